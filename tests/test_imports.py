@@ -214,6 +214,23 @@ def test_no_two_classes_have_one_name() -> None:
     assert sorted({name for name in names if names.count(name) > 1}) == []
 
 
+# A command line has one of each module; compiled functions are called by those of the same name.
+ON_PURPOSE = {"command", "main"}
+
+
+@pytest.mark.parametrize("package", ["seecr", "crosscheck"])
+def test_no_two_public_functions_of_a_package_have_one_name(package: str) -> None:
+    """``explained`` was a diagnosis in one module and a number in another."""
+    names = [
+        node.name
+        for path in modules(package)
+        if "compiled" not in path.parts
+        for node in tree_of(path).body
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")
+    ]
+    assert sorted({n for n in names if names.count(n) > 1} - ON_PURPOSE) == []
+
+
 # The two physics are worth comparing because they share the description of the robot alone.
 DESCRIPTION = {
     "seecr.errors",

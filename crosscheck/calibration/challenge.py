@@ -50,8 +50,8 @@ def _without(exact: Exact, about: Scores, best: Refit, name: str) -> None:
     barred: Names = frozenset()
     top = -float("inf")
     for k in range(_ROUNDS):
-        before, barred = barred, equals_of(exact, best, name)
-        scores = without(about, barred)
+        before, barred = barred, tried_equals(exact, best, name)
+        scores = excluding(about, barred)
         explore(scores, [scores.always, best.names - barred], _MOVES)
         least = best.score - _HOPELESS
         first, *others = scores.best(_EACH, _HOPELESS)
@@ -72,13 +72,13 @@ def _without(exact: Exact, about: Scores, best: Refit, name: str) -> None:
         about = exact.scores_about(other.joint)
 
 
-def without(scores: Scores, barred: Names) -> Scores:
+def excluding(scores: Scores, barred: Names) -> Scores:
     """The scores of a search from which these effects are excluded."""
     groups = {n: g for n, g in scores.gram.groups.items() if n not in barred}
     return replace(scores, gram=replace(scores.gram, groups=groups), solved={}, near={})
 
 
-def equals_of(exact: Exact, best: Refit, name: str) -> Names:
+def tried_equals(exact: Exact, best: Refit, name: str) -> Names:
     """A member, and the effects that fitted about as well in its place."""
     rest = best.names - {name}
     equals = {name}

@@ -12,7 +12,7 @@ from crosscheck.calibration.catalogue import Catalogue, gram_about, widths_for
 from crosscheck.calibration.gram import ColumnGroup, Gram, averaged, best_widths, gram_of
 from crosscheck.calibration.joining import at_null
 from crosscheck.calibration.joint import JointFit, Setting, settle
-from crosscheck.calibration.linearised import Linear, groups_of, left_to_gain, linearised
+from crosscheck.calibration.linearised import Linear, column_groups, left_to_gain, linearised
 from crosscheck.calibration.priors import SHAPES
 from crosscheck.calibration.sets import Names, Scores
 from crosscheck.calibration.shapes import log_shares, prices_about
@@ -218,7 +218,7 @@ def scored(
 
 def own_gram(linear: Linear, joint: JointFit) -> Gram:
     """Normal equations of a fit's own effects about its optimum, without parameters on a bound."""
-    groups = groups_of(joint, widths_for)
+    groups = column_groups(joint, widths_for)
     return gram_of(linear.x, own_readings(linear, joint, groups), groups)
 
 

@@ -19,7 +19,7 @@ from crosscheck.calibration.exact import own_readings
 from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN
 from crosscheck.calibration.gram import ColumnGroup, Gram, Solved, averaging, gram_of
 from crosscheck.calibration.joint import JointFit, Setting
-from crosscheck.calibration.linearised import groups_of, linearised
+from crosscheck.calibration.linearised import column_groups, linearised
 from crosscheck.calibration.sets import Names, Scores
 from crosscheck.calibration.varying import Varying, varying
 
@@ -157,7 +157,7 @@ class _Sets:
 
 def _with_fields(setting: Setting, joint: JointFit) -> tuple[Gram, list[Varying]]:
     """Normal equations of a fit's own effects and of all fields, and which fields these are."""
-    linear, groups = linearised(setting, joint), groups_of(joint, widths_for)
+    linear, groups = linearised(setting, joint), column_groups(joint, widths_for)
     y = own_readings(linear, joint, groups)
     fields, first = dict[Varying, ColumnGroup](), linear.x.shape[1]
     parts = varying(setting, joint)

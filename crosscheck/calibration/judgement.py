@@ -112,7 +112,7 @@ def judge(
             return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, kept, undecided, imitated=in_place)
     if unknown:  # known effects imitate it: none of them is sure
         return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), undecided)
-    if not sure and not more and undecided < _OPEN and explained(found) < _OWED:
+    if not sure and not more and undecided < _OPEN and explained_evidence(found) < _OWED:
         return Judgement(DiagnosisVerdict.NO_EFFECT_MISSING, (), undecided)
     verdict = DiagnosisVerdict.EFFECTS_FOUND if few and sure else DiagnosisVerdict.MANY_EFFECTS
     return Judgement(verdict, sure, undecided, doubted, more)
@@ -189,6 +189,6 @@ def _worth(found: Found, linear: dict[Names, float], base: float, rest: Names) -
     return base - linear.get(rest, -np.inf)
 
 
-def explained(found: Found) -> float:
+def explained_evidence(found: Found) -> float:
     """ln evidence of the best set over that of the model as it stands."""
     return found.best.score - found.none.score

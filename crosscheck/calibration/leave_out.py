@@ -53,7 +53,7 @@ def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
     problem = setting.problem
     blocks = blocks_of(problem)
     linear = linearised(setting, joint)
-    fitted = without(linear, np.zeros(len(linear.y), dtype=bool))
+    fitted = values_without(linear, np.zeros(len(linear.y), dtype=bool))
     raw = np.full(problem.measured.shape, np.nan)
     chi2, readings, surprise = (np.zeros(len(blocks)) for _ in range(3))
     values = np.zeros((len(blocks), len(joint.z)))
@@ -64,7 +64,7 @@ def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
         state = _without(setting, joint, mine)
         values[fold], raw[rows] = state.terms.vector, state.raw[rows]
         left = joint.whitened(setting.chain, state.white)
-        straight = joint.state.white + joint.jacobian @ (fitted - without(linear, absent))
+        straight = joint.state.white + joint.jacobian @ (fitted - values_without(linear, absent))
         expected = joint.whitened(setting.chain, straight)
         for b in fold:
             own = blocks[b][problem.row_of]
@@ -89,7 +89,7 @@ def _without(setting: Setting, joint: JointFit, absent: NDArray[np.bool_]) -> St
     return state
 
 
-def without(linear: Linear, rows: NDArray[np.bool_]) -> Array:
+def values_without(linear: Linear, rows: NDArray[np.bool_]) -> Array:
     """(p,) values z of the linear model without some readings: ridge regression with the prior."""
     free = linear.width > 0.0
     kept = linear.x[~rows][:, free]

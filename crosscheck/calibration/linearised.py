@@ -79,7 +79,7 @@ def left_to_gain(linear: Linear, z: Array) -> float:
     return float(slope @ solved(x.T @ x + np.diag(inverse2), slope))
 
 
-def groups_of(joint: JointFit, widths: Callable[[Layout], Array]) -> dict[str, ColumnGroup]:
+def column_groups(joint: JointFit, widths: Callable[[Layout], Array]) -> dict[str, ColumnGroup]:
     """The free columns of each effect without shapes, with the prior widths it may have."""
     free = free_of(joint)
     out = {}

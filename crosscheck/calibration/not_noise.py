@@ -42,13 +42,13 @@ def is_not_noise(setting: Setting, joint: JointFit, stated: Collection[str]) -> 
         stated: names of the kinds of reading whose noise was stated; for others it was estimated.
     """
     return (
-        too_large(joint.colour, np.bincount(setting.chain.kind, minlength=len(KINDS)), stated)
+        too_loud(joint.colour, np.bincount(setting.chain.kind, minlength=len(KINDS)), stated)
         or outliers_cluster(setting, joint)
         or is_correlated(setting, joint)
     )
 
 
-def too_large(colour: Colour, readings: NDArray[np.int64], stated: Collection[str]) -> bool:
+def too_loud(colour: Colour, readings: NDArray[np.int64], stated: Collection[str]) -> bool:
     """Whether the noise of some kind of reading is too large for what was stated or estimated.
 
     Args:

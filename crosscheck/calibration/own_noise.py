@@ -68,11 +68,11 @@ def by_own_noise(
         return OwnNoise()
     fits = {out: _fitted(setting, found, out) for out in some}
     worth = {
-        out: evidence(setting, found, fit)
+        out: evidence_by_own_noise(setting, found, fit)
         for out, fit in fits.items()
         if fit is not None and may_be(fit)
     }
-    own = evidence(setting, found, whole)
+    own = evidence_by_own_noise(setting, found, whole)
     best = max(worth, key=lambda out: worth[out], default=None)
     fewer = None if best is None or worth[best] <= own else fits[best]
     every = {frozenset[str](): own, **worth}
@@ -80,7 +80,7 @@ def by_own_noise(
     return OwnNoise(fewer, {out: float(np.exp(e - total)) for out, e in every.items()})
 
 
-def evidence(setting: Setting, found: Found, joint: JointFit) -> float:
+def evidence_by_own_noise(setting: Setting, found: Found, joint: JointFit) -> float:
     """ln evidence of a set by a fit with its own noise, plus ln of its prior."""
     fixed = replace(setting, frozen=True, weight=joint.weight)
     names, noise = frozenset(joint.terms.names), (setting.chain, joint.colour, joint.weight)

@@ -125,7 +125,7 @@ def explore(scores: Scores, starts: Iterable[Names], moves: int = _MOVES) -> Nam
     return max(ends, key=scores.score)
 
 
-def thinned(scores: Scores, start: Names) -> Names:
+def trimmed(scores: Scores, start: Names) -> Names:
     """A set without its least valuable members, while it is large and they are worth little."""
     gram = scores.gram
     widths = {n: scores.middle(n) for n in sorted(start & gram.groups.keys())}
@@ -142,7 +142,7 @@ def thinned(scores: Scores, start: Names) -> Names:
 
 def climb(scores: Scores, start: Names, moves: int = _MOVES) -> Names:
     """Move to a better neighbouring set as long as there is one, at most so often."""
-    at = thinned(scores, start)
+    at = trimmed(scores, start)
     for _ in range(moves):
         around = scores.neighbours(at)
         scores.near |= {n: s for n, s in around.items() if n not in scores.solved}

@@ -11,7 +11,7 @@ from crosscheck.calibration.colour import WHITE, Colour
 from crosscheck.calibration.gram import best_widths, gram_of
 from crosscheck.calibration.joining import PAYS, at_null, inside, layouts, promising_beside
 from crosscheck.calibration.joint import JointFit, Setting, cost, settle, tempered
-from crosscheck.calibration.linearised import groups_of, linearised, unwhitened
+from crosscheck.calibration.linearised import column_groups, linearised, unwhitened
 from crosscheck.calibration.priors import wider, widths_of
 from crosscheck.calibration.restricted import estimate, log_evidence
 from crosscheck.calibration.robust import LARGER, outliers
@@ -175,7 +175,7 @@ def noise_of(setting: Setting, joint: JointFit) -> Colour:
 def widened(setting: Setting, joint: JointFit) -> JointFit:
     """The fit with wider priors for effects that are clearly larger than plausible."""
     linear = linearised(setting, joint)
-    groups = groups_of(joint, wider)
+    groups = column_groups(joint, wider)
     gram = gram_of(linear.x, linear.y, groups)
     start = {name: float(group.widths[0]) for name, group in groups.items()}
     width = joint.width.copy()

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from seecr.cli.following import following
-from seecr.cli.options import FILE, finite, json_option, made_by, out_option, progress_share
+from seecr.cli.options import FILE, finite_option, json_option, made_by, out_option, progress_share
 
 
 @click.command(
@@ -74,7 +74,7 @@ Examples:
 @click.option(
     "--rest-for",
     type=click.FloatRange(min=0, min_open=True),
-    callback=finite,
+    callback=finite_option,
     metavar="S",
     default=0.5,
     show_default=True,
@@ -86,7 +86,7 @@ Examples:
 @click.option(
     "--clock",
     type=float,
-    callback=finite,
+    callback=finite_option,
     metavar="S",
     help="How far the tracker's clock is ahead of that of the commands.  [default: estimated]",
 )

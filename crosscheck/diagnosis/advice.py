@@ -18,7 +18,7 @@ from crosscheck.planning.adding import Extension
 from crosscheck.planning.extensions import extensions
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.proposer import Suggestion, telling_apart
-from crosscheck.planning.words import signals
+from crosscheck.planning.words import signal_words
 from crosscheck.units import in_unit, parameter_name
 from seecr.description.robot import Robot
 from seecr.effects import Term, catalogue
@@ -195,7 +195,7 @@ def _words_of(way: Suggestion) -> str:
     if way.poses is not None:
         places = ", ".join(_place(pose) for pose in way.poses)
         words = f"add poses at {places}"
-    return f"{words} (signal that separates them: {signals(gain)})"
+    return f"{words} (signal that separates them: {signal_words(gain)})"
 
 
 def _place(pose: Array) -> str:

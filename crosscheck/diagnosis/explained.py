@@ -25,7 +25,7 @@ from crosscheck.diagnosis.small import share_of
 from crosscheck.diagnosis.steps import OTHER
 from crosscheck.diagnosis.unexplained import where_of
 from crosscheck.diagnosis.words import (
-    agreement,
+    agreement_words,
     and_what_is_left,
     either,
     hints_of,
@@ -160,7 +160,7 @@ def _sentence(
     alternatives: Sequence[Names] = (),
 ) -> str:
     if said.verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
-        return agreement(tried, hints_of(chances, ()))
+        return agreement_words(tried, hints_of(chances, ()))
     if said.imitated is not None:
         known = " + ".join(sorted(said.imitated.replaced))
         left = (

@@ -11,7 +11,7 @@ from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict
-from crosscheck.fit.tolerance import Tolerance, doubt_of, left_over
+from crosscheck.fit.tolerance import Tolerance, doubt_of, remainder_of
 
 
 def weighed(found: Diagnosis, problem: Problem, tolerance: Tolerance) -> Diagnosis:
@@ -26,7 +26,7 @@ def weighed(found: Diagnosis, problem: Problem, tolerance: Tolerance) -> Diagnos
         return found
     rho = 0.0 if found.whiteness is None else max(found.whiteness.lag, found.whiteness.neighbour)
     rms, noise = _left_and_noise(found, found.search, problem)
-    left = left_over(rms, noise, tolerance, problem.data.sigma, doubt_of(problem, rho))
+    left = remainder_of(rms, noise, tolerance, problem.data.sigma, doubt_of(problem, rho))
     found = replace(found, left=left)
     if found.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT or left.important or left.undecided:
         return found

@@ -15,7 +15,13 @@ from crosscheck.diagnosis.nearby import chances_near
 from crosscheck.diagnosis.result import Diagnosis, NotListed
 from crosscheck.diagnosis.rivals import Rival, rivals_of
 from crosscheck.diagnosis.search import Search
-from crosscheck.diagnosis.words import agreement, and_what_is_left, hints_of, noise_left, words_of
+from crosscheck.diagnosis.words import (
+    agreement_words,
+    and_what_is_left,
+    hints_of,
+    noise_left,
+    words_of,
+)
 from crosscheck.fit.prepare import noise_floor
 from crosscheck.fit.problem import rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
@@ -39,7 +45,7 @@ def settled(
         rivals = _all_rivals(kept, told)
     missing = [missing_of(kept, name, chances, rivals[name]) for name in kept.found]
     hints = hints_of(chances, kept.found, found.found)
-    verdict, sentence = DiagnosisVerdict.NO_EFFECT_MISSING, agreement(found.tried, hints)
+    verdict, sentence = DiagnosisVerdict.NO_EFFECT_MISSING, agreement_words(found.tried, hints)
     if missing:
         verdict = DiagnosisVerdict.EFFECTS_FOUND
         sentence = and_what_is_left(words_of(missing), noise_left(hints), found.tried)

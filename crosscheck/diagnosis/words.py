@@ -32,7 +32,7 @@ def and_what_is_left(text: str, left: str, tried: int) -> str:
     )
 
 
-def agreement(tried: int, hints: Mapping[str, float] | None = None) -> str:
+def agreement_words(tried: int, hints: Mapping[str, float] | None = None) -> str:
     """The sentence about a model that lacks nothing for sure.
 
     Args:

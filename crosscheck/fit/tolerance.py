@@ -19,7 +19,7 @@ from crosscheck.given import check_above_zero
 from crosscheck.measurements.data import Sigma
 from crosscheck.units import SI, parse_kind
 
-__all__ = ["HALF_THE_NOISE", "LeftOver", "Tolerance", "doubt_of", "left_over"]
+__all__ = ["HALF_THE_NOISE", "LeftOver", "Tolerance", "doubt_of", "remainder_of"]
 
 # Without a stated tolerance, what is smaller than this part of the noise does not matter.
 _PART = 0.5
@@ -99,7 +99,7 @@ class LeftOver:
         return {"size": self.size, "tolerance": self.limit, "important": self.important}
 
 
-def left_over(
+def remainder_of(
     rms: Rms,
     noise: Rms,
     tolerance: Tolerance,

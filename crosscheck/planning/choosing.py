@@ -17,7 +17,7 @@ from crosscheck.planning.greedy import Wanted, chosen_poses
 from crosscheck.planning.places import held_within, tilted_grid, trustworthy
 from crosscheck.planning.planned import Planned, Reads, expected_sigma, kinds_of, planned
 from crosscheck.planning.sight import all_visible
-from crosscheck.planning.visibility import EXACT, Signal, left_over, signals
+from crosscheck.planning.visibility import EXACT, Signal, signal_left, signals
 from seecr.arguments import whole
 from seecr.counted import counted
 from seecr.description.joints import pose_of_values
@@ -159,7 +159,7 @@ def _wanted(there: dict[str, Signal]) -> list[Wanted]:
             continue
         out.append(Wanted(name, "", 0.0, found.needed))
         left = {
-            other: left_over(there[name], signal)
+            other: signal_left(there[name], signal)
             for other, signal in there.items()
             if other != name and other not in found.twins
         }

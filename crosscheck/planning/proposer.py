@@ -18,7 +18,7 @@ from crosscheck.measurements.data import Measurements
 from crosscheck.planning.adding import Adding, Extension
 from crosscheck.planning.greedy import Wanted, chosen_poses
 from crosscheck.planning.planned import Planned
-from crosscheck.planning.visibility import EXACT, Signal, joined, left_over
+from crosscheck.planning.visibility import EXACT, Signal, signal_left, signals_together
 from seecr.counted import counted
 from seecr.effects import Term
 from seecr.effects.base import Layout
@@ -127,11 +127,11 @@ def propose(
 
 
 def _gains(own: Signals, there: Signals, wanted: Sequence[Wanted]) -> tuple[Gain, ...]:
-    both = joined(own, there)
+    both = signals_together(own, there)
     gains = []
     for want in wanted:
         g = both[want.effect]
-        then = left_over(g, both[want.other]) if want.other else g.power
+        then = signal_left(g, both[want.other]) if want.other else g.power
         if then > _GAINS * want.now and then > _NEAR * want.needed:
             gains.append(Gain(want.effect, want.other, want.now, then, want.needed))
     return tuple(sorted(gains, key=lambda g: (not g.enough, -g.then / g.needed)))
@@ -166,7 +166,7 @@ def telling_apart(
         rival: the other effect.
     """
     own = _pair(plan, name, rival)
-    now = left_over(own[name], own[rival.name])
+    now = signal_left(own[name], own[rival.name])
     if now <= EXACT * own[name].power:
         now = 0.0
     want = Wanted(name, rival.name, now, NEEDED)

@@ -13,7 +13,7 @@ from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Reason, Why
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.result import Visible
-from crosscheck.planning.visibility import EXACT, Signal, left_over, needed, signals
+from crosscheck.planning.visibility import EXACT, Signal, needed, signal_left, signals
 from seecr.counted import counted, some
 from seecr.pose import Array
 
@@ -102,7 +102,7 @@ def _visible(name: str, own: Mapping[str, Signal]) -> Visible:
     g = own[name]
     need = needed(g.directions, len(own))
     power = g.power
-    left = {other: left_over(g, s) for other, s in own.items() if other != name}
+    left = {other: signal_left(g, s) for other, s in own.items() if other != name}
     twins = tuple(o for o, value in left.items() if power > 0 and value <= EXACT * power)
     rest = {o: value for o, value in left.items() if o not in twins}
     imitator = min(rest, key=lambda o: rest[o]) if rest else ""

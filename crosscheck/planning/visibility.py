@@ -126,12 +126,12 @@ def _columns(plan: Planned, layout: Layout, shape: dict[str, float]) -> Array:
     return np.asarray(np.where(given, 0.0, columns * layout.scale))
 
 
-def left_over(g: Signal, h: Signal) -> float:
+def signal_left(g: Signal, h: Signal) -> float:
     """lam_gh: squared signal of g that h cannot imitate."""
     return imitation.left_over(g.columns, h.basis)
 
 
-def joined(a: Mapping[str, Signal], b: Mapping[str, Signal]) -> dict[str, Signal]:
+def signals_together(a: Mapping[str, Signal], b: Mapping[str, Signal]) -> dict[str, Signal]:
     """Signals of two sets of readings together; 0 where one of them lacks an effect."""
     out = {}
     rows = [len(next(iter(s.values())).columns) if s else 0 for s in (a, b)]

@@ -16,7 +16,7 @@ def alike(found: Visible) -> str:
     return some(names)
 
 
-def signals(gain: Gain) -> str:
+def signal_words(gain: Gain) -> str:
     """The signal now, after the measurement, and that which is needed, to two digits."""
     # :g writes 2000, where :.2g alone writes 2e+03
     now, then = (f"{float(f'{value:.2g}'):g}" for value in (gain.now, gain.then))
@@ -25,7 +25,7 @@ def signals(gain: Gain) -> str:
 
 def gain_words(gain: Gain) -> str:
     """What a measurement would gain, with numbers."""
-    numbers = f"(signal {signals(gain)})"
+    numbers = f"(signal {signal_words(gain)})"
     if gain.other:
         return f"tells {gain.effect} from {gain.other} {numbers}"
     return f"makes {gain.effect} visible {numbers}"

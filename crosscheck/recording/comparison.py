@@ -45,7 +45,9 @@ def write_comparison_recording(found: Comparison, path: str | Path) -> None:
             _verdict(recording, found, None)
         return
     shown = Misfit(problem, found.state)
-    seen = np.concatenate([shown.measured[shown.rows], misfit.read_poses(shown.first)[shown.rows]])
+    seen = np.concatenate(
+        [shown.measured[shown.rows], misfit.predicted_poses(shown.first)[shown.rows]]
+    )
     with recording_file(path, name, _blueprint(found, shown, name, seen)) as recording:
         top = colours.round_up(float(np.nanmax(found.state.prediction.tensions, initial=0.0)))
         scene = Scene(recording, problem.robot, seen, top)
@@ -92,7 +94,7 @@ def _over_poses(recording: Recording, scene: Scene, found: Comparison, shown: Mi
     misfit.cursor(recording, index, shown)
     measured = np.where(found.problem.use[:, None], shown.measured, np.nan)
     scene.platform("measured", index, measured, MEASURED)
-    predicted = misfit.read_poses(found.state)
+    predicted = misfit.predicted_poses(found.state)
     states = misfit.states_of(found.state)
     predicted = np.where(states.known[:, None], predicted, np.nan)
     scene.platform("model", index, predicted, colours.SEECR, solid=True)
@@ -143,7 +145,7 @@ def _verdict(recording: Recording, found: Comparison, shown: Misfit | None) -> N
     if shown is not None:
         parts.append(_errors(found, shown))
         parts.append(
-            f"\n**Scene.** {misfit.words_of(shown)} Blue box and cables: the model; orange "
+            f"\n**Scene.** {misfit.misfit_words(shown)} Blue box and cables: the model; orange "
             "edges: what was measured.\n"
         )
         parts.append(_worst(found))

@@ -71,7 +71,9 @@ def _write_words(found: Diagnosis, path: str | Path) -> None:
 
 
 def _seen(shown: Misfit) -> Array:
-    return np.concatenate([shown.measured[shown.rows], misfit.read_poses(shown.first)[shown.rows]])
+    return np.concatenate(
+        [shown.measured[shown.rows], misfit.predicted_poses(shown.first)[shown.rows]]
+    )
 
 
 def _top_tension(stages: list[Stage]) -> float:
@@ -124,7 +126,7 @@ def _over_steps(
     count = len(stages)
     measured = np.tile(shown.measured[worst], (count, 1))
     scene.platform("measured", index, measured, MEASURED)
-    predicted = np.stack([misfit.read_poses(state)[worst] for state in states])
+    predicted = np.stack([misfit.predicted_poses(state)[worst] for state in states])
     scene.platform("model", index, predicted, colours.SEECR, solid=True)
     scene.cables("model", index, misfit.stacked([(state, worst) for state in states]))
     texts = [model_words(found, stages, k, shown, worst) for k in range(count)]
@@ -138,10 +140,10 @@ def _over_poses(recording: Recording, scene: Scene, stages: list[Stage], shown: 
     last = stages[-1].state
     measured = np.where(shown.problem.use[:, None], shown.measured, np.nan)
     scene.platform("measured", index, measured, MEASURED)
-    scene.platform("model", index, misfit.read_poses(last), colours.SEECR, solid=True)
+    scene.platform("model", index, misfit.predicted_poses(last), colours.SEECR, solid=True)
     scene.cables("model", index, misfit.states_of(last))
     if len(stages) > 1:
-        scene.platform("first", index, misfit.read_poses(shown.first), colours.PINK)
+        scene.platform("first", index, misfit.predicted_poses(shown.first), colours.PINK)
     misfit.maps(recording, pose_index(1), shown, [shown.first])
     misfit.cursor(recording, index, shown)
     for kind in shown.kinds:

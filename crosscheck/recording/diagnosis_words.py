@@ -28,7 +28,7 @@ def verdict_words(found: Diagnosis, shown: Misfit | None) -> str:
     """The verdict, what to measure next, what was assumed, and how to read the views."""
     parts = [f"# {found.verdict.heading}\n{plain(found.sentence)}\n"]
     if shown is not None:
-        parts.append(_PLAY.format(arrows=misfit.words_of(shown)))
+        parts.append(_PLAY.format(arrows=misfit.misfit_words(shown)))
     parts += _listed("What to measure next", list(found.measure_next))
     parts += _listed("Notes", list(found.notes))
     return "\n".join(parts)

@@ -83,7 +83,7 @@ class Misfit:
         return np.concatenate([position, quat], axis=1)
 
 
-def read_poses(state: State) -> Array:
+def predicted_poses(state: State) -> Array:
     """(n, 7) poses that would be read according to the model."""
     readings = state.prediction.readings
     return np.concatenate([readings.position, readings.quat_wxyz], axis=1)
@@ -208,7 +208,7 @@ def _arrow_words(misfit: Misfit, kind: Kind) -> str:
     return f", arrows {drawn(misfit.magnify)}" if kind.name == "position" and misfit.magnify else ""
 
 
-def words_of(misfit: Misfit) -> str:
+def misfit_words(misfit: Misfit) -> str:
     """The meaning of arrows and colours, in a sentence or two."""
     kind = misfit.kinds[0]
     scale = f"from dark (none) to yellow ({misfit.top(kind):g} {kind.unit} or more)"

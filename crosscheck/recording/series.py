@@ -84,7 +84,7 @@ class Series:
         both = material.seecr.known & material.mujoco.known
         self._lanes(index, plots.lane_states(material.seecr.slack, material.slack_differs, both))
         verdicts = [verdict.name.lower() for verdict in material.result.verdict]
-        plots.lanes(self.recording, VERDICT, index, verdicts)
+        plots.lane(self.recording, VERDICT, index, verdicts)
         _verdict_style(self.recording)
         self._style()
 
@@ -128,7 +128,7 @@ class Series:
 
     def _lanes(self, index: Index, states: NDArray[np.object_]) -> None:
         for name, column in zip(self.material.robot.cable_names, states.T, strict=True):
-            plots.lanes(self.recording, f"{LANES}/{entity_of(name)}", index, list(column))
+            plots.lane(self.recording, f"{LANES}/{entity_of(name)}", index, list(column))
 
     def _log(self, root: str, quantity: str, index: Index, values: Array) -> None:
         self.recording.scalars(f"{root}/{quantity}", index, plots.log10(values))

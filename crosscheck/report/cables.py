@@ -97,7 +97,7 @@ def walls_of(problem: Problem, before: Drawn, after: Drawn) -> list[Wall]:
 def _of_cables(problem: Problem, prediction: Prediction) -> list[tuple[str, Array]]:
     out = [("length of the cable [m]", cable_lengths(problem, prediction))]
     out.append(("its tension [N]", prediction.tensions))
-    out.append(("reeled in ← last move [mm] → paid out", 1e3 * paid_out(problem, prediction)))
+    out.append(("reeled in ← last move [mm] → paid out", 1e3 * length_changes(problem, prediction)))
     return out + _time(problem)
 
 
@@ -130,7 +130,7 @@ def _time(problem: Problem) -> list[tuple[str, Array]]:
     return [("time [s]", t_s - t_s.min())]
 
 
-def paid_out(problem: Problem, prediction: Prediction) -> Array:
+def length_changes(problem: Problem, prediction: Prediction) -> Array:
     """Commanded change of each cable's length (n, m) [m] since the row before in its run.
 
     NaN for the first row of a run: its long way from the reference pose would hide the others.

@@ -141,7 +141,7 @@ def _arrows(
     axes: Axes, problem: Problem, stage: Drawn, place: Array, view: tuple[int, int], magnify: float
 ) -> None:
     error = np.where(problem.counted[:, POSITION], stage.state.raw[:, POSITION], 0.0)
-    rows = np.flatnonzero(problem.use)[:: thinned(problem)]
+    rows = np.flatnonzero(problem.use)[:: rows_per_arrow(problem)]
     axes.quiver(
         place[rows, view[0]], place[rows, view[1]], error[rows, view[0]], error[rows, view[1]],
         angles="xy", scale_units="xy", scale=1.0 / magnify, units="inches", width=0.017,
@@ -149,7 +149,7 @@ def _arrows(
     )  # fmt: skip
 
 
-def thinned(problem: Problem) -> int:
+def rows_per_arrow(problem: Problem) -> int:
     """Arrows are drawn for one row in so many."""
     return int(np.ceil(problem.use.sum() / _MOST_ARROWS))
 
@@ -173,8 +173,8 @@ def caption(problem: Problem, stage: Drawn) -> str:
     parts = []
     if magnify:
         parts.append(
-            f"Arrows: measured minus predicted position at {_which(thinned(problem))}; an error "
-            f"of 1 mm is drawn as an arrow of {magnify:g} mm."
+            f"Arrows: measured minus predicted position at {_which(rows_per_arrow(problem))}; an "
+            f"error of 1 mm is drawn as an arrow of {magnify:g} mm."
         )
     if kind is not None:
         parts.append(f"Dots: the {kind.name} error.")

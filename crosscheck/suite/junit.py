@@ -93,7 +93,7 @@ def _report(result: CaseResult) -> list[str]:
         f"{words.NAMES[name]}: {worst.value:.3e}, allowed {worst.allowed:.3e}, pose {worst.pose}"
         for name, worst in result.worst.items()
     ]
-    return [*lines, *words.findings(result), *words.widened(result)]
+    return [*lines, *words.findings(result), *words.widened_lines(result)]
 
 
 def _clean(text: str) -> str:

@@ -23,7 +23,7 @@ from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.pool import Pool
 from crosscheck.suite.results import CaseResult, Worst, counts, worst_of
 from crosscheck.suite.thresholds import Thresholds, load_thresholds
-from crosscheck.suite.verdicts import Answers, Verdict, held_to, judge
+from crosscheck.suite.verdicts import Answers, Verdict, held_to, judge_poses
 from seecr.counted import counted
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
@@ -146,7 +146,7 @@ def run_case(case: Case, thresholds: Thresholds, record: Recorder | None = None)
     settling = mujoco.settle(case.poses, case.begins)
     allowance = allowances(thresholds, solution, settling)
     difference = differences_of(solution, settling, allowance.tension_N)
-    verdict, findings = judge(Answers(mujoco, solution, settling, difference, allowance))
+    verdict, findings = judge_poses(Answers(mujoco, solution, settling, difference, allowance))
     result = CaseResult(
         case=case,
         robot=robot,

@@ -40,7 +40,7 @@ def _cases(run: Run, worst_pose: str) -> list[str]:
     ]
     parts += _section(run, "Failures", words.failures)
     parts += _section(run, "Findings", words.findings)
-    parts += _section(run, "Widened thresholds", words.widened)
+    parts += _section(run, "Widened thresholds", words.widened_lines)
     return parts
 
 

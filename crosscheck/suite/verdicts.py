@@ -94,7 +94,7 @@ class Answers(NamedTuple):
     allowance: Allowance
 
 
-def judge(answers: Answers) -> tuple[NDArray[np.object_], tuple[PoseFinding, ...]]:
+def judge_poses(answers: Answers) -> tuple[NDArray[np.object_], tuple[PoseFinding, ...]]:
     """Verdicts (n,) of all poses, and a finding for each that does not simply agree."""
     n = len(answers.solution)
     verdicts = np.full(n, Verdict.AGREES, dtype=object)

@@ -150,7 +150,7 @@ def case_line(result: CaseResult) -> str:
     return f"{result.case.name}: {poses}, {result.outcome.value}{notes}; {worst_sentence(pair)}"
 
 
-def widened(result: CaseResult) -> list[str]:
+def widened_lines(result: CaseResult) -> list[str]:
     """One line for each pose with widened thresholds."""
     rows = [i for i, wide in enumerate(result.allowance.widened) if wide]
     return [

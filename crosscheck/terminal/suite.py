@@ -78,7 +78,7 @@ def _print_notes(console: Console, result: CaseResult) -> None:
     lines = words.failures(result)
     branches = [f for f in result.findings if f.verdict is Verdict.BRANCH and not f.fails]
     lines += [f"pose {f.pose}: {f.text}" for f in branches]
-    lines += words.widened(result)
+    lines += words.widened_lines(result)
     name = result.case.name
     _print_lines(console, [f"{name}, {line}" for line in lines], name)
 

@@ -148,7 +148,7 @@ def progress_share(text: str) -> Iterator[Callable[[str, float], None]]:
         yield tell
 
 
-def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
+def finite_option(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
     """A number as it is, as an option's callback; a usage error where it is none, or has no end."""
     if value is not None and not math.isfinite(value):
         raise click.BadParameter(f"{value} is not a finite number.", ctx, param)

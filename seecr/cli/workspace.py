@@ -20,7 +20,7 @@ from seecr.cli.arguments import (
     turned_option,
 )
 from seecr.cli.following import following
-from seecr.cli.options import finite, json_option, made_by, out_option, progress_bar
+from seecr.cli.options import finite_option, json_option, made_by, out_option, progress_bar
 
 if TYPE_CHECKING:
     import numpy as np
@@ -70,7 +70,7 @@ Examples:
 @click.option(
     "--edge",
     type=click.FloatRange(0.0, min_open=True),
-    callback=finite,
+    callback=finite_option,
     metavar="M",
     help="Also find the edge of the workspace, to this many metres, between poses of the grid.",
 )

@@ -72,7 +72,7 @@ class Path:
         return turning(self.robot, self.given)
 
 
-def path_of(robot: Robot, commands: Commands, waypoints: float | None = None) -> Path:
+def waypoints_of(robot: Robot, commands: Commands, waypoints: float | None = None) -> Path:
     """The waypoints of commands: straight from the reference pose, straight between rows.
 
     Args:

@@ -16,7 +16,7 @@ from seecr.effects.base import Layout
 _SIZES, _SIZES_READ, _TURN = 1e4, 1e5, 2.0 * np.pi
 
 
-def limits_of(layout: Layout, i: int) -> tuple[float, float]:
+def range_of(layout: Layout, i: int) -> tuple[float, float]:
     """The lowest and the highest value that parameter i may have."""
     lower, upper = float(layout.lower[i]), float(layout.upper[i])
     if layout.shape[i]:  # its bounds are its search range
@@ -29,7 +29,7 @@ def limits_of(layout: Layout, i: int) -> tuple[float, float]:
 
 def beyond(layout: Layout, i: int, value: float) -> str:
     """What is wrong with a value that parameter i cannot have; "" if nothing is."""
-    low, high = limits_of(layout, i)
+    low, high = range_of(layout, i)
     if low <= value <= high:
         return ""
     return f"{value:g} is out of bounds; expected {low:g} to {high:g}"

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.commands.data import Commands
-from seecr.commands.path import Path, path_of
+from seecr.commands.path import Path, waypoints_of
 from seecr.compiled.outcomes import CONVERGED, SINGULAR
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot
@@ -124,7 +124,7 @@ def follow_commands(robot: Robot, commands: Commands, setup_of: SetupOf) -> Solu
         a :class:`seecr.Solution` with ``jumps``. If the platform finds no equilibrium after a jump,
         the waypoint is solved from its own command, as without following.
     """
-    path = path_of(robot, commands, waypoints=_WAY)
+    path = waypoints_of(robot, commands, waypoints=_WAY)
     tables = assemble(setup_of(path.commands, path.source))
     followed = _Followed(robot, path, tables, setup_of)
     found = batch.Evaluation.empty(len(tables), robot.n_cables, robot.n_dof)

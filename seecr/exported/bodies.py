@@ -19,7 +19,7 @@ from seecr.description.joints import values_of_pose
 from seecr.description.robot import Robot
 from seecr.effects.setup import Setup
 from seecr.exported.chain import HangingCable, HangingChain, hanging
-from seecr.exported.scene import cable, dot, numbers, scene, text_of
+from seecr.exported.scene import cable, dot, numbers_text, scene, text_of
 from seecr.pose import Array, transform_points
 from seecr.statics.solution import Solution
 
@@ -57,7 +57,7 @@ def bodies_text(setup: Setup, solution: Solution, comment: str) -> str:
     if robot.joints:
         rest = values_of_pose(robot, solution.pose)[0][0]
     frames = ET.SubElement(root, "keyframe")
-    ET.SubElement(frames, "key", name="rest", qpos=numbers(rest, joints))
+    ET.SubElement(frames, "key", name="rest", qpos=numbers_text(rest, joints))
     return text_of(root)
 
 
@@ -77,7 +77,7 @@ def _push(root: ET.Element, world: ET.Element, body: ET.Element, wrench: Array) 
     ET.SubElement(body, "site", name="origin")
     ET.SubElement(
         ET.SubElement(root, "actuator"), "general", name="wrench", site="origin", refsite="base",
-        gear=numbers(wrench), gainprm="0", biastype="affine", biasprm="1",
+        gear=numbers_text(wrench), gainprm="0", biastype="affine", biasprm="1",
     )  # fmt: skip
 
 
@@ -170,18 +170,22 @@ class _Cable:
 
     def _carrier(self, parent: ET.Element, name: str, place: Array) -> ET.Element:
         """A body of small mass, held by springs, without weight."""
-        body = ET.SubElement(parent, "body", name=name, pos=numbers(place), gravcomp="1")
+        body = ET.SubElement(parent, "body", name=name, pos=numbers_text(place), gravcomp="1")
         turning = 1e-3 * self.small * self.robot.length**2
         ET.SubElement(
-            body, "inertial", pos="0 0 0", mass=numbers(self.small),
-            diaginertia=numbers([turning] * 3),
+            body, "inertial", pos="0 0 0", mass=numbers_text(self.small),
+            diaginertia=numbers_text([turning] * 3),
         )  # fmt: skip
         return body
 
     def _spring(self, body: ET.Element, axis: Array, compliance: float, pull: float) -> None:
         """Add a spring along an axis, and its equilibrium value under a pull [N]."""
         ET.SubElement(
-            body, "joint", type="slide", axis=numbers(axis), stiffness=numbers(1.0 / compliance)
+            body,
+            "joint",
+            type="slide",
+            axis=numbers_text(axis),
+            stiffness=numbers_text(1.0 / compliance),
         )
         self.at_rest.append(compliance * pull)
 
@@ -193,7 +197,7 @@ class _Cable:
             for axis, by in self.yields:
                 self._spring(parent, axis, by, float(self.pull @ axis))
         ET.SubElement(
-            parent, "site", name=f"exit{number}", pos=numbers(place), size=dot(self.robot)
+            parent, "site", name=f"exit{number}", pos=numbers_text(place), size=dot(self.robot)
         )
         below = place - self.tail * self.up
         if self.series > 0.0:
@@ -201,7 +205,7 @@ class _Cable:
             self._spring(winch, self.up, self.series, self.tension)
             ET.SubElement(winch, "site", name=f"winch{number}")
         elif self.radius > 0.0:
-            ET.SubElement(parent, "site", name=f"winch{number}", pos=numbers(below))
+            ET.SubElement(parent, "site", name=f"winch{number}", pos=numbers_text(below))
         if self.radius > 0.0:
             self._sheave(world)
         return parent
@@ -210,17 +214,17 @@ class _Cable:
         r, number = self.radius, self.i + 1
         ahead = self._ahead()
         wheel = ET.SubElement(
-            world, "body", name=f"sheave{number}", pos=numbers(self.exit),
-            xyaxes=numbers(ahead, np.cross(self.up, ahead)),
+            world, "body", name=f"sheave{number}", pos=numbers_text(self.exit),
+            xyaxes=numbers_text(ahead, np.cross(self.up, ahead)),
         )  # fmt: skip
         ET.SubElement(
-            wheel, "geom", name=f"sheave{number}", type="cylinder", size=numbers(r, 0.2 * r),
-            pos=numbers(r, 0.0, 0.0), quat=_ACROSS, contype="0", conaffinity="0", mass="0",
+            wheel, "geom", name=f"sheave{number}", type="cylinder", size=numbers_text(r, 0.2 * r),
+            pos=numbers_text(r, 0.0, 0.0), quat=_ACROSS, contype="0", conaffinity="0", mass="0",
         )  # fmt: skip
         # on top: as seen from the centre, between the normals of the two tangents
         lean = 0.9 * np.arctan2(r, self.tail)
         side = [r + 2.0 * r * np.sin(lean), 0.0, 2.0 * r * np.cos(lean)]
-        ET.SubElement(wheel, "site", name=f"over{number}", pos=numbers(side))
+        ET.SubElement(wheel, "site", name=f"over{number}", pos=numbers_text(side))
 
     def _ahead(self) -> Array:
         """Horizontal direction (3,) to the anchor point; arbitrary if there is none."""
@@ -247,14 +251,14 @@ class _Cable:
         for j, place in enumerate(chain.places, start=1):
             name = f"node{self.i + 1}-{j}"
             there = start + self._by(place)
-            node = ET.SubElement(world, "body", name=name, pos=numbers(there))
+            node = ET.SubElement(world, "body", name=name, pos=numbers_text(there))
             for axis in np.eye(3):
-                ET.SubElement(node, "joint", type="slide", axis=numbers(axis))
+                ET.SubElement(node, "joint", type="slide", axis=numbers_text(axis))
             self._point(node, chain.between)
             ET.SubElement(node, "site", name=name, size=dot(self.robot))
             names.append(name)
             self.at_rest += [0.0, 0.0, 0.0]
-        self._point(ET.SubElement(body, "body", pos=numbers(self.anchor)), chain.end)
+        self._point(ET.SubElement(body, "body", pos=numbers_text(self.anchor)), chain.end)
         if self.yields:
             rest = self.weight - (SEGMENTS - 1) * chain.between - chain.end
             self._point(ET.SubElement(carrier, "body"), rest)
@@ -264,5 +268,9 @@ class _Cable:
         mass = weight / self.gravity
         turning = 1e-3 * mass * self.robot.length**2
         ET.SubElement(
-            body, "inertial", pos="0 0 0", mass=numbers(mass), diaginertia=numbers([turning] * 3)
+            body,
+            "inertial",
+            pos="0 0 0",
+            mass=numbers_text(mass),
+            diaginertia=numbers_text([turning] * 3),
         )

@@ -14,7 +14,7 @@ from seecr.pose import Array, quat_conjugate, quat_rotate
 _PLATFORM_COLOUR, _CABLE_COLOUR = "0.13 0.35 0.62 1", "0.10 0.12 0.14 1"
 
 
-def numbers(*values: ArrayLike) -> str:
+def numbers_text(*values: ArrayLike) -> str:
     """Numbers as MJCF text, without rounding."""
     flat = np.concatenate([np.atleast_1d(np.asarray(value, float)) for value in values])
     return " ".join(repr(float(value) + 0.0) for value in flat)
@@ -33,17 +33,19 @@ def scene(robot: Robot, comment: str) -> tuple[ET.Element, ET.Element, ET.Elemen
     root = ET.Element("mujoco", model=robot.name)
     root.append(ET.Comment(f" {comment.replace('--', '- -')} "))
     ET.SubElement(root, "compiler", angle="radian")
-    ET.SubElement(root, "option", gravity=numbers(robot.gravity), integrator="discrete")
+    ET.SubElement(root, "option", gravity=numbers_text(robot.gravity), integrator="discrete")
     span = np.ptp(np.concatenate([robot.exit_points, robot.reference_pose[None, :3]]), axis=0)
     middle = robot.exit_points.mean(axis=0)
-    extent = numbers(0.75 * np.linalg.norm(span))
-    ET.SubElement(root, "statistic", center=numbers(middle), extent=extent)
+    extent = numbers_text(0.75 * np.linalg.norm(span))
+    ET.SubElement(root, "statistic", center=numbers_text(middle), extent=extent)
     ET.SubElement(
         ET.SubElement(root, "asset"), "texture", type="skybox", builtin="gradient",
         rgb1="0.93 0.95 0.97", rgb2="0.6 0.68 0.76", width="64", height="384",
     )  # fmt: skip
     world = ET.SubElement(root, "worldbody")
-    ET.SubElement(world, "light", pos=numbers(middle + extent_up(robot)), dir=numbers(-robot.up))
+    ET.SubElement(
+        world, "light", pos=numbers_text(middle + extent_up(robot)), dir=numbers_text(-robot.up)
+    )
     return root, world, _platform(world, robot)
 
 
@@ -54,38 +56,40 @@ def extent_up(robot: Robot) -> Array:
 
 def _platform(world: ET.Element, robot: Robot) -> ET.Element:
     place, quat = robot.reference_pose[:3], robot.reference_pose[3:]
-    body = ET.SubElement(world, "body", name="platform", pos=numbers(place), quat=numbers(quat))
+    body = ET.SubElement(
+        world, "body", name="platform", pos=numbers_text(place), quat=numbers_text(quat)
+    )
     if not robot.joints:
         ET.SubElement(body, "freejoint")
     back = quat_conjugate(quat)
     for joint in robot.joints:
         ET.SubElement(
             body, "joint", name=joint.name, type=joint.kind,
-            axis=numbers(quat_rotate(back, joint.axis)),
-            pos=numbers(quat_rotate(back, joint.point - place)),
+            axis=numbers_text(quat_rotate(back, joint.axis)),
+            pos=numbers_text(quat_rotate(back, joint.point - place)),
         )  # fmt: skip
     turning = robot.inertia
     if not np.any(turning):  # unknown, but MuJoCo needs one
         turning = robot.mass * robot.length**2 * np.eye(3)
     six = turning[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     ET.SubElement(
-        body, "inertial", pos=numbers(robot.centre_of_mass), mass=numbers(robot.mass),
-        fullinertia=numbers(six),
+        body, "inertial", pos=numbers_text(robot.centre_of_mass), mass=numbers_text(robot.mass),
+        fullinertia=numbers_text(six),
     )  # fmt: skip
     half = np.maximum(0.5 * np.ptp(robot.anchor_points, axis=0), 0.1 * robot.length)
     middle = robot.anchor_points.mean(axis=0)
     ET.SubElement(
-        body, "geom", type="box", pos=numbers(middle), size=numbers(half), contype="0",
+        body, "geom", type="box", pos=numbers_text(middle), size=numbers_text(half), contype="0",
         conaffinity="0", mass="0", rgba=_PLATFORM_COLOUR,
     )  # fmt: skip
     for i, anchor in enumerate(robot.anchor_points, start=1):
-        ET.SubElement(body, "site", name=f"anchor{i}", pos=numbers(anchor), size=dot(robot))
+        ET.SubElement(body, "site", name=f"anchor{i}", pos=numbers_text(anchor), size=dot(robot))
     return body
 
 
 def dot(robot: Robot) -> str:
     """Size of sites, which only matters for the picture."""
-    return numbers(0.05 * robot.length)
+    return numbers_text(0.05 * robot.length)
 
 
 def cable(
@@ -108,8 +112,8 @@ def cable(
         width: of its picture [m].
     """
     spatial = ET.SubElement(
-        tendons, "spatial", name=name, springlength=numbers(0.0, rest),
-        stiffness=numbers(*stiffness), width=numbers(width), rgba=_CABLE_COLOUR,
+        tendons, "spatial", name=name, springlength=numbers_text(0.0, rest),
+        stiffness=numbers_text(*stiffness), width=numbers_text(width), rgba=_CABLE_COLOUR,
     )  # fmt: skip
     for tag, attributes in path:
         ET.SubElement(spatial, tag, attributes)
@@ -125,7 +129,7 @@ def plain_text(robot: Robot, comment: str) -> str:
     """A robot's description, which :func:`seecr.load_robot` reads back to within a digit or two."""
     root, world, _ = scene(robot, comment)
     for i, point in enumerate(robot.exit_points, start=1):
-        ET.SubElement(world, "site", name=f"exit{i}", pos=numbers(point), size=dot(robot))
+        ET.SubElement(world, "site", name=f"exit{i}", pos=numbers_text(point), size=dot(robot))
     tendons = ET.SubElement(root, "tendon")
     for i, name in enumerate(robot.cable_names):
         rest = float(robot.rest_lengths[i])

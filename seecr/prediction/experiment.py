@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.commands.data import Commands
-from seecr.commands.path import Path, path_of
+from seecr.commands.path import Path, waypoints_of
 from seecr.compiled.columns import STRAIN, TENSION
 from seecr.compiled.outcomes import CONVERGED, ITERATIONS, SINGULAR, STALLED
 from seecr.description.given import GivenRobot, robot_of
@@ -162,7 +162,7 @@ class Experiment:
     def path(self) -> Path:
         """The rows with their waypoints, for effects with history."""
         if not self._path:
-            self._path.append(path_of(self.robot, self.commands))
+            self._path.append(waypoints_of(self.robot, self.commands))
         return self._path[0]
 
     def with_length_errors(self, errors: Array | None) -> Experiment:

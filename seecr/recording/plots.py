@@ -101,7 +101,7 @@ def lane_states(
     return words
 
 
-def lanes(recording: Recording, entity: str, index: Index, words: Sequence[str]) -> None:
+def lane(recording: Recording, entity: str, index: Index, words: Sequence[str]) -> None:
     """One lane over a timeline, (k,) words."""
     recording.rows(entity, index, rr.StateChange.columns(state=list(words)))
 

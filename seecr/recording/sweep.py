@@ -128,5 +128,5 @@ def _plots(recording: Recording, index: Index, solution: Solution, commanded: bo
         recording.scalars(entity, index, solution.tensions[:, k])
         plots.as_line(recording, entity, said.get(k, names[k]), colour, 1.5)
         lane = f"{_LANES}/{entity_of(names[k])}"
-        plots.lanes(recording, lane, index, list(states[:, k]))
+        plots.lane(recording, lane, index, list(states[:, k]))
         plots.lane_style(recording, lane, colour)

@@ -11,7 +11,7 @@ from made_data import COGIRO, SIGMA, measured, term
 
 from crosscheck.calibration.all_effects import Calibration, fit_all_effects
 from crosscheck.calibration.joint import cost
-from crosscheck.calibration.leave_out import surprise_of, without
+from crosscheck.calibration.leave_out import surprise_of, values_without
 from crosscheck.calibration.linearised import Linear
 from crosscheck.calibration.result import calibrate
 from crosscheck.fit.held_out import blocks_of
@@ -140,7 +140,7 @@ def test_leaving_out_in_a_linear_model_is_refitting_without() -> None:
     rng = np.random.default_rng(6)
     x, y, width = rng.normal(size=(30, 4)), rng.normal(size=30), np.array([1.0, 0.5, 0.0, 2.0])
     rows = np.arange(30) < 8
-    z = without(Linear(x, y, width), rows)
+    z = values_without(Linear(x, y, width), rows)
     assert z[2] == 0.0
     kept = x[8:, [0, 1, 3]]
     slope = kept.T @ (y[8:] - kept @ z[[0, 1, 3]]) - z[[0, 1, 3]] / width[[0, 1, 3]] ** 2

@@ -12,7 +12,7 @@ import pytest
 from crosscheck.calibration import challenge as module
 from crosscheck.calibration import refits
 from crosscheck.calibration.catalogue import Catalogue
-from crosscheck.calibration.challenge import challenge, equals_of, without
+from crosscheck.calibration.challenge import challenge, excluding, tried_equals
 from crosscheck.calibration.exact import Exact, Refit
 from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.probability import probabilities
@@ -127,7 +127,7 @@ def test_an_equal_may_cost_what_its_further_parameter_does() -> None:
     exact.longer = frozenset("e")
     best = exact.fitted[frozenset("a")]
     assert best is not None
-    assert equals_of(exact, best, "a") == frozenset("ace")
+    assert tried_equals(exact, best, "a") == frozenset("ace")
 
 
 def test_large_sets_are_not_challenged(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -137,7 +137,7 @@ def test_large_sets_are_not_challenged(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_what_is_barred_is_in_no_set() -> None:
-    scores = without(Scores(gram({"a": 2.0}), len(NAMES)), frozenset("ac"))
+    scores = excluding(Scores(gram({"a": 2.0}), len(NAMES)), frozenset("ac"))
     explore(scores, [frozenset(), frozenset("b")])
     assert not any(names & frozenset("ac") for names in scores.best(50, 1e9))
 

@@ -74,7 +74,9 @@ def test_the_set_with_the_most_evidence_by_its_own_noise_is_taken(
     monkeypatch: pytest.MonkeyPatch, best: str
 ) -> None:
     monkeypatch.setattr(own_noise, "_fitted", fit_of)
-    monkeypatch.setattr(own_noise, "evidence", lambda _s, _f, fit: float(fit.out == best))
+    monkeypatch.setattr(
+        own_noise, "evidence_by_own_noise", lambda _s, _f, fit: float(fit.out == best)
+    )
     setting: Any = None
     taken = own_noise.by_own_noise(setting, found({"a": 1.0, "b": 2.0}))
     assert taken.fewer is None if best == "" else taken.fewer.out == best  # type: ignore[union-attr]
@@ -90,7 +92,7 @@ def test_a_member_is_as_probable_as_by_the_noise_without_it(
 ) -> None:
     own = {"": 10.0, "a": 9.0, "b": 8.0, "ab": 7.0}
     monkeypatch.setattr(own_noise, "_fitted", fit_of)
-    monkeypatch.setattr(own_noise, "evidence", lambda _s, _f, fit: own[fit.out])
+    monkeypatch.setattr(own_noise, "evidence_by_own_noise", lambda _s, _f, fit: own[fit.out])
     setting: Any = None
     taken = own_noise.by_own_noise(setting, found({"a": 1.0, "b": 2.0, "c": 1e4}))
     assert taken.fewer is None

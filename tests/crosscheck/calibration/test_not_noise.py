@@ -12,7 +12,7 @@ from crosscheck.calibration.not_noise import (
     is_correlated,
     most_together,
     outliers_cluster,
-    too_large,
+    too_loud,
 )
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
@@ -43,7 +43,7 @@ def noise(scale: float, rho: float) -> Colour:
 def test_stated_noise_may_be_coloured_and_wrong_by_two_but_no_more(
     scale: float, rho: float, is_noise: bool
 ) -> None:
-    assert too_large(noise(scale, rho), POSITION, ["position"]) is not is_noise
+    assert too_loud(noise(scale, rho), POSITION, ["position"]) is not is_noise
 
 
 def test_the_size_of_what_goes_together_is_known_as_well_as_its_errors_say() -> None:
@@ -63,8 +63,8 @@ def test_the_size_of_what_goes_together_is_known_as_well_as_its_errors_say() -> 
 
 def test_few_readings_may_be_three_times_as_noisy_but_no_more() -> None:
     few = np.array([60, 0, 0])
-    assert not too_large(noise(2.9, 0.9), few, ["position"])
-    assert too_large(noise(3.1, 0.9), few, ["position"])
+    assert not too_loud(noise(2.9, 0.9), few, ["position"])
+    assert too_loud(noise(3.1, 0.9), few, ["position"])
 
 
 @pytest.mark.parametrize(
@@ -74,12 +74,12 @@ def test_estimated_noise_may_be_larger_where_it_goes_together(
     scale: float, rho: float, is_noise: bool
 ) -> None:
     # differences of neighbours show 0.36 of AR(1) noise that goes together by 0.8
-    assert too_large(noise(scale, rho), POSITION, []) is not is_noise
+    assert too_loud(noise(scale, rho), POSITION, []) is not is_noise
 
 
 def test_kinds_that_were_not_read_do_not_count() -> None:
     colour = Colour(np.array([1.0, 9.0, 1.0]), np.zeros(3))
-    assert not too_large(colour, POSITION, ["position", "orientation"])
+    assert not too_loud(colour, POSITION, ["position", "orientation"])
 
 
 @pytest.mark.parametrize("pulled", [False, True])

@@ -77,7 +77,9 @@ def test_the_evidence_of_a_fit_is_greatest_with_the_noise_that_it_leaves() -> No
     found = sought(correlated())
     setting, best = found.calibration.setting, found.found.best.joint
     by_size = [
-        own_noise.evidence(setting, found.found, replace(best, colour=best.colour.hotter(factor)))
+        own_noise.evidence_by_own_noise(
+            setting, found.found, replace(best, colour=best.colour.hotter(factor))
+        )
         for factor in (0.7, 1.0, 1.4)
     ]
     assert by_size[1] > max(by_size[0], by_size[2]) + 3.0

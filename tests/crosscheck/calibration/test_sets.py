@@ -19,7 +19,7 @@ from crosscheck.calibration.probability import (
     with_hints,
 )
 from crosscheck.calibration.refits import Found
-from crosscheck.calibration.sets import Names, Scores, explore, log_prior, thinned
+from crosscheck.calibration.sets import Names, Scores, explore, log_prior, trimmed
 
 WIDTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0])
 NONE: Names = frozenset()
@@ -98,7 +98,7 @@ def test_a_large_set_is_thinned_without_losing_what_is_there() -> None:
     x = rng.normal(size=(200, 20))
     y = 3.0 * x[:, 4] - 4.0 * x[:, 11] + rng.normal(size=200)
     gram = gram_of(x, y, {f"e{k}": ColumnGroup(np.array([k]), WIDTHS) for k in range(20)})
-    left = thinned(Scores(gram, 20), frozenset(gram.names))
+    left = trimmed(Scores(gram, 20), frozenset(gram.names))
     assert len(left) <= 8
     assert {"e4", "e11"} <= left
 

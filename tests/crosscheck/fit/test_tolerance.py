@@ -13,7 +13,7 @@ from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.reasons import DiagnosisVerdict
-from crosscheck.fit.tolerance import HALF_THE_NOISE, Tolerance, doubt_of, left_over
+from crosscheck.fit.tolerance import HALF_THE_NOISE, Tolerance, doubt_of, remainder_of
 from crosscheck.measurements.data import Sigma
 from seecr.effects import Terms
 
@@ -46,23 +46,23 @@ def test_what_is_no_tolerance_is_refused(texts: list[str], words: str) -> None:
 
 
 def test_what_is_left_is_what_noise_does_not_explain() -> None:
-    left = left_over(rms(1.25e-4, 0.9e-3), NOISE, HALF_THE_NOISE, SIGMA)
+    left = remainder_of(rms(1.25e-4, 0.9e-3), NOISE, HALF_THE_NOISE, SIGMA)
     assert left.size == {
         "position_rms_m": pytest.approx(0.75e-4), "orientation_rms_rad": 0.0, "tension_rms_N": None,
     }  # fmt: skip
     assert left.limit["position_rms_m"] == pytest.approx(0.5e-4) and left.important
     assert "0.0750 mm" in left.words and "0.0500 mm" in left.words
-    assert not left_over(rms(1.1e-4, 1.1e-3), NOISE, HALF_THE_NOISE, SIGMA).important
+    assert not remainder_of(rms(1.1e-4, 1.1e-3), NOISE, HALF_THE_NOISE, SIGMA).important
     # as the user says, each kind by itself
-    assert not left_over(rms(1.25e-4, 1e-3), NOISE, Tolerance(position_m=1e-4), SIGMA).important
-    assert left_over(rms(1.1e-4, 1e-3), NOISE, Tolerance(position_m=1e-5), SIGMA).important
-    assert left_over(rms(1.25e-4, 2e-3), NOISE, Tolerance(position_m=1e-4), SIGMA).important
+    assert not remainder_of(rms(1.25e-4, 1e-3), NOISE, Tolerance(position_m=1e-4), SIGMA).important
+    assert remainder_of(rms(1.1e-4, 1e-3), NOISE, Tolerance(position_m=1e-5), SIGMA).important
+    assert remainder_of(rms(1.25e-4, 2e-3), NOISE, Tolerance(position_m=1e-4), SIGMA).important
 
 
 def test_what_chance_adds_to_few_readings_is_not_important() -> None:
     doubt = {"position_rms_m": 0.3}
-    assert not left_over(rms(1.25e-4, 1e-3), NOISE, HALF_THE_NOISE, SIGMA, doubt).important
-    assert left_over(rms(2e-4, 1e-3), NOISE, HALF_THE_NOISE, SIGMA, doubt).important
+    assert not remainder_of(rms(1.25e-4, 1e-3), NOISE, HALF_THE_NOISE, SIGMA, doubt).important
+    assert remainder_of(rms(2e-4, 1e-3), NOISE, HALF_THE_NOISE, SIGMA, doubt).important
     problem = prepare(robot(), readings(), Terms()).problem
     n = 3 * problem.data.n_rows
     assert doubt_of(problem)["position_rms_m"] == pytest.approx(np.sqrt(2.0 / n))
@@ -73,11 +73,11 @@ def test_what_chance_adds_to_few_readings_is_not_important() -> None:
 
 def test_noise_that_nobody_stated_says_nothing_of_what_matters() -> None:
     some = Sigma(position_m=1e-4)
-    left = left_over(rms(1.1e-4, 1.1e-3), NOISE, HALF_THE_NOISE, some)
+    left = remainder_of(rms(1.1e-4, 1.1e-3), NOISE, HALF_THE_NOISE, some)
     assert left.undecided and left.limit["orientation_rms_rad"] is None and not left.important
-    told = left_over(rms(1.1e-4, 1.1e-3), NOISE, Tolerance(orientation_rad=1e-3), some)
+    told = remainder_of(rms(1.1e-4, 1.1e-3), NOISE, Tolerance(orientation_rad=1e-3), some)
     assert not told.undecided and not told.important
-    nothing = left_over(rms(1.1e-4, 1.1e-3), NOISE, HALF_THE_NOISE, Sigma())
+    nothing = remainder_of(rms(1.1e-4, 1.1e-3), NOISE, HALF_THE_NOISE, Sigma())
     assert "not stated, use --tolerance" in nothing.words
 
 

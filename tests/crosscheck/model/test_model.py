@@ -15,7 +15,7 @@ from crosscheck.model.write import Provenance, calibrated, renewed, save_model, 
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import catalogue, layout_of
-from seecr.effects.limits import limits_of
+from seecr.effects.limits import range_of
 from seecr.errors import InputFileError
 from seecr.prediction.experiment import predict
 from seecr.prediction.model import load_model, new_model
@@ -275,7 +275,7 @@ def test_every_value_has_finite_limits_that_hold_its_plausible_sizes(robot):
     for effect in catalogue().values():
         layout = layout_of(effect, robot)
         for i in range(len(layout)):
-            low, high = limits_of(layout, i)
+            low, high = range_of(layout, i)
             assert np.isfinite([low, high]).all() and low <= layout.null[i] <= high
             far = layout.null[i] + 30.0 * layout.scale[i] * np.array([-1.0, 1.0])
             far = np.clip(far, layout.lower[i], layout.upper[i])

@@ -21,7 +21,13 @@ from crosscheck.planning.greedy import Wanted, chosen_poses
 from crosscheck.planning.places import more_poses
 from crosscheck.planning.planned import Reads, near_slack, planned
 from crosscheck.planning.proposer import MORE_POSES, NEEDED, telling_apart
-from crosscheck.planning.visibility import joined, left_over, needed, signals, signals_like
+from crosscheck.planning.visibility import (
+    needed,
+    signal_left,
+    signals,
+    signals_like,
+    signals_together,
+)
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Terms
@@ -188,8 +194,8 @@ def test_chosen_poses_beat_the_first_ones(plan):
     def signal(chosen):
         some = np.isin(row_of, chosen)
         few = {n: replace(s, columns=s.columns[some]) for n, s in there.items()}
-        both = joined(own, few)
-        return left_over(both["centre_of_mass"], both["external_wrench"])
+        both = signals_together(own, few)
+        return signal_left(both["centre_of_mass"], both["external_wrench"])
 
     assert signal(rows) > 1.5 * signal(np.unique(row_of)[:4])
 

@@ -21,7 +21,7 @@ from crosscheck.recording import bars
 from crosscheck.recording.comparison import write_comparison_recording
 from crosscheck.recording.diagnosis import write_diagnosis_recording
 from crosscheck.recording.diagnosis_words import plain
-from crosscheck.recording.misfit import Misfit, read_poses, states_of, worst_row
+from crosscheck.recording.misfit import Misfit, predicted_poses, states_of, worst_row
 from crosscheck.units import short
 from seecr.errors import InputFileError
 
@@ -130,7 +130,7 @@ def test_the_box_is_the_worst_pose(back: Readback, stages: list[Stage], shown: M
     assert worst == np.argmax((table**2).sum(axis=1))
     turned = back.column("/scene/model/platform", "Boxes3D:quaternions", STEP)
     for k, stage in enumerate(stages):
-        quat = read_poses(stage.state)[worst, 3:]
+        quat = predicted_poses(stage.state)[worst, 3:]
         assert np.roll(turned[k][0], 1) == pytest.approx(quat, abs=1e-6)
     measured = back.column("/scene/measured/platform", "Boxes3D:quaternions", STEP)
     assert np.roll(measured[0][0], 1) == pytest.approx(shown.measured[worst, 3:], abs=1e-6)

@@ -16,7 +16,7 @@ from PIL import Image
 
 from crosscheck.report import where
 from crosscheck.report.drawing import MANY, blank, dots, image, keeping, plain_log, styled
-from crosscheck.report.where import thinned
+from crosscheck.report.where import rows_per_arrow
 
 
 def drawn(points: int) -> str:
@@ -87,7 +87,7 @@ def test_logarithmic_axes_have_plain_numbers() -> None:
 @pytest.mark.parametrize(("rows", "every"), [(1, 1), (250, 1), (251, 2), (1000, 4)])
 def test_arrows_are_thinned_out(rows: int, every: int) -> None:
     problem: Any = SimpleNamespace(use=np.ones(rows, dtype=bool))
-    assert thinned(problem) == every
+    assert rows_per_arrow(problem) == every
 
 
 def light(colour: np.ndarray) -> float:

@@ -35,7 +35,7 @@ from crosscheck.fit.imitation import imitated
 from crosscheck.fit.problem import KINDS
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.report import where, write_page
-from crosscheck.report.cables import Wall, draw_wall, paid_out, walls_of
+from crosscheck.report.cables import Wall, draw_wall, length_changes, walls_of
 from crosscheck.report.confusion import confusion_of
 from crosscheck.report.drawing import AFTER, BEFORE, CALM, keeping
 from crosscheck.report.findings import finding_card
@@ -284,7 +284,7 @@ def test_paid_out_is_the_commanded_change_within_a_run() -> None:
     found = diagnosis("pulleys")
     assert found.search is not None
     problem = found.search.problem
-    change = paid_out(problem, found.search.last.fit.state.prediction)
+    change = length_changes(problem, found.search.last.fit.state.prediction)
     lengths = problem.robot.nominal_lengths(problem.data.command_pose)
     assert np.isnan(change[0]).all()
     assert change[1] == pytest.approx(lengths[1] - lengths[0])

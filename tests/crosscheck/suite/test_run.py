@@ -426,7 +426,7 @@ def seesaw_answers(path: Path) -> verdicts.Answers:
 def test_two_stable_equilibria_are_a_finding_with_both_energies(seesaw):
     answers = seesaw_answers(seesaw)
     assert answers.difference.orientation_rad[0] > 0.2
-    verdict, (finding,) = verdicts.judge(answers)
+    verdict, (finding,) = verdicts.judge_poses(answers)
     assert list(verdict) == [Verdict.BRANCH]
     assert finding.mujoco_stays
     assert finding.seecr_stays
@@ -440,7 +440,7 @@ def test_an_answer_that_mujoco_leaves_is_no_equilibrium(seesaw):
     # SEECR's answer, moved by a hundredth of a radian: it is stable for nobody
     wrong = pose_add(answers.solution.pose, np.array([[0, 0, 0, 0, 0.01, 0]]))
     answers = answers._replace(solution=replace(answers.solution, pose=wrong))
-    verdict, (finding,) = verdicts.judge(answers)
+    verdict, (finding,) = verdicts.judge_poses(answers)
     assert list(verdict) == [Verdict.DIFFERS]
     assert finding.mujoco_stays is False
     assert "MuJoCo leaves" in finding.text

@@ -11,7 +11,7 @@ from effect_cases import experiment_of, full_difference, random_term, robot_of
 
 from seecr.commands.data import Commands
 from seecr.commands.loads import Loads
-from seecr.commands.path import path_of
+from seecr.commands.path import waypoints_of
 from seecr.effects import Effect, Terms, effect_named
 from seecr.errors import InputError
 from seecr.prediction.experiment import Experiment, Prediction
@@ -163,7 +163,7 @@ def test_a_payload_hangs_before_the_way_to_its_row_begins() -> None:
     robot = robot_of("demobot_cogiro")
     poses = experiment_of("demobot_cogiro").commands.pose[:3]
     commands = Commands(poses, loads=Loads.of(3, mass=np.array([0.1, 0.2, 0.2])))
-    path = path_of(robot, commands)
+    path = waypoints_of(robot, commands)
     assert path.commands.loads is not None
     mass = path.commands.loads.mass
     first, second, third = path.rows.tolist()

@@ -12,7 +12,7 @@ from rectangle import RECTANGLE
 from scipy.spatial.transform import Rotation
 
 from seecr.description.robot import Joint, Robot
-from seecr.exported.scene import cable, numbers, plain_text, scene, text_of
+from seecr.exported.scene import cable, numbers_text, plain_text, scene, text_of
 
 TURN = Rotation.from_rotvec([0.3, -0.5, 0.8])
 # A body whose axes are not those of its frame; no plate is as flat as to break the triangle rule.
@@ -35,7 +35,7 @@ def loaded(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 def test_numbers_keep_all_digits_and_zero_has_no_sign() -> None:
     values = [0.1 + 0.2, -1e-300, np.pi, np.nextafter(1.0, 2.0)]
-    text = numbers(values, -0.0)
+    text = numbers_text(values, -0.0)
     assert [float(word) for word in text.split()] == [*values, 0.0] and text.endswith(" 0.0")
 
 
@@ -83,8 +83,8 @@ def test_points_are_where_the_robot_has_them() -> None:
 def test_a_cable_pulls_by_its_stretch_and_never_pushes(rest: float, force: float) -> None:
     """Of 2 m between its ends, with 300 N/m."""
     root, world, body = scene(RECTANGLE, "a test")
-    ET.SubElement(world, "site", name="here", pos=numbers([0.0, 0.0, 0.0]))
-    ET.SubElement(body, "site", name="there", pos=numbers([-1.5, -2.0, -0.5]))
+    ET.SubElement(world, "site", name="here", pos=numbers_text([0.0, 0.0, 0.0]))
+    ET.SubElement(body, "site", name="there", pos=numbers_text([-1.5, -2.0, -0.5]))
     tendons = ET.SubElement(root, "tendon")
     path = [("site", {"site": "here"}), ("site", {"site": "there"})]
     cable(tendons, "one", path, rest, [300.0], 0.01)

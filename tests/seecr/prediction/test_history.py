@@ -9,7 +9,7 @@ import pytest
 from effect_cases import experiment_of, robot_of
 
 from seecr.commands.data import Commands, play
-from seecr.commands.path import path_of
+from seecr.commands.path import waypoints_of
 from seecr.compiled.columns import (
     EA,
     FRICTION,
@@ -61,7 +61,7 @@ def lifted(heights: np.ndarray, *effects: Effect, **more: object) -> Prediction:
 def test_each_run_starts_at_the_reference_pose_and_goes_straight_from_row_to_row() -> None:
     experiment = experiment_of("demobot_cogiro")
     robot, commands = experiment.robot, experiment.commands
-    path = path_of(robot, commands)
+    path = waypoints_of(robot, commands)
     assert np.array_equal(path.commands.pose[path.rows], commands.pose)
     assert path.fresh.sum() == 2
     assert np.array_equal(path.commands.pose[path.fresh], np.tile(robot.reference_pose, (2, 1)))
@@ -76,7 +76,7 @@ def test_each_run_starts_at_the_reference_pose_and_goes_straight_from_row_to_row
 def test_the_clock_runs_once_through_the_path() -> None:
     experiment = experiment_of("demobot_cogiro")
     time = experiment.commands.time
-    path = path_of(experiment.robot, experiment.commands)
+    path = waypoints_of(experiment.robot, experiment.commands)
     assert time is not None
     assert np.cumsum(path.elapsed)[path.rows] == pytest.approx(time - time[0], abs=1e-12)
     assert path.elapsed[path.fresh][1] == pytest.approx(time[3] - time[2])  # waits at home
@@ -85,7 +85,7 @@ def test_the_clock_runs_once_through_the_path() -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_a_platform_on_joints_never_leaves_them_on_its_way(seed: int) -> None:
     experiment = experiment_of("jointed", seed=seed)
-    path = path_of(experiment.robot, experiment.commands)
+    path = waypoints_of(experiment.robot, experiment.commands)
     values_of_pose(experiment.robot, path.commands.pose)  # raises where it does
     found = experiment.predict([effect("backlash", gap=1e-4)])
     assert np.all(found.solved)
@@ -93,7 +93,7 @@ def test_a_platform_on_joints_never_leaves_them_on_its_way(seed: int) -> None:
 
 def test_lengths_move_evenly_too() -> None:
     experiment = experiment_of("lengths")
-    path = path_of(experiment.robot, experiment.commands)
+    path = waypoints_of(experiment.robot, experiment.commands)
     lengths, told = path.commands.lengths, experiment.commands.lengths
     assert lengths is not None and told is not None
     assert lengths[path.fresh][0] == pytest.approx(experiment.robot.rest_lengths)
