@@ -121,4 +121,4 @@ __getattr__ = lazily(__name__, _WHERE)
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})

@@ -161,8 +161,9 @@ __all__ = [
 ]
 
 
-__getattr__ = lazily(__name__, _WHERE, modules=("inverse", "workspace"))
+_FOLDERS = ("inverse", "workspace")
+__getattr__ = lazily(__name__, _WHERE, modules=_FOLDERS)
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*__all__, *_FOLDERS, *(name for name in globals() if name.startswith("__"))})
