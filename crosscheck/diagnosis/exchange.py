@@ -2,18 +2,22 @@
 
 The search adds one effect at a time: what imitates two effects together is added first, and leaves
 nothing for the second. Probabilities compare whole sets, and the set they prefer is fitted here.
+Of two effects that explained the same when one was added, the other may explain more in the end.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 from crosscheck.calibration.judgement import SURE
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.node import Node, node_of
 from crosscheck.diagnosis.order import fitted_to_the_end, in_order
+from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.candidates import try_candidate
+from crosscheck.fit.possible import can_be
 
 DOUBTED = 0.5
 """An effect found by the search that is less probable than this may stand in for others."""
@@ -37,6 +41,26 @@ def exchanged(found: Search, chances: Chances) -> Search:
     if node.evidence.log <= found.last.evidence.log:
         return found
     return replace(found, steps=in_order(found.trials, found.steps[0].node, node, {}))
+
+
+def replaced(found: Search, rivals: Iterable[Rival]) -> Search:
+    """The search with an effect replaced by the rival that explains most more in its place.
+
+    It stays as it is if no rival does, or if what does leaves structure or is impossible.
+
+    Args:
+        found: a search that ended with noise.
+        rivals: effects fitted in place of one that was found.
+    """
+    stood = found.steps[0].fit.terms
+    for rival in sorted(rivals, key=lambda r: r.loss):
+        if not rival.is_better:
+            break
+        node = fitted_to_the_end(found.trials, node_of(found.trials, rival.fit))
+        better = node.evidence.log > found.last.evidence.log and node.whiteness.is_noise
+        if better and can_be(found.problem.robot, node.fit.terms, stood):
+            return replace(found, steps=in_order(found.trials, found.steps[0].node, node, {}))
+    return found
 
 
 def _fitted(found: Search, gone: list[str], come: list[str]) -> Node | None:

@@ -43,9 +43,19 @@ class Rival:
         """The parameters of the rival."""
         return self.fit.terms[self.name].layout
 
+    @property
+    def is_better(self) -> bool:
+        """Whether it explains more than the effect listed, and not only as well."""
+        return self.loss <= -EQUAL
+
 
 def rivals_of(found: Search, name: str, apart: float = _TOLD_APART) -> list[Rival]:
-    """Effects that could replace ``name`` in the final model, the best first.
+    """Effects that explain as well in place of ``name`` in the final model; see `in_place_of`."""
+    return [rival for rival in in_place_of(found, name, apart) if not rival.is_better]
+
+
+def in_place_of(found: Search, name: str, apart: float = _TOLD_APART) -> list[Rival]:
+    """Effects that explain as well as ``name`` in the final model or better, the best first.
 
     Args:
         found: the search. name: name of the effect.
@@ -81,10 +91,9 @@ def loss_of_its_part(rival: str, name: str, every: Mapping[str, Rival]) -> float
 
 
 def _explains_as_well(found: Search, rival: Rival, own: int, apart: float) -> bool:
-    """Whether a rival explains as much as the effect, which has ``own`` parameters."""
+    """Whether a rival explains as much as the effect, which has ``own`` parameters, or more."""
     worse = (rival.fit.chi2 - found.last.fit.chi2) / found.last.whiteness.inflation**2
-    alike = rival.loss > -EQUAL and are_equals(rival.loss, own, len(rival.layout))
-    return alike and worse < apart
+    return are_equals(rival.loss, own, len(rival.layout)) and worse < apart
 
 
 def _in_its_place(found: Search, candidate: Candidate, without: Fit, apart: float) -> Rival | None:

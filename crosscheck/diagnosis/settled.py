@@ -9,11 +9,11 @@ import numpy as np
 
 from crosscheck.calibration.judgement import SURE
 from crosscheck.diagnosis.chances import Chances
-from crosscheck.diagnosis.exchange import exchanged
+from crosscheck.diagnosis.exchange import exchanged, replaced
 from crosscheck.diagnosis.listed import diagnosis_of, missing_of, not_listed
 from crosscheck.diagnosis.nearby import chances_near
 from crosscheck.diagnosis.result import Diagnosis, NotListed
-from crosscheck.diagnosis.rivals import Rival, rivals_of
+from crosscheck.diagnosis.rivals import Rival, in_place_of, rivals_of
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.words import (
     agreement_words,
@@ -31,11 +31,11 @@ def settled(
     found: Search, notes: Sequence[str], told: Callable[[str], None] = lambda _text: None
 ) -> Diagnosis:
     """The diagnosis of a search whose last model leaves noise; ``told`` says what is being done."""
-    rivals = _all_rivals(found, told)
+    found, rivals = _with_better(found, told)
     chances = _chances(found, rivals)
     other = exchanged(found, chances)
     if other is not found:
-        found, rivals = other, _all_rivals(other, told)
+        found, rivals = _with_better(other, told)
         chances = _chances(found, rivals)
     wider = _by_evidence(found, rivals, chances)
     if wider != rivals:
@@ -67,6 +67,22 @@ def settled(
 
 def _chances(found: Search, rivals: Mapping[str, Sequence[Rival]]) -> Chances:
     return chances_near(found, {n: [r.name for r in some] for n, some in rivals.items()})
+
+
+def _with_better(
+    found: Search, told: Callable[[str], None]
+) -> tuple[Search, dict[str, list[Rival]]]:
+    """The search with what explains more in place of some of its effects, and their rivals."""
+    for _ in found.found:
+        every = {}
+        for name in found.found:
+            told(f"looking for effects that could replace {name}")
+            every[name] = in_place_of(found, name)
+        other = replaced(found, (rival for some in every.values() for rival in some))
+        if other is found:
+            return found, {n: [r for r in some if not r.is_better] for n, some in every.items()}
+        found = other
+    return found, _all_rivals(found, told)
 
 
 def _all_rivals(found: Search, told: Callable[[str], None]) -> dict[str, list[Rival]]:

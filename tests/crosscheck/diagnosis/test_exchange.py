@@ -8,9 +8,10 @@ import pytest
 from linear_toy import LinearToy, toy
 
 from crosscheck.diagnosis.chances import Chances
-from crosscheck.diagnosis.exchange import exchanged
+from crosscheck.diagnosis.exchange import exchanged, replaced
 from crosscheck.diagnosis.node import node_of
 from crosscheck.diagnosis.order import in_order
+from crosscheck.diagnosis.rivals import Rival, rivals_of
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.candidates import Trials
 from crosscheck.fit.gauss_newton import Fit
@@ -78,3 +79,39 @@ def test_an_effect_that_these_data_cannot_show_takes_no_place(made: LinearToy) -
     found = ending_with(made, "cable_length_offset")
     blind = replace(found, trials=replace(found.trials, candidates=lambda _problem: []))
     assert exchanged(blind, chances(tracker_scale=0.99, cable_length_offset=0.01)) is blind
+
+
+def the_scale(made: LinearToy, found: Search) -> Rival:
+    """The scale in place of what a search found."""
+    fit = made.fit(made.problem, made.terms("tracker_scale"))
+    return Rival("tracker_scale", fit, found.last.evidence.log - made.trials.evidence(fit).log)
+
+
+def test_what_explains_more_in_its_place_takes_it(made: LinearToy) -> None:
+    """On a robot of six cables offsets were as good as a start off its place, until more came."""
+    found = ending_with(made, "cable_length_offset")
+    better = the_scale(made, found)
+    other = replaced(found, [replace(better, name="none", loss=1.0), better])
+    assert better.is_better and other.found == ("tracker_scale",) and len(other.steps) == 2
+    assert other.last.evidence.log == pytest.approx(found.last.evidence.log - better.loss)
+
+
+def test_what_explains_as_well_is_a_rival_and_takes_no_place(
+    made: LinearToy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = ending_with(made, "cable_length_offset")
+    better = the_scale(made, found)
+    alike = replace(better, loss=-2.9)
+    assert replaced(found, []) is replaced(found, [alike]) is found
+    monkeypatch.setattr("crosscheck.diagnosis.rivals.in_place_of", lambda *_: [better, alike])
+    assert rivals_of(found, "cable_length_offset") == [alike]
+
+
+def test_no_fit_takes_the_place_that_is_worse_or_impossible(
+    made: LinearToy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = ending_with(made, "cable_length_offset")
+    scale = ending_with(made, "tracker_scale")
+    assert replaced(scale, [Rival("cable_length_offset", found.last.fit, -5.0)]) is scale
+    monkeypatch.setattr("crosscheck.diagnosis.exchange.can_be", lambda *_: False)
+    assert replaced(found, [the_scale(made, found)]) is found

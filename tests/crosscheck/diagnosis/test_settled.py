@@ -11,7 +11,7 @@ import pytest
 from crosscheck.diagnosis import settled
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.search import Search
-from crosscheck.diagnosis.settled import _by_evidence, _sure_part
+from crosscheck.diagnosis.settled import _by_evidence, _sure_part, _with_better
 
 NOTHING: Any = None
 
@@ -59,6 +59,22 @@ def test_of_what_is_not_sure_all_that_evidence_does_not_tell_apart_is_named(
     assert asked == [("curve", np.inf)]
     assert wider == {"curve": ["mass", "stiffness"], "tilt": []}
     assert _by_evidence(found, rivals, chances(curve=0.99, tilt=0.99)) == rivals
+
+
+def test_what_explains_more_is_looked_for_until_nothing_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Neither it nor what it took the place of is told as a rival that explains as well."""
+    found, other = way("tilt", "curve", noise_from=2), way("tilt", "mass", noise_from=2)
+    better, alike = (SimpleNamespace(is_better=is_better) for is_better in (True, False))
+    tried = {("tilt", "curve"): [better], ("tilt", "mass"): [alike]}
+    monkeypatch.setattr(settled, "in_place_of", lambda search, _name: tried[search.found])
+    monkeypatch.setattr(settled, "replaced", lambda s, some: other if better in some else s)
+    last, rivals = _with_better(found, lambda _text: None)
+    assert last is other and rivals == {"tilt": [alike], "mass": [alike]}
+    # where nothing may take its place, what explains more is no rival either
+    monkeypatch.setattr(settled, "replaced", lambda s, _some: s)
+    assert _with_better(found, lambda _text: None) == (found, {"tilt": [], "curve": []})
 
 
 def test_an_effect_without_which_no_noise_is_left_stays() -> None:
