@@ -20,6 +20,8 @@ from seecr.result import Record, Result
 
 # A root of the quartic this far off the unit circle is not an angle (roots are polished later).
 _OFF_CIRCLE = 1e-5
+# Sine of the angle between cables on one line, up to rounding.
+_OPPOSED = 1e-12
 
 
 def bar_tilt(exit_points: ArrayLike, positions: ArrayLike, half_length: float = 0.0) -> Array:
@@ -100,7 +102,8 @@ def bar_equilibria(
     """All tilts at which a bar on two cables is in equilibrium at a position, in ascending order.
 
     There the lines of both cables and of the weight meet in one point. The tilts are the roots of a
-    quartic in exp(i theta), two or four. The paper speaks of a unique one; if there are more,
+    quartic in exp(i theta), two or four. Those at which both cables are on one line are left out:
+    no tension carries the weight there. The paper speaks of a unique one; if there are more,
     several can be stable.
 
     Args:
@@ -128,7 +131,8 @@ def bar_equilibria(
     found = []
     for theta in np.sort(_roots(to_exit, half_length)):
         tensions, stable = _balance(theta, to_exit, half_length)
-        found.append(BarRest(float(theta), tensions, stable))
+        if np.all(np.isfinite(tensions)):
+            found.append(BarRest(float(theta), tensions, stable))
     return tuple(found)
 
 
@@ -273,7 +277,7 @@ def _balance(theta: float, to_exit: Array, h: float) -> tuple[tuple[float, float
     u = cables / lengths[:, None]
     # forces that cancel horizontally and carry the weight: tau_1 u_1x + tau_2 u_2x = 0
     lift = _cross(u[0], u[1])
-    if lift == 0.0:
+    if abs(lift) < _OPPOSED:
         return (np.nan, np.nan), False
     tension = np.array([-u[1, 0], u[0, 0]]) / lift
     pair = (float(tension[0]), float(tension[1]))

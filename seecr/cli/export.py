@@ -64,7 +64,7 @@ def command(
             raise InputError(f"{file}: is the robot's own file; expected another file to write")
     own = model_at(model, machine)
     found = export(machine, own or (), pose_of(coordinates, machine) if coordinates else None)
-    if coordinates and found.mujoco_text is None:
+    if coordinates and found.mujoco_text is None and not found.softens:
         raise InputError(
             f"X Y Z is the pose for {beside.name}, and the model's effects need no such file; "
             "leave it out"

@@ -15,8 +15,12 @@ from seecr.pose import Array
 
 
 def usual_strain(robot: Robot) -> float:
-    """Strain of a cable that carries half the weight."""
-    return max(0.5 * robot.usual_load / float(np.mean(robot.ea)), 1e-9)
+    """Strain of a cable that carries half the weight, or of the pretension if that is more.
+
+    The pretension is the median over the cables at the reference pose, as the robot is described.
+    """
+    stretched = float(np.median(robot.reference_lengths / robot.rest_lengths - 1.0))
+    return max(0.5 * robot.usual_load / float(np.mean(robot.ea)), stretched, 1e-9)
 
 
 def usual_stretch(robot: Robot) -> float:
@@ -88,7 +92,9 @@ class NonlinearElasticity(Effect):
 
     T = E S (eps + quadratic eps^2 + cubic eps^3), a polynomial in the strain (Kraus, Force
     control of cable-driven parallel robots, 2016). Positive: stiffening. A metre holds the energy
-    E S (eps^2/2 + quadratic eps^3/3 + cubic eps^4/4).
+    E S (eps^2/2 + quadratic eps^3/3 + cubic eps^4/4). The slope of a softening cable is never less
+    than a hundredth of E S (our own rule): where the polynomial would fall, the cable still pulls
+    a little more when it is stretched further.
     """
 
     name: ClassVar[str] = "nonlinear_elasticity"

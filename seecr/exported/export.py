@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seecr.commands.data import Commands
-from seecr.compiled.columns import FORCE_OF_WEIGHT, UP
+from seecr.compiled.columns import CUBIC, FORCE_OF_WEIGHT, QUADRATIC, STRAIN, UP
+from seecr.compiled.law import LEAST
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects import Effect
@@ -18,7 +19,7 @@ from seecr.effects.edits import setup_with
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError, NoRestError
 from seecr.exported.bodies import SEGMENTS, bodies_text
-from seecr.exported.expressed import expressed
+from seecr.exported.expressed import SOFT, Expressed, expressed, without_law
 from seecr.exported.scene import plain_text
 from seecr.prediction.experiment import effects_of
 from seecr.result import Record, Result
@@ -56,6 +57,11 @@ class Export(Result):
     bodies: tuple[str, ...]
     lengths: tuple[str, ...]
     nowhere: tuple[tuple[str, str], ...]
+
+    @property
+    def softens(self) -> bool:
+        """Whether a law of the cables is in no file because they are stretched too far here."""
+        return any(why == SOFT for _name, why in self.nowhere)
 
     @property
     def leans(self) -> bool:
@@ -141,7 +147,7 @@ def export(robot: GivenRobot, effects: GivenEffects = (), at: ArrayLike | None =
     place = robot.reference_pose[None] if at is None else commanded_poses(at, "at")
     if len(place) != 1:
         raise InputError(f"expected one pose to export at, got {len(place)}")
-    said = expressed(robot, effects_of(effects, robot))
+    said, solution = _sorted(robot, effects_of(effects, robot), place)
     home = Commands(robot.reference_pose[None])
     plain = setup_with((*said.plain, *said.lengths), robot, home)
     described = replace(
@@ -149,12 +155,9 @@ def export(robot: GivenRobot, effects: GivenEffects = (), at: ArrayLike | None =
         mass=plain.mass, centre_of_mass=plain.centre_of_mass, gravity=plain.gravity,
         rest_lengths=plain.rest_lengths()[0],
     )  # fmt: skip
-    mujoco_text, solution = None, None
-    if said.bodies:
-        mujoco_text, solution = _for_mujoco(
-            robot, (*said.plain, *said.bodies, *said.lengths),
-            place,
-        )  # fmt: skip
+    mujoco_text = None
+    if solution is not None:
+        mujoco_text = _for_mujoco(robot, _inside(said), place, solution)
     comment = f"{robot.name} with {_names(said.plain) or 'no effect'}; written by seecr export"
     plain_names, bodies, lengths = (
         tuple(one.name for one in group) for group in (said.plain, said.bodies, said.lengths)
@@ -164,17 +167,50 @@ def export(robot: GivenRobot, effects: GivenEffects = (), at: ArrayLike | None =
     return Export(described, text, mujoco_text, solution, plain_names, bodies, lengths, nowhere)
 
 
-def _for_mujoco(
-    robot: Robot, effects: tuple[Effect, ...], pose: np.ndarray
-) -> tuple[str, Solution]:
-    solution = solve(robot, pose, effects=effects)
+def _sorted(
+    robot: Robot, effects: Sequence[Effect], pose: np.ndarray
+) -> tuple[Expressed, Solution | None]:
+    """Where each effect can be expressed, and the equilibrium in the file for MuJoCo alone."""
+    said = expressed(robot, effects)
+    solution = _rest(robot, said, pose)
+    if solution is not None and _softens(solution):
+        said = without_law(robot, said)
+        solution = _rest(robot, said, pose)
+    return said, solution
+
+
+def _rest(robot: Robot, said: Expressed, pose: np.ndarray) -> Solution | None:
+    """The equilibrium with all that the files hold; None if one file holds it all."""
+    if not said.bodies:
+        return None
+    solution = solve(robot, pose, effects=_inside(said))
     if not solution.converged[0]:
         raise NoRestError(
             f"robot {robot.name}: no rest at the pose to export at: {solution.sentence(0)}; "
             "expected another pose"
         )
+    return solution
+
+
+def _softens(solution: Solution) -> bool:
+    """Whether a cable is stretched to where its polynomial is softer than seecr lets it be."""
+    row, strain = solution.tables.cables[0], solution.evaluation.states[0, :, STRAIN]
+    q, c = row[:, QUADRATIC], row[:, CUBIC]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lowest = np.clip(np.where(c > 0.0, -q / (3.0 * c), strain), 0.0, np.maximum(strain, 0.0))
+    slopes = [1.0 + 2.0 * q * e + 3.0 * c * e**2 for e in (strain, lowest)]
+    return bool(np.any(np.minimum(*slopes) < LEAST))
+
+
+def _inside(said: Expressed) -> tuple[Effect, ...]:
+    return (*said.plain, *said.bodies, *said.lengths)
+
+
+def _for_mujoco(
+    robot: Robot, effects: tuple[Effect, ...], pose: np.ndarray, solution: Solution
+) -> str:
     comment = f"{robot.name} with {_names(effects)}; for MuJoCo alone, written by seecr export"
-    return bodies_text(setup_with(effects, robot, Commands(pose)), solution, comment), solution
+    return bodies_text(setup_with(effects, robot, Commands(pose)), solution, comment)
 
 
 def _names(effects: tuple[Effect, ...]) -> str:

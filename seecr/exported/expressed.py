@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,10 @@ _PAST = frozenset(name for name, item in QUANTITIES.items() if item.history is n
 PAST = "it depends on the motion before"
 SENSED = "it changes what sensors read, not where the platform rests"
 LAW = "it has its own law for the cables"
+SOFT = (
+    "at this pose cables are stretched to where its polynomial falls; seecr keeps a hundredth of "
+    "their stiffness there, and MuJoCo does not"
+)
 LIFTED_SHEAVE = "with pulleys, the frame must be equally compliant in all directions"
 
 
@@ -71,6 +75,16 @@ def expressed(robot: Robot, effects: Sequence[Effect]) -> Expressed:
         nowhere += [(one, LIFTED_SHEAVE) for one in yields]
         bodies = [one for one in bodies if one not in yields]
     return Expressed(tuple(plain), tuple(bodies), tuple(lengths), tuple(nowhere))
+
+
+def without_law(robot: Robot, said: Expressed) -> Expressed:
+    """The same without the effects that bend the cables' elastic law."""
+    bent = [one for one in said.bodies if _edits(robot, one)[0] & {"quadratic", "cubic"}]
+    return replace(
+        said,
+        bodies=tuple(one for one in said.bodies if one not in bent),
+        nowhere=(*said.nowhere, *((one, SOFT) for one in bent)),
+    )
 
 
 def _edits(robot: Robot, effect: Effect) -> tuple[set[str], bool]:

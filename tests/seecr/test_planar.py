@@ -93,6 +93,16 @@ def test_where_the_cables_cannot_hold_the_bar() -> None:
         assert np.isfinite(bar_tilt(EXITS, [0.4, 0.2], h))
 
 
+@pytest.mark.parametrize("x", [0.3, 0.5])
+def test_no_tension_holds_a_bar_that_is_level_with_both_exit_points(x: float) -> None:
+    """Rounding made it a stable rest at 180 degrees, with 6.5e16 weights in each cable."""
+    exits = [[0.0, 1.0], [1.0, 1.0]]
+    assert np.isnan(bar_tilt(exits, [x, 1.0], 0.1)) and bar_equilibria(exits, [x, 1.0], 0.1) == ()
+    below = bar_equilibria(exits, [x, 0.9], 0.1)
+    assert any(rest.stable for rest in below)
+    assert all(np.isfinite(rest.tensions).all() for rest in below)
+
+
 def test_of_two_ways_to_hang_the_more_level_one_is_taken() -> None:
     """A short bar can also hang upside down, its cables crossed; both ways are stable."""
     exits, place, h = [[-0.277, 0.974], [0.170, 0.653]], [-0.010, -0.998], 0.011

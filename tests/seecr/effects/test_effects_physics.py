@@ -11,8 +11,11 @@ from random_robots import random_poses, random_robot
 
 from seecr.commands.data import Commands
 from seecr.compiled.pulley import pulley_geometry
+from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
-from seecr.effects import Effect, effect_named
+from seecr.description.shipped import model_path
+from seecr.effects import Effect, effect_named, layout_of
+from seecr.effects.cable import usual_strain
 from seecr.effects.setup import plain_setup
 from seecr.equilibrium.solving import solve
 from seecr.pose import (
@@ -247,6 +250,19 @@ def test_a_frame_yields_sideways_and_upwards_by_what_each_cable_pulls(kind: str)
             along = (anchors - moved) / np.linalg.norm(anchors - moved, axis=1)[:, None]
             moved = robot.exit_points + found.tensions[0][:, None] * along * soft
         assert found.pose[0] == pytest.approx(pose, abs=1e-9)
+
+
+def test_the_usual_strain_is_that_of_the_weight_or_of_the_pretension() -> None:
+    """Of a pretensioned robot the weight's was a fifth: a plausible law made its cables push."""
+    pretensioned = load_robot(model_path("ipanema"))
+    hung = load_robot(model_path("demobot_cogiro"))
+    strain = np.median(pretensioned.reference_lengths / pretensioned.rest_lengths - 1.0)
+    assert usual_strain(pretensioned) == pytest.approx(strain) and 0.004 < strain < 0.006
+    weight = hung.mass * np.linalg.norm(hung.gravity)
+    assert usual_strain(hung) == pytest.approx(0.5 * weight / hung.ea.mean(), rel=1e-9)
+    # at a plausible size the quadratic part adds or takes 0.3 of the tension, the cubic 0.3 more
+    scale = layout_of("nonlinear_elasticity", pretensioned).scale
+    assert scale * [strain, strain**2] == pytest.approx([0.3, 0.3])
 
 
 def test_closed_forms_of_one_hanging_cable() -> None:

@@ -243,6 +243,25 @@ def test_what_mjcf_cannot_say_is_said() -> None:
     )
 
 
+def test_a_law_that_seecr_keeps_from_falling_is_in_no_file_where_it_would_fall() -> None:
+    """MuJoCo takes the bare polynomial: the keyframe had 2449 N on a platform of 0.4 kg."""
+    robot = load_robot(model_path("demobot_parallel"))
+    soft = [term(robot, "nonlinear_elasticity", cubic=-4.29e5)]
+    far = export(robot, soft, [0.17, 0.25, 0.2, 1, 0, 0, 0])
+    assert far.softens and far.mujoco_text is None and far.solution is None
+    assert [name for name, _why in far.nowhere] == ["nonlinear_elasticity"]
+    assert "seecr keeps a hundredth of their stiffness there" in " ".join(far.lines())
+    # other effects stay, also where the polynomial falls before it rises again
+    wheel = term(robot, "pulley_radius", radius_m=0.01)
+    dip = term(robot, "nonlinear_elasticity", quadratic=-2000.0, cubic=1.33e6)
+    both = export(robot, [wheel, dip], [0.17, 0.25, 0.2, 1, 0, 0, 0])
+    assert both.bodies == ("pulley_radius",) and both.softens and both.solution is not None
+    # a little softer, they are as seecr has them
+    for cubic in (-100.0, 4.29e5):
+        some = export(robot, [term(robot, "nonlinear_elasticity", cubic=cubic)])
+        assert some.bodies == ("nonlinear_elasticity",) and not some.softens
+
+
 def test_another_vertical_than_gravity_is_said() -> None:
     """Of pulleys and frame; the platform rests 1e-5 of its size elsewhere."""
     pulley = {"pulley_radius": {"radius_m": 0.01}}
