@@ -77,6 +77,19 @@ def test_what_explains_more_is_looked_for_until_nothing_does(
     assert _with_better(found, lambda _text: None) == (found, {"tilt": [], "curve": []})
 
 
+def test_the_end_of_a_search_asks_what_explains_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Asked(Exception):
+        pass
+
+    def asks(found: Search, told: Any) -> Any:
+        raise Asked(found.found)
+
+    monkeypatch.setattr(settled, "_with_better", asks)
+    monkeypatch.setattr(settled, "_all_rivals", lambda *_: {})
+    with pytest.raises(Asked, match="tilt"):
+        settled.settled(way("tilt", noise_from=1), [])
+
+
 def test_an_effect_without_which_no_noise_is_left_stays() -> None:
     found = way("mass", "tilt", noise_from=2)
     assert _sure_part(found, chances(mass=0.999, tilt=0.5)).found == ("mass", "tilt")

@@ -414,3 +414,17 @@ def test_told_lengths_and_loads_are_read_again_as_they_were_given(tmp_path: Path
     line = ["--line", "0.4", "0", "0.2", "0.5", "0", "0.2"]
     assert run("sweep", "planar_vertical", *line, "--no-recording", "--out", out).exit_code == 0
     assert not (out / "sweep.toml").exists()
+
+
+def test_a_pose_at_which_cables_give_way_is_exported_without_their_law(tmp_path: Path) -> None:
+    model = tmp_path / "soft.toml"
+    model.write_text(
+        'format = 1\n[robot]\nname = "demobot_parallel"\n[[effect]]\n'
+        'name = "nonlinear_elasticity"\n'
+        "[effect.parameters]\nquadratic = { value = 0.0 }\ncubic = { value = -4.29e5 }\n"
+    )
+    out = tmp_path / "soft.xml"
+    found = run("export", "demobot_parallel", out, "0.17", "0.25", "0.2", "--model", model)
+    assert found.exit_code == 0, found.output
+    assert "not in any file: nonlinear_elasticity; at this pose" in " ".join(found.output.split())
+    assert out.exists() and not (tmp_path / "soft-mujoco.xml").exists()
