@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from crosscheck.fit.length_errors import with_length_errors
 from crosscheck.fit.problem import Problem, in_units_of
 from seecr.effects import Terms
-from seecr.effects.base import Effect
 from seecr.pose import Array
-from seecr.prediction.experiment import Experiment, Prediction, mixed
+from seecr.prediction.experiment import Experiment, Prediction
 from seecr.prediction.parted import rates
 
 # A row is far off if the mean square of its whitened residuals exceeds _FAR_OFF. It may then rest
@@ -79,9 +78,10 @@ def evaluate(problem: Problem, terms: Terms, factor: Array, near: State | None =
         state = _compared(problem, terms, prediction, raw, factor, experiment)
         return _on_measured_branch(problem, state)
     at = with_length_errors(problem, effects, experiment.length_errors, start)
-    experiment = experiment.with_length_errors(at.length_errors)
-    state = _compared(problem, terms, at.prediction, at.linear_raw(), at.factor, experiment)
-    return _as_likely(problem, state, at.cost(problem, problem.length_sigma))
+    experiment, lines = experiment.with_length_errors(at.lines.errors), at.lines
+    raw = lines.at_commands()
+    state = _compared(problem, terms, at.prediction, raw, lines.factor, experiment)
+    return _as_likely(problem, state, at.cost(problem))
 
 
 def _on_measured_branch(problem: Problem, state: State) -> State:
@@ -162,92 +162,3 @@ def derivatives(
     """(N, p) whitened derivatives of the prediction by the terms' parameters."""
     change = rates(state.experiment, state.terms, state.prediction, columns, frozen)
     return problem.whiten(state.factor, problem.as_read(change, state.prediction.readings))
-
-
-# Rounds of the search for the most likely length errors: from scratch, and from a nearby state.
-_ROUNDS, _ROUNDS_NEAR = 8, 3
-
-
-def with_length_errors(
-    problem: Problem, effects: Sequence[Effect], errors: Array | None, near: Prediction | None
-) -> Rows:
-    """The rows with the most likely errors of their lengths, and the noise about these.
-
-    Args:
-        problem: readings and noise, that of lengths included.
-        effects: effects of the model.
-        errors: (n, m) [m] errors to start from, or None.
-        near: a prediction to start from; without one, more rounds are made.
-    """
-    spread = problem.length_sigma
-    if errors is None:
-        errors = np.zeros((problem.data.n_rows, problem.data.n_cables))
-    here = Rows.predicted(problem, effects, errors, near)
-    share = np.ones(len(errors))  # length of each row's step, as a fraction of the full one
-    together = True
-    for _ in range(_ROUNDS if near is None else _ROUNDS_NEAR):
-        step = here.better_errors(problem, spread) - here.length_errors
-        size = np.max(np.abs(step) / spread, axis=1, initial=0.0)
-        moving = problem.use & (share * size > 1e-2)
-        if not moving.any():
-            break
-        moved = here.length_errors + (share * moving)[:, None] * step
-        trial = Rows.predicted(problem, effects, moved, here.prediction)
-        better = moving & (trial.cost(problem, spread) <= here.cost(problem, spread))
-        share = np.where(better, np.minimum(2.0 * share, 1.0), np.where(moving, 0.3 * share, share))
-        together = bool((better == moving).all())
-        here = trial if together else here.with_rows(trial, better)
-    if not together and here.prediction.has_history:
-        here = Rows.predicted(problem, effects, here.length_errors, here.prediction)
-    return here
-
-
-@dataclass(eq=False)
-class Rows:
-    """Rows with given errors of their lengths, and their residuals."""
-
-    length_errors: Array
-    prediction: Prediction
-    solved: NDArray[np.bool_]
-    raw: Array
-    rate: Array  # (n, 6 + m, m) derivative of what was read by the lengths
-    factor: Array
-
-    @classmethod
-    def predicted(
-        cls, problem: Problem, effects: Sequence[Effect], errors: Array, start: Prediction | None
-    ) -> Rows:
-        at = problem.experiment.with_length_errors(errors).predict(effects, start)
-        rate = problem.by_length(at)
-        raw = problem.residuals(at.readings)
-        return cls(errors, at, at.solved, raw, rate, problem.noise_about(rate))
-
-    def with_rows(self, other: Rows, rows: NDArray[np.bool_]) -> Rows:
-        """These rows, some replaced by another's; with history, the prediction is approximate."""
-        there = other.prediction
-        return Rows(
-            length_errors=mixed(rows, self.length_errors, other.length_errors),
-            prediction=there if there.has_history else self.prediction.with_rows(there, rows),
-            solved=np.where(rows, other.solved, self.solved),
-            raw=mixed(rows, self.raw, other.raw),
-            rate=mixed(rows, self.rate, other.rate),
-            factor=mixed(rows, self.factor, other.factor),
-        )
-
-    def cost(self, problem: Problem, spread: Array) -> Array:
-        """(n,) sum of squares of readings and length errors, in units of their noise."""
-        filled = np.where(problem.measured & np.isfinite(self.raw), self.raw, 0.0)
-        cost = ((filled / problem.reading_sigma) ** 2).sum(axis=1)
-        cost = cost + ((self.length_errors / spread) ** 2).sum(axis=1)
-        return np.where(self.solved, cost, np.inf)
-
-    def linear_raw(self) -> Array:
-        """Residuals at the commanded lengths, to first order."""
-        return self.raw + (self.rate @ self.length_errors[..., None])[..., 0]
-
-    def better_errors(self, problem: Problem, spread: Array) -> Array:
-        """Most likely errors of the lengths (n, m) given the readings, to first order."""
-        read = np.where(problem.measured, self.linear_raw(), 0.0)[..., None]
-        white = np.linalg.solve(self.factor, np.concatenate([read, self.rate], axis=2))
-        along = np.swapaxes(white[..., 1:], 1, 2) @ white[..., :1]
-        return np.asarray(spread**2 * along[..., 0])

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from seecr.compiled.columns import STRAIN
+from seecr.compiled.columns import REST, STRAIN
 from seecr.description.joints import motion_columns
 from seecr.effects.base import Effect, Readings
 from seecr.effects.checked import is_built_in
@@ -84,10 +84,13 @@ def length_sensitivities(at: Prediction) -> Array:
 
 
 def _by_length(at: Prediction) -> Array:
+    """With steps to the one side on which a cable that is just taut, or slack, remains so."""
     step = 1e-6 * at.tables.length
-    return _response_by_cable(
-        at, at.tables.lengthened(step), at.tables.lengthened(-step), 2.0 * step
-    )
+    longer_by = at.found.states[..., STRAIN] * at.tables.cables[..., REST]
+    ahead = np.where((longer_by > 0.0) & (longer_by < step), 0.0, step)
+    behind = np.where((longer_by < 0.0) & (longer_by > -step), 0.0, step)
+    plus, minus = at.tables.lengthened(ahead), at.tables.lengthened(-behind)
+    return _response_by_cable(at, plus, minus, (ahead + behind)[:, None])
 
 
 def read_by_length(at: Prediction) -> Array:
@@ -255,7 +258,7 @@ def _response_by_cable(at: Prediction, plus: Tables, minus: Tables, apart: Any) 
     step = -_kept(at, "inverse", _inverse_stiffness) @ (force / apart)
     out = np.concatenate([motion_of(at) @ step, at.found.slopes @ step], axis=1)
     cable = np.arange(own.shape[1])
-    out[:, 6 + cable, cable] += own / apart
+    out[:, 6 + cable, cable] += own / (apart[:, 0] if np.ndim(apart) == 3 else apart)
     return out
 
 

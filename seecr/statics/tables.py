@@ -45,8 +45,8 @@ class Tables:
     def __len__(self) -> int:
         return len(self.poses)
 
-    def lengthened(self, by: float) -> Tables:
-        """The same tables with every cable longer by a length [m]."""
+    def lengthened(self, by: float | Array) -> Tables:
+        """The same tables with every cable longer by a length [m], or by lengths (n, m)."""
         cables = self.cables.copy()
         cables[..., REST] += by
         cables[..., GAP] -= by

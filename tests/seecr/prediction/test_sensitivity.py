@@ -10,9 +10,10 @@ from effect_cases import KINDS, experiment_of, random_term, robot_of, worst_mism
 from random_robots import random_poses
 
 from seecr.commands.data import Commands
+from seecr.compiled.columns import REST, STRAIN
 from seecr.effects import Term, Terms, effect_named, layout_of
 from seecr.equilibrium.solving import solve
-from seecr.pose import pose_difference
+from seecr.pose import Array, pose_difference
 from seecr.prediction.experiment import Experiment
 from seecr.prediction.sensitivity import (
     length_sensitivities,
@@ -37,6 +38,29 @@ def test_by_rest_lengths_as_solving_again_gives(kind: str) -> None:
         pull = (ahead.tensions - behind.tensions) / (2 * step[i])
         assert found[:, :6, i] == pytest.approx(move, rel=1e-4, abs=1e-5 * np.abs(move).max())
         assert found[:, 6:, i] == pytest.approx(pull, rel=1e-4, abs=1e-5 * np.abs(pull).max())
+
+
+@pytest.mark.parametrize("part", [1e-9, -1e-9])
+def test_by_rest_lengths_on_one_side_of_the_kink_where_a_cable_goes_slack(part: float) -> None:
+    """A step across it would give a mean of both sides, at which nothing is right."""
+    experiment = experiment_of("demobot_parallel", seed=2)
+    there = experiment.predict()
+    row, cable = np.argwhere(there.slack)[0]
+    states, cables = there.found.states[row, cable], there.tables.cables[row, cable]
+    gap = -states[STRAIN] * cables[REST]
+    assert gap > 1e-4
+
+    def rates(by: float) -> Array:
+        errors = np.zeros(there.tensions.shape)
+        errors[row, cable] = -gap - by
+        at = experiment.with_length_errors(errors).predict((), there)
+        assert at.slack[row, cable] == (by < 0.0)
+        return length_sensitivities(at)[row]
+
+    length = experiment.robot.length
+    near, far = rates(part * length), rates(1e3 * part * length)
+    assert near == pytest.approx(far, rel=1e-2, abs=1e-3 * np.abs(far).max())
+    assert (near[6 + cable, cable] == 0.0) == (part < 0.0)
 
 
 @pytest.mark.parametrize("kind", ["free", "planar", "jointed"])
