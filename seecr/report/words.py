@@ -254,7 +254,7 @@ def other_lines(
 
 
 def _more_energy(more: float) -> str:
-    """The difference in energy, if there is one: moments and users' laws have no energy."""
+    """The difference in energy, if both have one."""
     return f"{joules(more, '+.4g')}, " if np.isfinite(more) else ""
 
 
