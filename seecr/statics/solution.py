@@ -360,7 +360,8 @@ def _energies(
     robot: Robot, tables: Tables, check: batch.Evaluation, status: NDArray[np.object_]
 ) -> Array:
     """Energies (n,) [J] of poses, whatever full turns a search made under a moment."""
-    balanced = [s in (Status.CONVERGED, Status.UNSTABLE, Status.SINGULAR) for s in status]
+    ends = (Status.CONVERGED, Status.UNSTABLE, Status.SINGULAR)
+    balanced = np.array([one in ends for one in status], dtype=bool)
     rows = np.flatnonzero(batch.under_moment(tables) & balanced)
     if len(rows) == 0 or not robot.joints:
         return check.energy

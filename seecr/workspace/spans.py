@@ -142,6 +142,8 @@ def slack_spans(
         raise InputError("slack_spans needs commanded poses (n, 7); got lengths")
     if told.pose.shape != solution.command.shape or np.any(told.pose != solution.command):
         raise InputError("slack_spans: expected the commands of the solution, got other poses")
+    if len(told) == 0:
+        return ()
     setup = setup_with(effects_of(effects, robot), robot, told)
     fixed = setup.has_history or bool(setup.laws) or solution.jumps is not None
     way = _Way(solution, told, effects)

@@ -131,6 +131,14 @@ def test_where_it_does_not_rest_is_a_zone_of_its_own() -> None:
     assert solve(robot, beside).converged.tolist() == [False, True]
 
 
+def test_nothing_and_one_pose() -> None:
+    robot = load_robot(model_path("planar_vertical"))
+    assert slack_spans(solve(robot, np.zeros((0, 7)))) == ()
+    (span,) = slack_spans(solve(robot, line(0.2, 0.0, 1)))
+    assert span.slack == ("cable2", "cable3") and span.width == span.turn == 0.0
+    assert span.rows == (0.0, 0.0) and span.first == pytest.approx(span.last)
+
+
 def test_refusals() -> None:
     robot = load_robot(model_path("planar_vertical"))
     found = solve(robot, line(0.2, 0.0, 3))
