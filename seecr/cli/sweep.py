@@ -108,8 +108,7 @@ def command(
     Poses are named by their line in POSES.csv; those of --line and --grid are counted from 0.
 
     Zones are the stretches of the commanded way with the same slack cables; between poses their
-    edges are searched for, to a micrometre; with --follow or history they are half way between
-    poses.
+    edges are searched for, to a micrometre; with history they are half way between poses.
     On two pairs of parallel cables in a plane, the paper's point V or H is given, too.
 
     Writes sweep.json, sweep.csv, a figure and sweep.rrd. Also writes sweep.toml if lengths are told

@@ -265,7 +265,7 @@ def span_lines(spans: Sequence[SlackSpan]) -> Iterator[str]:
         )
         wide = f"{1e3 * span.width:.3f} mm wide" if span.width > 0.0 else ""
         turn = f"turned by {np.degrees(span.turn):.4g} deg" if span.turn > _NO_TURN else ""
-        size = ", ".join(part for part in (wide, turn) if part)
+        size = ", ".join(part for part in (wide, turn) if part) or "one pose"
         name = " ".join("xyz"[k] for k in shown)
         yield f"  {name} {first} to {last} mm, {size}: {span.words}"
 

@@ -120,8 +120,9 @@ def slack_spans(
     row is not seen, if the same cables are slack in both rows.
 
     Args:
-        solution: of the sweep's commanded poses. If it was followed or has a history, changes are
-            not searched: they are half way between rows, and known to within that.
+        solution: of the sweep's commanded poses. If it was followed, so are the changes: from the
+            row before, in steps that are halved. If it has a history, they are not searched: they
+            are half way between rows, and known to within that.
         commands: its commands, with runs and loads; default: one run of ``solution.command``. A
             load hangs from the beginning of the way to its row.
         effects: those of the solution.
@@ -145,21 +146,25 @@ def slack_spans(
     if len(told) == 0:
         return ()
     setup = setup_with(effects_of(effects, robot), robot, told)
-    fixed = setup.has_history or bool(setup.laws) or solution.jumps is not None
+    fixed = setup.has_history or bool(setup.laws)
     way = _Way(solution, told, effects)
     changes = way.changes(np.inf if fixed else float(near))
     return tuple(way.spans(changes))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Change:
-    """Where on the way from row k the slack cables change: between parts a and b of it."""
+    """Where on the way from row k the slack cables change: between parts a and b of it.
+
+    ``rest`` (7,) is where the platform rests at a, NaN where it does not.
+    """
 
     k: int
     a: float
     b: float
     before: _Key
     after: _Key
+    rest: Array
 
     @property
     def at(self) -> float:
@@ -191,9 +196,9 @@ class _Way:
 
     def changes(self, tolerance: float) -> list[_Change]:
         """All changes between rows of a run, in their order, each known to a tolerance [m]."""
-        keys, starts = _keys(self.solution), self.commands.starts
+        keys, starts, rests = _keys(self.solution), self.commands.starts, self.solution.pose
         pairs = [k for k in range(len(keys) - 1) if not starts[k + 1] and keys[k] != keys[k + 1]]
-        found = [_Change(k, 0.0, 1.0, keys[k], keys[k + 1]) for k in pairs]
+        found = [_Change(k, 0.0, 1.0, keys[k], keys[k + 1], rests[k]) for k in pairs]
         if not found or not np.isfinite(tolerance):
             return found
         size = np.linalg.norm(self.steps, axis=1)
@@ -212,12 +217,19 @@ class _Way:
         trial = replace(
             self.commands.rows(row + 1), pose=self.poses(row + middle), run=np.arange(len(row))
         )
-        found = solve(self.solution.robot, trial, effects=self.effects)
-        for c, at, key in zip(changes, middle.tolist(), _keys(found), strict=True):
+        start = None
+        if self.solution.jumps is not None:
+            # moved with its command, or from the command where it does not rest
+            rest = np.array([c.rest for c in changes])
+            step = (middle - np.array([c.a for c in changes]))[:, None] * self.steps[row]
+            start = moved(self.solution.robot, _or_else(rest, trial.pose), step)
+        found = solve(self.solution.robot, trial, effects=self.effects, start=start)
+        each = zip(changes, middle.tolist(), _keys(found), found.pose, strict=True)
+        for c, at, key, pose in each:
             if key != c.before:
-                yield _Change(c.k, c.a, at, c.before, key)
+                yield _Change(c.k, c.a, at, c.before, key, c.rest)
             if key != c.after:
-                yield _Change(c.k, at, c.b, key, c.after)
+                yield _Change(c.k, at, c.b, key, c.after, pose)
 
     def spans(self, changes: Sequence[_Change]) -> Iterator[SlackSpan]:
         """The stretches between changes."""
@@ -246,6 +258,11 @@ class _Way:
         if key is not None:
             names = tuple(n for n, s in zip(robot.cable_names, key, strict=True) if s)
         return SlackSpan(run, names, rows, poses[0], poses[-1], float(width), float(turned), within)
+
+
+def _or_else(poses: Array, others: Array) -> Array:
+    """Poses (n, 7), and others where these have NaN."""
+    return np.where(np.isfinite(poses).all(axis=1, keepdims=True), poses, others)
 
 
 def _keys(solution: Solution) -> list[_Key]:

@@ -14,6 +14,7 @@ from seecr.description.shipped import model_path
 from seecr.effects import Term
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
+from seecr.pose import pose_add, pose_difference, quat_from_rotvec
 from seecr.workspace.spans import slack_spans
 
 
@@ -99,20 +100,48 @@ def test_a_load_hangs_on_the_way_to_its_row() -> None:
     assert spans[-1].slack == () and spans[-1].first[0] == pytest.approx(last, abs=1e-4)
 
 
-def test_what_is_followed_or_remembers_is_told_half_way_between_rows() -> None:
+def test_what_remembers_is_told_half_way_between_rows() -> None:
     robot = load_robot(model_path("planar_vertical"))
     poses = line(0.2, 0.0, 24)
     plain = slack_spans(solve(robot, poses))
     friction = [Term.of(robot, "hysteresis", amplitude_N=1e-3)]
-    for found, effects in (
-        (solve(robot, poses, follow=True), ()),
-        (solve(robot, poses, effects=friction), friction),
-    ):
-        spans = slack_spans(found, effects=effects)
-        assert [len(span.slack or ()) for span in spans] == [2, 1, 0, 1, 2]
-        for span, other in zip(spans[1:], plain[1:], strict=True):
-            assert span.within[0] == pytest.approx(0.01)
-            assert abs(span.first[0] - other.first[0]) <= 0.0101
+    spans = slack_spans(solve(robot, poses, effects=friction), effects=friction)
+    assert [len(span.slack or ()) for span in spans] == [2, 1, 0, 1, 2]
+    for span, other in zip(spans[1:], plain[1:], strict=True):
+        assert span.within[0] == pytest.approx(0.01)
+        assert abs(span.first[0] - other.first[0]) <= 0.0101
+
+
+def test_what_is_followed_has_the_same_zones_where_there_is_one_rest() -> None:
+    robot = load_robot(model_path("planar_vertical"))
+    poses = line(0.2, 0.0, 24)
+    plain, led = (slack_spans(solve(robot, poses, follow=way)) for way in (False, True))
+    assert [span.slack for span in led] == [span.slack for span in plain]
+    for span, other in zip(led, plain, strict=True):
+        assert span.first == pytest.approx(other.first, abs=1.1e-6)
+
+
+@pytest.mark.slow
+def test_what_is_followed_changes_where_it_jumps() -> None:
+    """Solved from the command alone the platform rests elsewhere than where the way leads it."""
+    robot = load_robot(model_path("demobot_parallel"))
+    poses = np.tile(robot.reference_pose, (6, 1))
+    turn = np.zeros((6, 3))
+    turn[:, 0] = np.radians(np.linspace(140.0, 155.0, 6))
+    poses[:, 3:] = quat_from_rotvec(turn)
+    commands = Commands(poses, stands=np.ones(6, dtype=bool))
+    found = solve(robot, commands, follow=True)
+    assert found.jumps is not None
+    (jump,) = [one for jumps in found.jumps for one in jumps]
+    spans = slack_spans(found, commands)
+    edges = [span.first for span in spans[1:]]
+    off = [np.abs(pose_difference(edge, jump.command)).max() for edge in edges]
+    near = int(np.argmin(off))
+    assert off[near] * robot.length < 2e-6
+    for k, pose, aside in ((near, jump.before, -1e-4), (near + 1, jump.after, 1e-4)):
+        command = pose_add(jump.command[None], np.array([[0.0, 0, 0, aside, 0, 0]]))
+        there = solve(robot, command, start=pose)
+        assert spans[k].slack == tuple(np.array(robot.cable_names)[there.slack[0]].tolist())
 
 
 def test_where_it_does_not_rest_is_a_zone_of_its_own() -> None:
