@@ -55,10 +55,13 @@ if TYPE_CHECKING:
     from seecr.prediction.sensitivity import sensitivities
     from seecr.prediction.uncertainty import Spread, spread_of
     from seecr.statics.solution import Solution, Status
+    from seecr.workspace.bars import BarBalance, bar_balances
     from seecr.workspace.chances import held_chance, kept_chance
     from seecr.workspace.edges import boundary
     from seecr.workspace.grid import Workspace
     from seecr.workspace.maps import default_axes, workspace_map
+    from seecr.workspace.midlines import Midlines, midline_points
+    from seecr.workspace.spans import SlackSpan, slack_spans
     from seecr.workspace.zones import Zone, feasible, slack_zones, tension_margin
 
 __version__ = "0.1.0"
@@ -95,11 +98,15 @@ _MODULES = {
     "statics.solution": ("Solution", "Status"),
     "description.shipped": ("model_names", "model_path"),
     "prediction.uncertainty": ("Spread", "spread_of"),
+    "workspace.bars": ("BarBalance", "bar_balances"),
+    "workspace.midlines": ("Midlines", "midline_points"),
+    "workspace.spans": ("SlackSpan", "slack_spans"),
     "workspace.zones": ("Zone", "feasible", "slack_zones", "tension_margin"),
 }  # fmt: skip
 _WHERE = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
+    "BarBalance",
     "BarRest",
     "Barrier",
     "Commands",
@@ -113,6 +120,7 @@ __all__ = [
     "Jump",
     "Knowledge",
     "Loads",
+    "Midlines",
     "MissingPackageError",
     "Model",
     "NoRestError",
@@ -122,6 +130,7 @@ __all__ = [
     "RobotError",
     "SeecrError",
     "Setup",
+    "SlackSpan",
     "Solution",
     "Spread",
     "Status",
@@ -129,6 +138,7 @@ __all__ = [
     "Terms",
     "Workspace",
     "Zone",
+    "bar_balances",
     "bar_equilibria",
     "bar_tilt",
     "barriers",
@@ -146,12 +156,14 @@ __all__ = [
     "load_model",
     "load_robot",
     "midline_point",
+    "midline_points",
     "model_names",
     "model_path",
     "new_model",
     "parameter",
     "predict",
     "sensitivities",
+    "slack_spans",
     "slack_zones",
     "solution_manifold",
     "solve",

@@ -44,18 +44,22 @@ def command(
     ROBOT is an MJCF file or the name of a shipped robot. X Y Z are metres in the base frame, QW
     QX QY QZ a quaternion, scalar first; without one the orientation is that of the reference pose.
     Other stable equilibria of the same command are searched for and listed by energy, with the
-    barrier in between.
+    barrier in between. For a bar on two cables, all tilts at which it is in balance are listed,
+    with their stability; for two pairs of parallel cables in a plane, the paper's point V or H.
 
     \b
     Exit status: 0 at rest, 2 bad input, 3 no equilibrium found, or a platform that is free to move
     there.
     """
-    from seecr import barriers, equilibria, predict, solve, spread_of
+    import numpy as np
+
+    from seecr import bar_balances, barriers, equilibria, midline_points, predict, solve, spread_of
     from seecr.equilibrium.multiple import elsewhere
     from seecr.files import json_text, staged, write_text
     from seecr.report.rows import SweepRows
     from seecr.report.words import (
         at_rest,
+        bar_lines,
         cable_lines,
         midline_lines,
         other_lines,
@@ -79,6 +83,12 @@ def command(
         spread = None if own is None else spread_of(machine, command, own)
         tell("solved", 1.0)
     status = 0 if at_rest(solution) else 3
+    # the closed form knows no effects
+    bars = [
+        bar_balances(machine, pose) if own is None and np.isfinite(pose).all() else None
+        for pose in (solution.pose[0], solution.command[0])
+    ]
+    met = midline_points(solution)
     notes = list(notes_of(own, solution))
     document = {
         "made": made_by(machine.source, model),
@@ -87,6 +97,9 @@ def command(
         "cables": machine.cable_names,
         **SweepRows(solution, spread=spread).as_json()[0],
         "sentence": solution.sentence(0),
+        "slack_cables": int(solution.slack[0].sum()) if solution.converged[0] else None,
+        "midline_point": None if met is None else met.name,
+        "bar": None if bars[1] is None else {"at_rest": bars[0], "at_command": bars[1]},
         "softest_direction": softest_words(solution),
         "frequencies_Hz": solution.frequencies[0],
         "equilibria": None if others is None else SweepRows(others),
@@ -103,6 +116,7 @@ def command(
         *pose_lines(solution, spread=spread),
         *cable_lines(solution, spread=spread),
         *midline_lines(solution),
+        *bar_lines(*bars),
         *other_lines(solution, others, passes),
         after_pose(solution, robot, coordinates[3:], given_with(cable, model)),
     ]

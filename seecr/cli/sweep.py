@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -31,12 +31,14 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from seecr import Commands, Model, Robot, Solution
+    from seecr import Commands, Model, Robot, SlackSpan, Solution
 
 
 _WANTED = "Lengths are commanded; deviations are from the wanted poses, columns want_*."
 # Poses of --line.
 _COUNT = 24
+# Zones of slack cables are computed for sweeps with at most so many changes of them.
+_MOST_CHANGES = 1000
 _COUNTED = "Poses are counted from 0, as the rows of sweep.json are."
 
 
@@ -105,6 +107,10 @@ def command(
 
     Poses are named by their line in POSES.csv; those of --line and --grid are counted from 0.
 
+    Zones are the stretches of the commanded way with the same slack cables; between poses their
+    edges are searched for, to a micrometre; with history they are half way between poses.
+    On two pairs of parallel cables in a plane, the paper's point V or H is given, too.
+
     Writes sweep.json, sweep.csv, a figure and sweep.rrd. Also writes sweep.toml if lengths are told
     lengths or runs begin at their first row, so that every command reads sweep.csv as these
     commands.
@@ -113,12 +119,12 @@ def command(
     Exit status: 0 all at rest, 2 bad input, 3 a pose without an equilibrium, or where the platform
     is free to move.
     """
-    from seecr import spread_of
+    from seecr import midline_points, spread_of
     from seecr.files import json_text, staged, write_text
     from seecr.report.commanded import toml_beside
     from seecr.report.rows import SweepRows
     from seecr.report.sweep_panels import sweep_figure
-    from seecr.report.words import at_rest, jump_lines, sweep_lines
+    from seecr.report.words import at_rest, jump_lines, span_lines, sweep_lines
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
@@ -134,7 +140,10 @@ def command(
         commanded = commands.lengths is None or wanted
         rows = SweepRows(solution, commands.lengths, more, spread, wanted, commands.loads)
         status = 0 if at_rest(solution) else 3
-        notes = [*notes_of(own, solution), *said]
+        runs = _runs(machine, given, more)
+        spans, why_not = _spans(solution, commands, own, runs)
+        met = midline_points(solution)
+        notes = [*notes_of(own, solution), *said, *why_not]
         document = {
             "made": made_by(machine.source, poses, model),
             "exit_status": status,
@@ -143,6 +152,8 @@ def command(
             "model": None if own is None else own.names,
             "notes": notes,
             **({} if search is None else {"search": search}),
+            "zones": spans,
+            "midline_point": None if met is None else met.name,
             "rows": rows,
         }
         text = json_text(document)
@@ -151,7 +162,6 @@ def command(
         if beside := toml_beside(commands.told, commands):
             write_text(folder / "sweep.toml", beside)
         if figure != "none":
-            runs = _runs(machine, given, more)
             sweep_figure(folder / f"sweep.{figure}", solution, commanded, wanted, runs, spread)
         if not no_recording:
             # takes a second or two to import
@@ -161,7 +171,10 @@ def command(
     if as_json:
         click.echo(text)
         return status
-    lines = [*sweep_lines(solution, commanded, spread), *jump_lines(solution)]
+    lines = [
+        *sweep_lines(solution, commanded, spread), *span_lines(spans or ()), *jump_lines(solution),
+        *(() if met is None else met.lines()),
+    ]  # fmt: skip
     if search is not None:
         lines.append(search.words)
     then = after_sweep(commands, robot, poses, given_with(cable, model))
@@ -282,6 +295,27 @@ def _along(robot: Robot, given: _Commanded) -> NDArray[np.float64]:
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     turned = given.turned or robot.reference_pose[3:]
     return commanded_poses(np.column_stack([places, np.tile(turned, (len(places), 1))]))
+
+
+def _spans(
+    solution: Solution, commands: Commands, model: Model | None, runs: Sequence[int] | None
+) -> tuple[tuple[SlackSpan, ...] | None, tuple[str, ...]]:
+    """The zones of slack cables between commanded poses, and why there are none."""
+    import numpy as np
+
+    from seecr import slack_spans
+
+    if commands.lengths is not None or len(commands) < 2:
+        return None, ()
+    changes = np.any(solution.slack[1:] != solution.slack[:-1], axis=1).sum()
+    if changes > _MOST_CHANGES:
+        return None, (
+            f"Zones of slack cables are not computed: more than {_MOST_CHANGES} poses differ from "
+            "the one before in which cables are slack.",
+        )
+    if commands.run is None and runs is not None:
+        commands = replace(commands, run=np.unique(runs, return_inverse=True)[1])
+    return slack_spans(solution, commands, effects=model or ()), ()
 
 
 def _runs(robot: Robot, given: _Commanded, more: _Columns) -> Sequence[int] | None:

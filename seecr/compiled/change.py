@@ -22,7 +22,7 @@ from seecr.compiled.columns import (
     UP,
 )
 from seecr.compiled.jit import jit_allocating, jit_inner
-from seecr.compiled.joints import joint_columns, onto_joints_gradient, place_joints
+from seecr.compiled.joints import N_CURRENT, joint_columns, onto_joints_gradient, place_joints
 from seecr.compiled.platform import N_WORK
 from seecr.compiled.rotation import rotated_less
 
@@ -31,7 +31,7 @@ from seecr.compiled.rotation import rotated_less
 def make_change_space(joints):
     """Scratch arrays, made once per batch."""
     return (
-        np.empty(7), np.zeros((joints, 7)), np.empty((joints, 6)), np.empty(3), np.empty(3),
+        np.empty(7), np.zeros((joints, N_CURRENT)), np.empty((joints, 6)), np.empty(3), np.empty(3),
         np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(N_STATE),
         np.empty((N_WORK, 6)), np.empty(6), np.empty(7), np.zeros(6),
     )  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 from seecr.compiled.algebra import cholesky, copy_rows, copy_vector, largest_diagonal, norm
 from seecr.compiled.columns import EA, N_STATE
 from seecr.compiled.jit import jit_allocating, jit_inner
-from seecr.compiled.joints import place_joints
+from seecr.compiled.joints import N_CURRENT, place_joints
 from seecr.compiled.outcomes import (
     CABLE_LAW,
     CONVERGED,
@@ -50,7 +50,7 @@ def make_space(m, n, joints):
     """Scratch arrays of a descent, made once per batch."""
     return (
         np.zeros(n), np.zeros((n, n)), np.zeros(7), np.zeros(n), np.zeros(n), np.zeros((n, n)),
-        np.zeros((m, N_STATE)), np.zeros((m, n)), np.zeros((m, 3)), np.zeros((joints, 7)),
+        np.zeros((m, N_STATE)), np.zeros((m, n)), np.zeros((m, 3)), np.zeros((joints, N_CURRENT)),
         np.zeros((N_WORK + m, 6)), np.zeros((m + 1, N_READY)),
     )  # fmt: skip
 

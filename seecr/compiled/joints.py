@@ -9,14 +9,18 @@ from __future__ import annotations
 from seecr.compiled.jit import jit, jit_inner
 from seecr.compiled.rotation import quaternion_product, rotated_less, turned
 
+# Columns of a current joint: those of a screw, and the joint's value.
+VALUE = 7
+N_CURRENT = 8
+
 
 @jit
 def place_joints(screws, values, length, origin, deviation, current):
     """Deviation (7,) of a platform on joints, and the current joint axes and points.
 
     The platform moves by E_1 E_2 ... E_n, with E_j along or about joint j at the commanded pose
-    (product of exponentials). ``screws`` and ``current`` are (n, 7): kind (0 slide, 1 hinge), axis,
-    point.
+    (product of exponentials). ``screws`` are (n, 7): kind (0 slide, 1 hinge), axis, point;
+    ``current`` (n, N_CURRENT) has the value besides.
     """
     w, x, y, z = 1.0, 0.0, 0.0, 0.0
     mx = my = mz = 0.0
@@ -29,6 +33,7 @@ def place_joints(screws, values, length, origin, deviation, current):
         current[j, 0], current[j, 1], current[j, 2], current[j, 3] = screws[j, 0], nx, ny, nz
         sx, sy, sz = rotated_less(w, x, y, z, px - ox, py - oy, pz - oz)
         current[j, 4], current[j, 5], current[j, 6] = px + sx + mx, py + sy + my, pz + sz + mz
+        current[j, VALUE] = values[j]
         if screws[j, 0] == 0.0:
             mx, my, mz = mx + nx * values[j], my + ny * values[j], mz + nz * values[j]
             continue
@@ -45,7 +50,7 @@ def place_joints(screws, values, length, origin, deviation, current):
 
 @jit
 def place_batch(screws, values, length, poses, deviation, current):
-    """Current joints (n, d, 7) of n platforms; ``deviation`` (7,) is that of the last one."""
+    """Current joints (n, d, N_CURRENT) of n platforms; ``deviation`` is that of the last one."""
     for r in range(screws.shape[0]):
         place_joints(screws[r], values[r], length, poses[r], deviation, current[r])
 

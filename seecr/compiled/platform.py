@@ -42,7 +42,7 @@ from seecr.compiled.columns import (
     WINCH_TENSION,
 )
 from seecr.compiled.jit import jit, jit_allocating, jit_inner
-from seecr.compiled.joints import joint_columns, onto_joints, place_joints
+from seecr.compiled.joints import N_CURRENT, VALUE, joint_columns, onto_joints, place_joints
 from seecr.compiled.law import is_linear
 from seecr.compiled.rotation import rotated_less
 
@@ -54,6 +54,8 @@ ARM, START, BEFORE, YIELD, RATE = 0, 3, 6, 7, 8
 N_READY = 9
 # Rows of scratch that evaluate needs, plus one for each cable.
 N_WORK = 34
+# Sine of the angle between axes that are parallel but for rounding.
+_PARALLEL = 1e-9
 
 
 @jit_inner
@@ -225,8 +227,7 @@ def _evaluate(
     for k in range(6):
         for r in range(k):
             hessian[r, k] = hessian[k, r]
-    # a constant moment has no potential in three dimensions
-    return np.nan if has_moment(load) else energy
+    return energy
 
 
 @jit_inner
@@ -240,7 +241,7 @@ def evaluate(
         ready: (m + 1, N_READY), prepared.
         load: (N_LOAD,).
         deviation: (7,) from the commanded pose.
-        current: (n, 7) current joints, (0, 7) for a free platform.
+        current: (n, N_CURRENT) current joints, none for a free platform.
         length: the robot's length [m].
         guess: (m, 3) warm start of the catenaries.
         gradient: (d,) [N], filled.
@@ -250,14 +251,15 @@ def evaluate(
         work: (N_WORK + m, 6) scratch.
 
     Returns:
-        energy [J]; nan under a moment and if a law has none in closed form; inf if a cable's own
-        equations could not be solved.
+        energy [J]; nan under a moment whose work depends on the way and if a law has none in closed
+        form; inf if a cable's own equations could not be solved.
     """
     n, m = current.shape[0], cables.shape[0]
     if n == 0:
-        return _evaluate(
+        energy = _evaluate(
             cables, ready, load, deviation, length, guess, gradient, hessian, states, slopes, work
         )
+        return energy - work_of_moment(load, current, length)
     columns, g, h, own = work[19:25], work[25], work[26:32], work[N_WORK:]
     x = ready[m, START] + deviation[0]
     y, z = ready[m, START + 1] + deviation[1], ready[m, START + 2] + deviation[2]
@@ -269,7 +271,7 @@ def evaluate(
             slopes[i, j] = 0.0
             for k in range(6):
                 slopes[i, j] += own[i, k] * columns[j, k]
-    return energy
+    return energy - work_of_moment(load, current, length)
 
 
 @jit_allocating
@@ -280,7 +282,7 @@ def evaluate_batch(
     """Gradient, stiffness and energy at given deviations; all outputs are filled."""
     m = cables.shape[1]
     work, ready = np.empty((N_WORK + m, 6)), np.zeros((m + 1, N_READY))
-    current = np.zeros((screws.shape[1], 7))
+    current = np.zeros((screws.shape[1], N_CURRENT))
     for i in range(poses.shape[0]):
         prepare(cables[i], load[i], poses[i], ready)
         if screws.shape[1] > 0:
@@ -293,9 +295,47 @@ def evaluate_batch(
 
 @jit_inner
 def has_moment(load):
-    """Whether there is an external moment, which has no potential."""
+    """Whether there is an external moment."""
     k = EXTERNAL_MOMENT
     return load[k] != 0.0 or load[k + 1] != 0.0 or load[k + 2] != 0.0
+
+
+@jit_inner
+def _are_parallel(a, b):
+    """Whether two vectors are parallel, to rounding."""
+    x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    squares = (a[0] ** 2 + a[1] ** 2 + a[2] ** 2) * (b[0] ** 2 + b[1] ** 2 + b[2] ** 2)
+    return x * x + y * y + z * z <= _PARALLEL * _PARALLEL * squares
+
+
+@jit_inner
+def work_of_moment(load, current, length):
+    """Work [J] of the external moment, which is constant in the base frame, on the way from the
+    commanded pose; nan if it depends on the way.
+
+    On a platform that turns freely it does: two quarter turns in either order do different work. On
+    hinges its torque along joint j is M . a_j, and joint i further out turns the axis a_j. That
+    torque depends on i, but that along i never on j; so there is a potential only if all torques
+    are constant, that is, M . (a_i x a_j) = 0 in every pose: each two hinges are parallel, or the
+    outer one is parallel to the moment. If this holds at one pose for all pairs, it does at all.
+    """
+    if not has_moment(load):
+        return 0.0
+    n, moment, work = current.shape[0], load[EXTERNAL_MOMENT : EXTERNAL_MOMENT + 3], 0.0
+    if n == 0:
+        return np.nan
+    for j in range(n):
+        if current[j, 0] == 0.0:
+            continue
+        axis = current[j, 1:4]
+        for i in range(j):
+            outer = current[i, 1:4]
+            turns = current[i, 0] == 1.0 and not _are_parallel(outer, axis)
+            if turns and not _are_parallel(outer, moment):
+                return np.nan
+        torque = moment[0] * axis[0] + moment[1] * axis[1] + moment[2] * axis[2]
+        work += torque * current[j, VALUE] / length
+    return work
 
 
 @jit

@@ -34,7 +34,7 @@ def residual_size(gradient):
 
 @jit_inner
 def advance(deviation, values, step, length, screws, pose, trial, trial_values, current):
-    """The state after one step."""
+    """The state after one step, and on joints these as they are then."""
     if screws.shape[0] == 0:
         for k in range(3):
             trial[k] = deviation[k] + step[k]
@@ -52,7 +52,8 @@ def advance(deviation, values, step, length, screws, pose, trial, trial_values, 
 def newton_step(gradient, hessian, shift, radius, load, current, length, factor, step):
     """Solve (H + shift I) step = -gradient, with a shift that makes H positive definite.
 
-    A moment makes the stiffness asymmetric; the step includes that, and still does positive work.
+    A moment whose work depends on the way makes the stiffness asymmetric; the step includes that,
+    and still does positive work.
     """
     n = step.shape[0]
     if not cholesky(hessian, shift, factor):

@@ -31,7 +31,7 @@ from seecr.compiled.columns import (
     FORCE_OF_WEIGHT,
 )
 from seecr.compiled.jit import jit_allocating, jit_inner
-from seecr.compiled.joints import joint_columns, onto_joints_gradient, place_joints
+from seecr.compiled.joints import N_CURRENT, joint_columns, onto_joints_gradient, place_joints
 from seecr.compiled.rotation import rotated_less
 from seecr.compiled.steps import advance
 
@@ -298,8 +298,8 @@ def make_turning_space(m, d, joints, turns):
     """Scratch arrays, made once per batch."""
     n = turns + m
     return (
-        np.zeros((joints, 7)), np.zeros((joints, 6)), np.empty(6), np.empty((m, d)), np.empty(d),
-        np.empty(m), np.empty(d), np.empty(7), np.empty(d), np.empty(d), np.empty(d),
+        np.zeros((joints, N_CURRENT)), np.zeros((joints, 6)), np.empty(6), np.empty((m, d)),
+        np.empty(d), np.empty(m), np.empty(d), np.empty(7), np.empty(d), np.empty(d), np.empty(d),
         np.empty((d, d)), np.empty((d, d)), np.empty((n, d)), np.empty((n, n)), np.empty((n, n)),
         np.empty(n), np.empty(n), np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Rows that depend on the rows before: waypoints solved in order, with the cables' history."""
+"""Rows that depend on the rows before: waypoints in their order, with the cables' history."""
 
 from __future__ import annotations
 

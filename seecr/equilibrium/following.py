@@ -24,6 +24,7 @@ from seecr.effects.setup import Setup
 from seecr.pose import Array, pose_add, pose_difference
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics import batch
+from seecr.statics.batch import under_moment
 from seecr.statics.solution import Solution, certify
 from seecr.statics.starts import start_of
 from seecr.statics.tables import Tables, assemble, take
@@ -42,6 +43,8 @@ _SMALL, _LARGE, _FORETOLD, _LEAST = 0.005, 0.05, 0.2, 2.0**-20
 _DAMPINGS = (1.0, 0.1, 10.0)
 # Flow after a fold: longest step [robot's length], residual at which it ends [load], most steps.
 _FLOW, _STILL, _STEPS = 0.05, 1e-6, 2000
+# Smallest inverse time step [N/m]: slack cables have no stiffness.
+_LEAST_PACE = 1e-12
 # Ridge: curvature that counts as flat [largest stiffness], and the push off it [robot's length].
 _FLAT, _TOUCH = 1e-10, 1e-3
 
@@ -228,10 +231,11 @@ class _Followed:
         self, trial: Tables, pose: Array, guess: Array, jumps: list[Jump]
     ) -> batch.Evaluation:
         """Where the platform comes to rest after a pose that is no longer an equilibrium."""
-        ends = []
+        ends, turns = [], []
         for damping in _DAMPINGS:
-            there = _flow(self.robot, trial, pose, damping)
+            there, over = _flow(self.robot, trial, pose, damping)
             ends.append(self._descended(trial, there, guess))
+            turns.append(over)
         places = [batch.platform_poses(trial, end.deviation) for end in ends]
         first, after = ends[0], places[0][0] if _rests(ends[0]) else np.full(7, np.nan)
         apart = [np.abs(step_between(self.robot, one, places[0])).max() for one in places]
@@ -239,6 +243,8 @@ class _Followed:
         if _rests(first) and apart_from(self.robot, places[0], pose) <= _SMALL * self.robot.length:
             return first
         energies = [evaluated(self.robot, trial, one).energy[0] for one in (pose, places[0])]
+        if turns[0] and under_moment(trial)[0]:
+            energies[0] = np.nan  # the work of a moment on full turns is left out of energies
         lost = energies[0] - energies[1] if _rests(first) else np.inf
         jumps.append(Jump(trial.poses[0].copy(), pose[0], after, float(lost), same))
         return first
@@ -271,20 +277,27 @@ def step_between(robot: Robot, poses: Array, before: Array) -> Array:
 
 
 def rest_below(robot: Robot, tables: Tables, pose: Array) -> Array:
-    """Where an overdamped platform comes to rest from a pose (1, 7); NaN if nowhere."""
-    start, values = start_of(robot, tables, _flow(robot, tables, pose, 1.0))
+    """Where an overdamped platform comes to rest from a pose (1, 7).
+
+    NaN if nowhere, or if a moment turns it past half a turn: its energy is then another one.
+    """
+    there, over = _flow(robot, tables, pose, 1.0)
+    if over and under_moment(tables)[0]:
+        return np.full((1, 7), np.nan)
+    start, values = start_of(robot, tables, there)
     found = batch.descend(tables, start, threads=1, start_values=values, staged=False)
     return (
         batch.platform_poses(tables, found.deviation) if _rests(found) else np.full((1, 7), np.nan)
     )
 
 
-def _flow(robot: Robot, tables: Tables, pose: Array, damping: float) -> Array:
+def _flow(robot: Robot, tables: Tables, pose: Array, damping: float) -> tuple[Array, bool]:
     """Follow an overdamped platform down its energy until it stands still, (1, 7).
 
-    The steps are linearly implicit: short where the energy is steep, Newton steps in the end.
+    Also returns whether a hinge turned past half a turn, where its value begins anew. The steps are
+    linearly implicit: short where the energy is steep, Newton steps in the end.
     """
-    weight = np.where(robot.hinges, damping, 1.0)
+    weight, over = np.where(robot.hinges, damping, 1.0), False
     for _ in range(_STEPS):
         at = evaluated(robot, tables, pose)
         if not np.isfinite(at.gradient).all():
@@ -297,17 +310,28 @@ def _flow(robot: Robot, tables: Tables, pose: Array, damping: float) -> Array:
             if values[0] > -_FLAT * values[-1]:
                 break
             # balanced on a ridge: any disturbance makes the platform leave it
-            pose = moved(robot, pose, _TOUCH * robot.length * (root * vectors[:, 0])[None])
+            pose, wraps = _stepped(robot, pose, _TOUCH * robot.length * (root * vectors[:, 0]))
+            over = over or wraps
             continue
         # the inverse of the time step: soft and unstable directions must not outrun the stiff ones
-        pace = max(2.0 * max(-float(values[0]), 0.0), 1e-9 * float(values[-1]))
+        pace = max(2.0 * max(-float(values[0]), 0.0), 1e-9 * float(values[-1]), _LEAST_PACE)
         while True:
             step = -root * (vectors @ (slope / (values + pace)))
             if np.linalg.norm(step) <= _FLOW * robot.length:
                 break
-            pace = 2.0 * max(pace, 1e-12)
-        pose = moved(robot, pose, step[None])
-    return pose
+            pace *= 2.0
+        pose, wraps = _stepped(robot, pose, step)
+        over = over or wraps
+    return pose, over
+
+
+def _stepped(robot: Robot, pose: Array, step: Array) -> tuple[Array, bool]:
+    """The pose (1, 7) after a step (d,), and whether a hinge's value jumped by a turn in it."""
+    after = moved(robot, pose, step[None])
+    if not robot.joints:
+        return after, False
+    jumped = np.abs(step_between(robot, after, pose)[0] - step)[robot.hinges]
+    return after, bool(np.any(jumped > np.pi * robot.length))
 
 
 def apart_from(robot: Robot, pose: Array, other: Array) -> float:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.compiled.columns import EXTERNAL_MOMENT
 from seecr.compiled.outcomes import TOLERANCE
 from seecr.description.robot import Robot
 from seecr.equilibrium.following import apart_from, evaluated, moved, rest_below, step_between
@@ -41,6 +42,10 @@ _ROUNDING = 1e-9
 _ASIDE = 1e-3
 # Poses nearer than this [of the length] are one equilibrium.
 _ALIKE = 1e-5
+_OF_MOMENT = (
+    "what a moment does on a platform that turns freely depends on the way, so it has no energy"
+)
+_OF_CABLE = "what its cables take depends on the way, or has no formula, so they have no energy"
 # A platform that is turned by more than this [rad] hangs twisted among its cables.
 TWISTED = 0.5 * np.pi
 
@@ -51,8 +56,7 @@ class Barrier(Result):
 
     Attributes:
         energy: [J] needed to get over it from the first equilibrium. NaN, like ``back`` and
-            ``pose``, if there is no potential energy: under a moment, or with a cable law that has
-                none.
+            ``pose``, if there is no potential energy, as ``Solution.energy`` says.
         back: [J] needed from the other equilibrium.
         pose: (7,) at the top.
         exact: whether the top is a saddle (balanced, with one falling direction) from which paths
@@ -60,6 +64,7 @@ class Barrier(Result):
             point of the path that was found, and the lowest path may be lower.
         twisted: whether the other is turned by more than a right angle from the first: pushes lead
             back and forth no more, cables lie across each other.
+        why_not: why there is no energy; "" if there is.
     """
 
     energy: float
@@ -67,6 +72,7 @@ class Barrier(Result):
     pose: Array
     exact: bool
     twisted: bool
+    why_not: str = ""
 
     def as_json(self) -> Record:
         """One entry of ``barriers`` in ``pose.json``."""
@@ -76,6 +82,7 @@ class Barrier(Result):
             "pose": self.pose,
             "exact": self.exact,
             "twisted": self.twisted,
+            "why_not": self.why_not or None,
         }
 
     @property
@@ -84,7 +91,7 @@ class Barrier(Result):
         least = "" if self.exact else "at most "
         twisted = "twisted" if self.twisted else "reachable"
         if not np.isfinite(self.energy):
-            return f"{twisted}; no barrier can be given: this load or law has no energy"
+            return f"{twisted}; no barrier can be given: {self.why_not}"
         # the top of a path that was not made exact may be its end
         back = joules(self.back) if self.back > 1e-12 * self.energy else "next to nothing"
         return f"{twisted}, {least}{joules(self.energy)} to get there, {back} back"
@@ -145,11 +152,19 @@ def _known_without_path(one: Solution, other: Solution) -> Barrier | None:
     """The barrier if that needs no path: without energies, and to the same equilibrium."""
     if not (np.isfinite(one.energy[0]) and np.isfinite(other.energy[0])):
         nowhere, twisted = np.full(7, np.nan), _is_twisted(one, other)
-        return Barrier(np.nan, np.nan, nowhere, exact=False, twisted=twisted)
+        return Barrier(np.nan, np.nan, nowhere, False, twisted, _why_no_energy(one))
     size = np.where(np.arange(6) < 3, 1.0 / one.robot.length, 1.0)
     if np.linalg.norm(size * pose_difference(other.pose, one.pose)) < _ALIKE:
         return Barrier(0.0, 0.0, one.pose[0], exact=True, twisted=False)
     return None
+
+
+def _why_no_energy(one: Solution) -> str:
+    """Whether it is the moment or a cable that has none."""
+    tables = take(one.tables, np.zeros(1, int))
+    tables.load[:, EXTERNAL_MOMENT : EXTERNAL_MOMENT + 3] = 0.0
+    of_moment = np.isfinite(evaluated(one.robot, tables, one.pose).energy[0])
+    return _OF_MOMENT if of_moment else _OF_CABLE
 
 
 def _barrier(one: Solution, other: Solution, path: _Path) -> Barrier:

@@ -13,10 +13,14 @@ import numpy as np
 from seecr.counted import counted
 from seecr.pose import Array
 
-# A limit exceeded by less than this part of the load is rounding.
+# A limit exceeded by less than this part of the load, or of the largest lower limit, is rounding; a
+# load below this part of that limit is none.
 _ROUNDING = 1e-7
 # Most cables named in a sentence.
 _MOST = 3
+# How SciPy's linear program ends.
+_FOUND, _INFEASIBLE = 0, 2
+_SLACK = "without a load all cables could be slack, but not with the lower limit"
 
 
 def why_not_held(
@@ -39,11 +43,15 @@ def why_not_held(
         k = int(np.argmax(low - high))
         least, most = _newtons(low[k]), _newtons(high[k])
         return f"{_who(names[k])} weighs {least}, more than the {most} it may pull"
-    beyond = _least_beyond(matrix, load, low, high)
-    if beyond is None:
+    scale = _scale(load, low)
+    outcome, beyond = _least_beyond(matrix, load, low, high, scale)
+    if outcome == _INFEASIBLE:
         return "no pulls of the cables, however large, balance the load there"
-    rounding = _ROUNDING * max(float(np.abs(load).max()), 1e-300)
-    order = [k for k in np.argsort(-np.abs(beyond)) if abs(beyond[k]) > rounding]
+    if outcome != _FOUND:
+        return "no tensions within the limits balance the load there"
+    rounding = _ROUNDING * scale
+    beyond = np.where(np.abs(low + beyond) <= rounding, -low, beyond)
+    order = [k for k in np.argsort(-np.abs(beyond), kind="stable") if abs(beyond[k]) > rounding]
     if not order:
         return (
             "tensions at their limits would balance the load there, but no lengths were found that "
@@ -56,7 +64,13 @@ def why_not_held(
         said[-1] += (
             f", and {counted(more, 'more cable')} {'is' if more == 1 else 'are'} beyond the limits"
         )
-    return "; ".join(said)
+    unloaded = float(np.abs(load).max()) <= rounding
+    return f"{_SLACK}: {'; '.join(said)}" if unloaded else "; ".join(said)
+
+
+def _scale(load: Array, low: Array) -> float:
+    """The load or the largest lower limit [N]: without a load, the limits alone have a size."""
+    return max(float(np.abs(load).max()), float(low.max())) or 1.0
 
 
 def _newtons(force: float) -> str:
@@ -82,11 +96,13 @@ def _of_cable(name: str, beyond: float, low: float, high: float, of_weight: bool
     return f"{who} would have to push with {_newtons(-pull)}"
 
 
-def _least_beyond(matrix: Array, load: Array, low: Array, high: Array) -> Array | None:
-    """(m,) [N] tensions above the upper or below the lower limits; None if nothing balances."""
+def _least_beyond(
+    matrix: Array, load: Array, low: Array, high: Array, scale: float
+) -> tuple[int, Array]:
+    """How the search ended; (m,) [N] tensions above the upper or below the lower limits, or NaN."""
     from scipy.optimize import linprog
 
-    m, scale = matrix.shape[1], max(float(np.abs(load).max()), 1e-300)
+    m = matrix.shape[1]
     eye, zero = np.eye(m), np.zeros((m, m))
     bounded = np.isfinite(high)
     # unknowns: tensions, and how far they are below and above the limits
@@ -101,6 +117,6 @@ def _least_beyond(matrix: Array, load: Array, low: Array, high: Array) -> Array 
         bounds=[*[(None, None)] * m, *[(0.0, None)] * (2 * m)],
         method="highs",
     )
-    if found.status != 0:
-        return None
-    return np.asarray(scale * (found.x[2 * m :] - found.x[m : 2 * m]))
+    if found.status != _FOUND:
+        return int(found.status), np.full(m, np.nan)
+    return _FOUND, np.asarray(scale * (found.x[2 * m :] - found.x[m : 2 * m]))

@@ -27,7 +27,9 @@ _FPS = 4.0
 GROUND = (24, 27, 33)
 
 
-def eye(robot: Robot, low: Array, high: Array, aspect: float) -> rrb.EyeControls3D:
+def eye(
+    robot: Robot, low: Array, high: Array, aspect: float, above: float | None = None
+) -> rrb.EyeControls3D:
     """A camera towards the wide side, from above and one side, as near as everything fits.
 
     Args:
@@ -35,12 +37,13 @@ def eye(robot: Robot, low: Array, high: Array, aspect: float) -> rrb.EyeControls
         low: (3,) corner of the visible box [m].
         high: (3,) the opposite corner [m].
         aspect: width over height of the view.
+        above: height of the camera over its distance; default: low.
     """
     up, span = robot.up, high - low
     across, towards = shapes.front(robot, low, high)
     flat = float(np.abs(towards) @ span) < 0.05 * float(np.linalg.norm(span))
-    aside, above = (0.12, 0.1) if flat else (0.42, 0.34)
-    gaze = towards + aside * across + above * up
+    aside, low_above = (0.12, 0.1) if flat else (0.42, 0.34)
+    gaze = towards + aside * across + (low_above if above is None else above) * up
     gaze = gaze / np.linalg.norm(gaze)
     target, distance = _aim(low, high, gaze, up, aspect)
     return rrb.EyeControls3D(
@@ -73,16 +76,36 @@ def _aim(low: Array, high: Array, gaze: Array, up: Array, aspect: float) -> tupl
 
 
 def scene_view(
-    robot: Robot, low: Array, high: Array, name: str, aspect: float
+    robot: Robot,
+    low: Array,
+    high: Array,
+    name: str,
+    aspect: float,
+    contents: Sequence[str] = ("$origin/**",),
+    above: float | None = None,
 ) -> rrb.Spatial3DView:
-    """The 3D view of one robot; ``aspect`` is its approximate width over height."""
+    """The 3D view of one robot, or of some entities.
+
+    Args:
+        robot: for its vertical and its cables' names.
+        low, high: (3,) corners of the visible box [m].
+        name: of the view.
+        aspect: its approximate width over height.
+        contents: what is shown in it.
+        above: see :func:`eye`.
+    """
     names, _words = shapes.cable_labels(robot, low, high)
     return rrb.Spatial3DView(
         origin=scenes.ROOT,
+        contents=list(contents),
         name=name,
         background=rrb.Background(color=GROUND),
         eye_controls=eye(
-            robot, np.minimum(low, names.min(axis=0)), np.maximum(high, names.max(axis=0)), aspect
+            robot,
+            np.minimum(low, names.min(axis=0)),
+            np.maximum(high, names.max(axis=0)),
+            aspect,
+            above,
         ),
         line_grid=_floor(robot, low, high),
         spatial_information=rrb.SpatialInformation(

@@ -150,34 +150,46 @@ def write_legend(recording: Recording, top: float, who: Mapping[str, Rgba] = PHY
         radius = 0.25 if name == "slack" else 0.7
         line = rr.LineStrips2D(dashed, radii=radius, colors=colour)
         recording.always(f"{LEGEND}/{name}", line)
-    _words(recording, "names", [(px, y + 2.6) for px, y in places], names, shades_of)
+    _words(recording, f"{LEGEND}/names", [(px, y + 2.6) for px, y in places], names, shades_of)
 
 
-def write_scale(recording: Recording, top: float, words: str = "") -> None:
-    """The colour scale from 0 to ``top`` [N], and words on what it means."""
+def write_scale(
+    recording: Recording, top: float, words: str = "", unit: str = "N", entity: str = LEGEND
+) -> None:
+    """The colour scale from 0 to ``top``, and words on what it means.
+
+    Args:
+        recording: where.
+        top: end of the scale, in the unit; without a unit it counts, in whole numbers.
+        words: on its meaning.
+        unit: of its numbers, "" for counts.
+        entity: the legend's.
+    """
     left, right, y = _BAR
-    x = np.linspace(left, right, _SLICES + 1)
-    pieces = [np.array([[x[i], y], [x[i + 1], y]]) for i in range(_SLICES)]
-    shades = colours.scale_colours(np.linspace(0.0, 1.0, _SLICES), 1.0)
-    recording.always(f"{LEGEND}/scale", rr.LineStrips2D(pieces, radii=0.9, colors=shades))
-    ticks = np.linspace(0.0, 1.0, 3)
+    steps = _SLICES if unit else round(top) + 1
+    x = np.linspace(left, right, steps + 1)
+    pieces = [np.array([[x[i], y], [x[i + 1], y]]) for i in range(steps)]
+    shades = colours.scale_colours(np.arange(steps, dtype=float), max(steps - 1.0, 1.0))
+    recording.always(f"{entity}/scale", rr.LineStrips2D(pieces, radii=0.9, colors=shades))
+    parts = np.linspace(0.0, 1.0, 3) if unit else (np.arange(steps) + 0.5) / steps
+    ticks = [f"{part * top:.4g} {unit}" for part in parts] if unit else map(str, range(steps))
     _words(
         recording,
-        "ticks",
-        [(left + part * (right - left), y + 2.6) for part in ticks],
-        [f"{part * top:g} N" for part in ticks],
-        [colours.COMMAND] * 3,
+        f"{entity}/ticks",
+        [(left + part * (right - left), y + 2.6) for part in parts],
+        list(ticks),
+        [colours.COMMAND] * len(parts),
     )
     if words:
-        _words(recording, "of", [(_PLACES[1], y - 2.2)], [words], [colours.COMMAND])
+        _words(recording, f"{entity}/of", [(_PLACES[1], y - 2.2)], [words], [colours.COMMAND])
 
 
 def _words(
     recording: Recording,
-    name: str,
+    entity: str,
     places: list[tuple[float, float]],
     words: list[str],
     shades: list[colours.Rgba],
 ) -> None:
     points = rr.Points2D(places, radii=0.01, colors=shades, labels=words, show_labels=True)
-    recording.always(f"{LEGEND}/{name}", points)
+    recording.always(entity, points)

@@ -73,12 +73,18 @@ def sweep_index(poses: Array) -> list[rr.TimeColumn]:
     along = moves[axis] > 0.0 and np.all(np.delete(moves, axis) < 1e-6 * moves[axis])
     if not along or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         return index
+    more = place_index("xyz"[axis], poses[:, axis])
+    return index if more is None else [*index, more]
+
+
+def place_index(axis: str, places: Array) -> rr.TimeColumn | None:
+    """The timeline over places (n,) [m] along an axis; None if micrometres are not fine enough."""
+    least = np.abs(np.diff(places)).min()
     for unit, factor in (("mm", 1e3), ("um", 1e6)):
-        places = factor * poses[:, axis]
-        if np.abs(places - places.round()).max() < _ROUNDED * np.abs(factor * steps).min():
-            name = f"{'xyz'[axis]}_{unit}"
-            return [*index, rr.TimeColumn(name, sequence=places.round().astype(int))]
-    return index
+        ticks = factor * places
+        if np.abs(ticks - ticks.round()).max() < _ROUNDED * factor * least:
+            return rr.TimeColumn(f"{axis}_{unit}", sequence=ticks.round().astype(int))
+    return None
 
 
 def opening(index: Sequence[rr.TimeColumn]) -> tuple[str, float]:

@@ -1,4 +1,7 @@
-"""The recording of a workspace: the poses that can be held as points, coloured by their margin."""
+"""The recording of a workspace: the poses that can be held as points, coloured by their margin.
+
+With an elastic map, further tabs show where the platform comes to rest.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +13,9 @@ import rerun.blueprint as rrb
 
 from seecr.pose import Array
 from seecr.recording import colours, layout, shapes
+from seecr.recording.elastic import HIDDEN, Elastic
 from seecr.recording.scene import LEGEND, ROOT, Scene, write_scale
-from seecr.recording.stream import recording_file
+from seecr.recording.stream import POSE, recording_file
 from seecr.workspace.grid import Workspace
 
 __all__ = ["write_map_recording"]
@@ -43,9 +47,13 @@ def write_map_recording(found: Workspace, path: str | Path, edge: Array | None =
     corners = np.tile(robot.reference_pose, (2, 1))
     corners[:, :3] = [[axis[end] for axis in found.axes] for end in (0, -1)]
     low, high = shapes.extent(robot, corners)
-    view = layout.scene_view(robot, low, high, name, 1.9)
-    root = rrb.Vertical(view, layout.legend(LEGEND), row_shares=[0.9, 0.1])
-    with recording_file(path, name, layout.blueprint(root)) as recording:
+    contents = ("$origin/**", f"- /{HIDDEN}")
+    view = layout.scene_view(robot, low, high, name, 1.9, contents)
+    held = rrb.Vertical(view, layout.legend(LEGEND), row_shares=[0.9, 0.1], name="Can be held")
+    elastic = Elastic(found) if np.any(found.rests) else None
+    root = held if elastic is None else rrb.Tabs(held, *elastic.tabs(low, high))
+    opens = (POSE, 1.0) if elastic is None else elastic.opening
+    with recording_file(path, name, layout.blueprint(root, timeline=opens)) as recording:
         scene = Scene(recording, robot, corners, top)
         scene.surroundings()
         scene.axes()
@@ -64,6 +72,8 @@ def write_map_recording(found: Workspace, path: str | Path, edge: Array | None =
             some = edge[:: 1 + len(edge) // _MOST, :3]
             dots = rr.Points3D(some, radii=0.002 * scene.size, colors=colours.VERMILION)
             recording.always(f"{ROOT}/edge", dots)
+        if elastic is not None:
+            elastic.write(recording, scene)
 
 
 def _unsure(found: Workspace, radius: float) -> rr.Points3D:

@@ -15,6 +15,7 @@ from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.report.drawing import COLOURS, figure
 from seecr.workspace.grid import Workspace
+from seecr.workspace.slices import across_of, colour_end
 
 __all__ = ["map_figure"]
 
@@ -34,8 +35,6 @@ _LETTERS = 13
 # Margins grow without limit towards the height of the exit points: their colours end at so many
 # times the median.
 _OUTSTANDING = 4.0
-# Smaller motions [mm, deg] count as zero: colours up to there would show rounding.
-_STILL = 1e-6
 
 
 def map_figure(
@@ -136,7 +135,7 @@ def _cut(found: Workspace, most: int) -> _Cut:
     lengths = [len(axis) for axis in found.axes]
     if sum(n > 1 for n in lengths) < 2:
         raise InputError("a figure of a map needs at least two axes with more than one value")
-    across = 2 if min(lengths) > 1 else int(np.argmin(lengths))
+    across = across_of(found)
     wide, high = (k for k in range(3) if k != across)
     picked = np.unique(np.linspace(0, lengths[across] - 1, most + 2).round().astype(int)[1:-1])
     number = np.arange(found.margin.size).reshape(lengths)
@@ -263,24 +262,12 @@ def _slack_panel(cut: _Cut, row: Any) -> Any:
 
 def _away_panel(cut: _Cut, row: Any) -> Any:
     away = 1e3 * np.linalg.norm(cut.found.deviation, axis=-1)
-    return _colours(cut, row, away, 0.0, _end(cut.found, away))
+    return _colours(cut, row, away, 0.0, colour_end(cut.found, away))
 
 
 def _turn_panel(cut: _Cut, row: Any) -> Any:
     turn = np.degrees(np.linalg.norm(cut.found.rotation, axis=-1))
-    return _colours(cut, row, turn, 0.0, _end(cut.found, turn))
-
-
-def _end(found: Workspace, values: Array) -> float:
-    """Upper end of the colours of a deviation, from poses that can be held.
-
-    Poses outside the workspace fall a hundred times as far, and would make all others one colour.
-    """
-    for some in (values[found.feasible], values):
-        known = some[np.isfinite(some)]
-        if len(known) and (top := float(np.quantile(known, 0.95))) > _STILL:
-            return top
-    return 1.0
+    return _colours(cut, row, turn, 0.0, colour_end(cut.found, turn))
 
 
 def _top(values: Array) -> float:

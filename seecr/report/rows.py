@@ -16,6 +16,7 @@ from seecr.prediction.uncertainty import Spread
 from seecr.report.commanded import load_columns
 from seecr.result import COORDINATES, Record
 from seecr.statics.solution import Solution
+from seecr.workspace.midlines import midline_points
 
 __all__ = ["SweepRows"]
 
@@ -63,6 +64,8 @@ class SweepRows:
             "smallest_eigenvalue": found.smallest_eigenvalue,
             **({} if found.jumps is None else {"jumps": found.jumps}),
         }
+        if (met := midline_points(found)) is not None:
+            columns |= {"midlines_meet_m": met.points, "beside_weight_m": met.beside}
         if spread is not None:
             columns |= {
                 "position_stderr_m": spread.position,
@@ -102,6 +105,9 @@ class SweepRows:
             "smallest_eigenvalue": found.smallest_eigenvalue.tolist(),
             "slack": [" ".join(names) for names in self._slack()],
         }
+        if (met := midline_points(found)) is not None:
+            columns |= _named("midlines_{}_m", "xyz", met.points)
+            columns["beside_weight_m"] = met.beside.tolist()
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
         writer.writerow(columns)

@@ -7,18 +7,22 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from seecr.compiled.columns import WEIGHT
+from seecr.counted import counted
 from seecr.description.robot import Joint, Robot
 from seecr.equilibrium.multiple import elsewhere
 from seecr.equilibrium.passes import TWISTED, Barrier
-from seecr.planar import midline_point
-from seecr.pose import Array, pose_difference, rxyz_from_quat, transform_points
+from seecr.pose import Array, pose_difference, rxyz_from_quat
 from seecr.prediction.uncertainty import Spread
 from seecr.statics.solution import Solution, Status
 from seecr.statics.tables import Tables
 from seecr.units import joules, short, with_error
+from seecr.workspace.bars import BarBalance
+from seecr.workspace.midlines import midline_points
+from seecr.workspace.spans import SlackSpan
 
 __all__ = [
     "at_rest",
+    "bar_lines",
     "cable_lines",
     "direction_words",
     "jump_lines",
@@ -27,6 +31,7 @@ __all__ = [
     "pose_lines",
     "sag_lines",
     "softest_words",
+    "span_lines",
     "stiffness_lines",
     "sweep_lines",
 ]
@@ -37,6 +42,13 @@ SAGS = (
 )
 """What "slack" means where cables have weight."""
 
+Bars = Sequence[BarBalance] | None
+"""Equilibria of a bar on two cables; None for any other robot."""
+
+# More zones of slack cables than these are not listed in a terminal.
+_MOST_SPANS = 12
+# A rotation of a command below this [rad] is rounding.
+_NO_TURN = 1e-9
 # A component of a direction below this is not mentioned.
 _PART = 0.1
 # Part of the weight that is used to show how soft a pose is.
@@ -205,23 +217,57 @@ def _axis_name(joint: Joint) -> str:
 
 def midline_lines(solution: Solution) -> Iterator[str]:
     """Where the midlines of two pairs of parallel cables in a plane meet, the paper's V or H."""
-    robot = solution.robot
-    anchors = transform_points(
-        np.stack([robot.reference_pose, solution.pose[0]]), robot.anchor_points
+    met = midline_points(solution)
+    if met is None or not np.isfinite(met.points[0]).all():
+        return
+    place = " ".join(f"{1e3 * met.points[0]['xyz'.index(axis)]:.2f}" for axis in met.axes)
+    name = f" (the paper's {met.name})" if met.name else ""
+    beside = round(1e3 * float(met.beside[0]), 6) + 0.0
+    yield (
+        f"midlines of both pairs of cables meet at {' and '.join(met.axes)} {place} mm{name}, "
+        f"{beside:+.2f} mm beside the line of the weight"
     )
-    points = np.concatenate([robot.exit_points, *anchors])
-    plane = np.flatnonzero(np.ptp(points, axis=0) > 1e-9 * robot.length)
-    if robot.n_cables != 4 or len(plane) != 2 or not np.isfinite(points).all():
+
+
+def bar_lines(at_rest: Bars, at_command: Bars) -> Iterator[str]:
+    """All equilibria of a bar on two cables, with its middle at rest, and at its command."""
+    for where, some in (("there", at_rest), ("where it was commanded to", at_command)):
+        if some is None:
+            continue
+        yield (
+            f"a bar with its middle {where}, on cables that do not stretch, is in balance at "
+            f"{counted(len(some), 'tilt')} (positive: the second cable's end is up):"
+        )
+        for one in some:
+            yield from (f"  {line}" for line in one.lines())
+
+
+def span_lines(spans: Sequence[SlackSpan]) -> Iterator[str]:
+    """Where on a sweep which cables are slack, and how wide these zones are."""
+    if not spans:
         return
-    ways = (anchors[0] - robot.exit_points)[:, plane]
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    if np.abs(ways[0::2] - ways[1::2]).max() > 1e-9:
+    if len(spans) == 1:
+        yield f"on the whole way {spans[0].words}"
         return
-    where = " and ".join("xyz"[k] for k in plane)
-    met = midline_point(robot.exit_points[:, plane], anchors[1][:, plane])
-    place = " ".join(f"{1e3 * value:.2f}" for value in met)
-    if np.isfinite(met).all():
-        yield f"midlines of both pairs of cables meet at {where} {place} mm (the paper's V or H)"
+    if len(spans) > _MOST_SPANS:
+        yield f"{counted(len(spans), 'zone')} of slack cables, with their widths, in sweep.json"
+        return
+    within = short(1e3 * max(max(span.within) for span in spans), 2)
+    yield f"zones of slack cables on the way, edges to within {within} mm:"
+    ends = np.array([[span.first[:3], span.last[:3]] for span in spans]).reshape(-1, 3)
+    moves = np.ptp(ends, axis=0)
+    axes = [k for k in range(3) if moves[k] > 1e-6 * max(moves.max(), 1e-300)]
+    shown = axes if len(axes) == 1 else range(3)
+    for span in spans:
+        first, last = (
+            " ".join(f"{1e3 * pose[k] + 0.0:.3f}" for k in shown)
+            for pose in (span.first, span.last)
+        )
+        wide = f"{1e3 * span.width:.3f} mm wide" if span.width > 0.0 else ""
+        turn = f"turned by {np.degrees(span.turn):.4g} deg" if span.turn > _NO_TURN else ""
+        size = ", ".join(part for part in (wide, turn) if part) or "one pose"
+        name = " ".join("xyz"[k] for k in shown)
+        yield f"  {name} {first} to {last} mm, {size}: {span.words}"
 
 
 def other_lines(
@@ -254,7 +300,7 @@ def other_lines(
 
 
 def _more_energy(more: float) -> str:
-    """The difference in energy, if there is one: moments and users' laws have no energy."""
+    """The difference in energy, if both have one."""
     return f"{joules(more, '+.4g')}, " if np.isfinite(more) else ""
 
 

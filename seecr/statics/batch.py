@@ -22,7 +22,7 @@ from seecr.compiled.columns import (
     TENSION,
 )
 from seecr.compiled.descent import STIFF, solve_batch
-from seecr.compiled.joints import place_batch
+from seecr.compiled.joints import N_CURRENT, place_batch
 from seecr.compiled.outcomes import (
     CABLE_LAW,
     CONVERGED,
@@ -286,8 +286,8 @@ def is_slack(tables: Tables, at: Evaluation) -> NDArray[np.bool_]:
 
 
 def joints_at_rest(tables: Tables, at: Evaluation) -> Array:
-    """Axes and points of the joints (n, d, 7) at the joint values of ``at``."""
-    out = np.empty_like(tables.screws)
+    """Axes and points of the joints (n, d, N_CURRENT) at the joint values of ``at``."""
+    out = np.empty((*tables.screws.shape[:2], N_CURRENT))
     if tables.screws.shape[1]:
         place = np.empty(7)
         place_batch(tables.screws, at.values, tables.length, tables.poses, place, out)
@@ -297,17 +297,21 @@ def joints_at_rest(tables: Tables, at: Evaluation) -> Array:
 def stiffness(tables: Tables, at: Evaluation) -> Array:
     """Minus the derivative of the wrench, (n, d, d) [N/m] in scaled coordinates.
 
-    A constant moment, which has no potential, makes it asymmetric; ``at.hessian`` is its symmetric
-    part.
+    A constant moment whose work depends on the way makes it asymmetric; ``at.hessian`` is its
+    symmetric part.
     """
-    first = EXTERNAL_MOMENT
-    rows = np.flatnonzero(np.any(tables.load[:, first : first + 3], axis=1))
+    rows = np.flatnonzero(under_moment(tables))
     if len(rows) == 0:
         return at.hessian
     joints, out = joints_at_rest(tables, at), at.hessian.copy()
     for i in rows:
         add_skew(tables.load[i], joints[i], tables.length, out[i])
     return out
+
+
+def under_moment(tables: Tables) -> NDArray[np.bool_]:
+    """Rows (n,) with an external moment."""
+    return np.asarray(np.any(tables.load[:, EXTERNAL_MOMENT : EXTERNAL_MOMENT + 3], axis=1))
 
 
 def residual_size(gradient: Array) -> Array:

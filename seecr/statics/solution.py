@@ -28,6 +28,7 @@ from seecr.pose import Array, rotvec_from_quat
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics import batch
 from seecr.statics.inertia import mass_matrices
+from seecr.statics.starts import start_of
 from seecr.statics.tables import Tables, take
 from seecr.threads import in_parts
 
@@ -93,9 +94,11 @@ class Solution(Result):
         residual: (n,) unbalanced force, or torque over the robot's length if larger, relative to
             the load; recomputed at the returned deviation.
         energy: (n,) [J] elastic energy minus the work of the load since the commanded pose, and of
-            the cables' weight since they hung straight there. NaN if there is no potential: under
-            an external moment, with hysteresis, exit friction or a user's cable law, and with cable
-            weight over pulleys (the effect ``cable_weight`` says why).
+            the cables' weight since they hung straight there. NaN if there is no potential: with
+            hysteresis, exit friction or a user's cable law, with cable weight over pulleys (the
+            effect ``cable_weight`` says why), and under an external moment, whose work on a
+            platform that turns freely depends on the way. If all hinges are parallel it does not;
+            full turns are left out of it.
         status: (n,) of :class:`Status`.
         others: the other stable equilibria of each command, if they were asked for.
         jumps: the jumps on the path to each command, if it was followed.
@@ -132,7 +135,7 @@ class Solution(Result):
         """Minus the derivative of the wrench with respect to the pose, (n, d, d).
 
         For a free platform [N/m, N/rad; N m/m, N m/rad], by translation and rotation vector in the
-        base frame; else by the joints. An external moment, which has no potential, makes it
+        base frame; else by the joints. An external moment whose work depends on the way makes it
         asymmetric. Where a cable is exactly as long as its rest length and the platform is free to
         move to one side, it is that of this side.
         """
@@ -348,9 +351,28 @@ def certify(robot: Robot, tables: Tables, found: batch.Evaluation) -> Solution:
         rest_lengths=tables.cables[..., REST],
         iterations=found.count,
         residual=np.where(lost, np.inf, check.residual),
-        energy=check.energy,
+        energy=_energies(robot, tables, check, status),
         status=status,
     )
+
+
+def _energies(
+    robot: Robot, tables: Tables, check: batch.Evaluation, status: NDArray[np.object_]
+) -> Array:
+    """Energies (n,) [J] of poses, whatever full turns a search made under a moment."""
+    ends = (Status.CONVERGED, Status.UNSTABLE, Status.SINGULAR)
+    balanced = np.array([one in ends for one in status], dtype=bool)
+    rows = np.flatnonzero(batch.under_moment(tables) & balanced)
+    if len(rows) == 0 or not robot.joints:
+        return check.energy
+    some, at = take(tables, rows), batch.take_evaluation(check, rows)
+    poses = batch.platform_poses(some, at.deviation)
+    start, values = start_of(robot, some, poses)
+    assert start is not None and values is not None
+    at.deviation, at.values = start, values
+    out = check.energy.copy()
+    out[rows] = batch.evaluate(some, at).energy
+    return out
 
 
 def _blank(values: Array, rows: NDArray[np.bool_]) -> Array:

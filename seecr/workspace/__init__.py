@@ -7,30 +7,42 @@ from typing import TYPE_CHECKING
 from seecr.lazy import lazily
 
 if TYPE_CHECKING:
+    from seecr.workspace.bars import BarBalance, bar_balances
     from seecr.workspace.chances import held_chance, kept_chance
     from seecr.workspace.edges import boundary
     from seecr.workspace.grid import Workspace
     from seecr.workspace.maps import default_axes, workspace_map
+    from seecr.workspace.midlines import Midlines, midline_points
+    from seecr.workspace.spans import SlackSpan, slack_spans
     from seecr.workspace.zones import Zone, feasible, slack_zones, tension_margin
 
 __all__ = [
+    "BarBalance",
+    "Midlines",
+    "SlackSpan",
     "Workspace",
     "Zone",
+    "bar_balances",
     "boundary",
     "default_axes",
     "feasible",
     "held_chance",
     "kept_chance",
+    "midline_points",
+    "slack_spans",
     "slack_zones",
     "tension_margin",
     "workspace_map",
 ]
 
 _MODULES = {
+    "bars": ("BarBalance", "bar_balances"),
     "chances": ("held_chance", "kept_chance"),
     "edges": ("boundary",),
     "grid": ("Workspace",),
     "maps": ("default_axes", "workspace_map"),
+    "midlines": ("Midlines", "midline_points"),
+    "spans": ("SlackSpan", "slack_spans"),
     "zones": ("Zone", "feasible", "slack_zones", "tension_margin"),
 }
 

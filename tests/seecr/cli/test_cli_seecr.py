@@ -41,8 +41,95 @@ def test_the_papers_points_are_printed(name: str) -> None:
     found = solve(name, load_robot(model_path(name)).reference_pose)
     ends = transform_points(found.pose, found.robot.anchor_points)[0]
     point = 1e3 * midline_point(found.robot.exit_points[:, [0, 2]], ends[:, [0, 2]])
-    assert f"meet at x and z {point[0]:.2f} {point[1]:.2f} mm" in line
+    letter = {"planar_vertical": "V", "planar_horizontal": "H"}[name]
+    where = f"meet at x and z {point[0]:.2f} {point[1]:.2f} mm (the paper's {letter}), +0.00 mm"
+    assert where in line
     assert "midlines" not in run("pose", "planar_two_cable", "--alone", "0.4", "0", "0.2").output
+
+
+def test_a_sweep_tells_the_zones_of_slack_cables_and_the_papers_points(tmp_path: Path) -> None:
+    """Figs 7, 9 and 11 of the paper, from the command line alone."""
+    way = ("--line", "0.17", "0", "0.2", "0.63", "0", "0.2", "--out", tmp_path / "v")
+    got = run("sweep", "planar_vertical", *way)
+    lines = got.output.splitlines()
+    at = lines.index(next(x for x in lines if x.startswith("zones of slack cables on the way")))
+    assert lines[at + 1] == "  x 170.000 to 285.143 mm, 115.143 mm wide: 2 slack: cable2 cable3"
+    assert lines[at + 2] == "  x 285.143 to 296.235 mm, 11.093 mm wide: 1 slack: cable3"
+    assert [x.split(": ")[1] for x in lines[at + 3 : at + 6]] == ["0 slack", "1 slack", "2 slack"]
+    assert lines[at + 6].startswith("point V is -17.80 to +17.80 mm beside the line of the weight")
+    document = json.loads((tmp_path / "v" / "sweep.json").read_text())
+    zones = document["zones"]
+    assert [zone["slack_cables"] for zone in zones] == [2, 1, 0, 1, 2]
+    assert zones[0]["slack"] == ["cable2", "cable3"]
+    assert zones[0]["from"][0] == 0.17 and zones[0]["to"] == zones[1]["from"]
+    assert zones[0]["width_m"] == pytest.approx(0.115143, abs=1e-6)
+    assert 0.0 < zones[0]["to_within_m"] <= 5e-7 and zones[0]["from_within_m"] == 0.0
+    assert document["midline_point"] == "V"
+    assert document["rows"][0]["beside_weight_m"] == pytest.approx(-0.01703, abs=1e-5)
+    first = (tmp_path / "v" / "sweep.csv").read_text().splitlines()
+    cell = dict(zip(first[0].split(","), first[1].split(","), strict=True))
+    assert float(cell["midlines_x_m"]) == document["rows"][0]["midlines_meet_m"][0]
+    assert float(cell["beside_weight_m"]) == document["rows"][0]["beside_weight_m"]
+
+    level = run("sweep", "planar_horizontal", *way).output
+    assert "on the whole way 0 slack\npoint H is +0.00 mm beside the line of the weight" in level
+    followed = run("sweep", "planar_vertical", "--follow", *way).output
+    assert lines[at : at + 6] == [
+        x for x in followed.splitlines() if x.startswith("zones") or " mm wide: " in x
+    ]
+    eight = ("--line", "0.17", "0.25", "0.1", "0.63", "0.25", "0.1", "--json", "--out", tmp_path)
+    document = json.loads(run("sweep", "demobot_parallel", *eight).stdout)
+    assert [zone["slack_cables"] for zone in document["zones"]] == [4, 2, 0, 2, 4]
+    assert [round(1e3 * zone["width_m"], 1) for zone in document["zones"][:2]] == [141.3, 15.5]
+    assert document["midline_point"] is None and "beside_weight_m" not in document["rows"][0]
+
+
+def test_columns_of_a_grid_are_ways_of_their_own_and_many_zones_are_counted(tmp_path: Path) -> None:
+    grid = ("--grid", "0.17:0.63:8", "0.25", "0.1:0.2:3", "--out", tmp_path)
+    text = run("sweep", "demobot_parallel", *grid).output
+    zones = json.loads((tmp_path / "sweep.json").read_text())["zones"]
+    assert {zone["run"] for zone in zones} == set(range(8)) and len(zones) == 10
+    assert text.count(" mm wide: ") == 10
+    finer = ("--grid", "0.17:0.63:16", "0.25", "0.1:0.2:3", "--out", tmp_path)
+    text = run("sweep", "demobot_parallel", *finer).output
+    zones = json.loads((tmp_path / "sweep.json").read_text())["zones"]
+    assert f"{len(zones)} zones of slack cables, with their widths, in sweep.json" in text
+    assert " mm wide: " not in text
+    one = run("sweep", "demobot_parallel", "--grid", "0.2", "0.25", "0.1", "--out", tmp_path)
+    assert json.loads((tmp_path / "sweep.json").read_text())["zones"] is None
+    assert "zones" not in one.output and "whole way" not in one.output
+
+
+def test_too_many_changes_are_said_and_not_searched(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("seecr.cli.sweep._MOST_CHANGES", 3)
+    way = ("--line", "0.17", "0", "0.2", "0.63", "0", "0.2", "--out", tmp_path)
+    text = run("sweep", "planar_vertical", *way).output
+    assert "Zones of slack cables are not computed: more than 3 poses differ from the one" in text
+    assert json.loads((tmp_path / "sweep.json").read_text())["zones"] is None
+
+
+def test_a_pose_tells_its_zone_the_papers_points_and_all_tilts_of_a_bar() -> None:
+    got = json.loads(run("pose", "planar_vertical", "--alone", "0.17", "0", "0.2", "--json").stdout)
+    assert (got["slack_cables"], got["slack"]) == (2, ["cable2", "cable3"])
+    assert got["midline_point"] == "V" and got["bar"] is None
+    assert got["beside_weight_m"] == pytest.approx(-0.01703, abs=1e-5)
+    place = ("planar_two_cable", "--alone", "0.3", "0", "0.5")
+    got = json.loads(run("pose", *place, "--json").stdout)
+    assert got["midline_point"] is None and "beside_weight_m" not in got
+    rest, command = got["bar"]["at_rest"], got["bar"]["at_command"]
+    assert [one["stable"] for one in rest] == [one["stable"] for one in command] == [True, False]
+    assert [one["here"] for one in rest] == [True, False] and not command[0]["here"]
+    assert rest[0]["pose"] == pytest.approx(got["pose"], abs=1e-9)
+    assert rest[0]["tensions_N"] == pytest.approx(got["tensions_N"], abs=1e-9)
+    # figure 3's number
+    assert np.degrees(command[0]["theta_rad"]) == pytest.approx(-30.90, abs=5e-3)
+    text = run("pose", *place).output
+    assert "is in balance at 2 tilts (positive: the second cable's end is up):" in text
+    assert "\n  tilt -22.6039 deg: stable, tensions 2.902 and 1.964 N, as it rests here\n" in text
+    assert "\n  tilt +158.7076 deg: not stable, tensions 3.406 and 2.333 N\n" in text
+    assert "tilt " not in run("pose", "planar_vertical", "--alone", "0.4", "0", "0.2").output
 
 
 def test_wanted_tensions_are_an_aim(tmp_path: Path) -> None:

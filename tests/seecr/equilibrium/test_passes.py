@@ -9,14 +9,15 @@ from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term, effect_named, layout_of
 from seecr.equilibrium import passes
-from seecr.equilibrium.following import evaluated, moved
+from seecr.equilibrium.following import _stepped, evaluated, moved
 from seecr.equilibrium.multiple import elsewhere, equilibria
 from seecr.equilibrium.passes import barriers
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
-from seecr.pose import pose_difference, quat_from_rotvec
+from seecr.pose import pose_difference, quat_from_rotvec, transform_points
 from seecr.prediction.model import load_model
 from seecr.report.words import other_lines
+from seecr.statics.solution import Solution
 from seecr.statics.tables import take
 
 
@@ -105,6 +106,87 @@ def test_where_there_is_no_energy_no_way_is_looked_for(monkeypatch: pytest.Monke
         assert np.isnan([way.energy, way.back, *way.pose]).all()
         assert not way.exact and not way.twisted
         energy.energy[:] = 0.0
+
+
+def energy_by_hand(own: Solution, pose: np.ndarray, moment: float) -> float:
+    """Of a platform in the x-z plane: springs, weight, and a moment about y times the turn."""
+    robot, rest = own.robot, own.rest_lengths[0]
+    spans = np.linalg.norm(transform_points(pose[None], robot.anchor_points)[0] - EXITS, axis=1)
+    stretch = np.maximum(spans - rest, 0.0)
+    turned = pose_difference(pose, robot.reference_pose)[4]
+    from_command = turned - pose_difference(own.command[0], robot.reference_pose)[4]
+    lifted = pose[2] - own.command[0, 2]
+    springs = float(np.sum(0.5 * robot.ea / rest * stretch**2))
+    return springs + robot.weight * lifted - moment * from_command
+
+
+PLANAR = load_robot(model_path("planar_horizontal"))
+EXITS = PLANAR.exit_points
+LEANING = np.array([0.6, 0.0, 0.4, 0.9, 0.0, np.sqrt(0.19), 0.0])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("moment", [0.02, -0.05])
+def test_under_a_moment_a_planar_platform_has_energies_and_barriers(moment: float) -> None:
+    """They were nan once: on one hinge the work of a moment depends on the turn alone."""
+    acting = [Term.of(PLANAR, "external_wrench", moment_y_Nm=moment)]
+    own, every = solve(PLANAR, LEANING, effects=acting), equilibria(PLANAR, LEANING, effects=acting)
+    (way,) = barriers(own, every.rows(elsewhere(own, every)))
+    own_energy, there, top = (
+        energy_by_hand(own, pose, moment) for pose in (own.pose[0], every.pose[-1], way.pose)
+    )
+    assert every.energy[-1] == pytest.approx(there, rel=1e-9)
+    assert way.exact and way.why_not == ""
+    assert way.energy == pytest.approx(top - own_energy, rel=1e-9)
+    assert way.back == pytest.approx(top - there, rel=1e-9)
+    # a saddle of that energy: level in all directions, and one of them falls
+    steps = np.eye(3) * 1e-5
+    around = [
+        [energy_by_hand(own, moved(PLANAR, way.pose[None], s * d[None])[0], moment) for d in steps]
+        for s in (1, -1)
+    ]
+    assert np.abs(np.subtract(*around)).max() / 2e-5 < 1e-4 * PLANAR.weight
+    # more or less of it by what the moment does on the turn from rest to saddle, nearly
+    free = solve(PLANAR, LEANING), equilibria(PLANAR, LEANING)
+    (plain,) = barriers(free[0], free[1].rows(elsewhere(*free)))
+    turn = pose_difference(plain.pose, free[0].pose[0])[4]
+    assert way.energy - plain.energy == pytest.approx(-moment * turn, rel=0.02)
+
+
+@pytest.mark.slow
+def test_full_turns_under_a_moment_are_not_counted() -> None:
+    acting = [Term.of(PLANAR, "external_wrench", moment_y_Nm=0.02)]
+    starts = np.tile(LEANING, (24, 1))
+    for k, angle in enumerate(np.linspace(-3.1, 3.1, 24)):
+        starts[k, 3:] = quat_from_rotvec(np.array([0.0, angle, 0.0]))
+    found = solve(PLANAR, np.tile(LEANING, (24, 1)), start=starts, effects=acting)
+    assert found.converged.sum() > 12
+    turned = found.evaluation.values[:, 2] / PLANAR.length
+    assert np.abs(turned).max() > 2.0
+    for k in np.flatnonzero(found.converged):
+        by_hand = energy_by_hand(found.rows([k]), found.pose[k], 0.02)
+        assert found.energy[k] == pytest.approx(by_hand, rel=1e-7)
+    # a hinge's value begins anew behind half a turn, and a moment's work with it
+    behind = moved(PLANAR, LEANING[None], np.array([[0.0, 0.0, 2.2 * PLANAR.length]]))
+    step = np.array([0.0, 0.0, 0.2 * PLANAR.length])
+    assert _stepped(PLANAR, behind, step)[1] and not _stepped(PLANAR, behind, -step)[1]
+
+
+def test_the_work_of_a_moment_that_depends_on_the_way_is_said_in_words() -> None:
+    robot = load_robot(model_path("demobot_parallel"))
+    pose = np.array([0.351, 0.216, 0.109, 0.943, 0.163, -0.288, -0.038])
+    pose[3:] /= np.linalg.norm(pose[3:])
+    other = solve(robot, pose, others=True).others
+    assert other is not None
+    for acting, why in (
+        ([Term.of(robot, "external_wrench", moment_y_Nm=1e-4)], "what a moment does on a platform"),
+        ([Term.of(robot, "hysteresis", amplitude_N=0.1)], "what its cables take"),
+    ):
+        own = solve(robot, pose, effects=acting)
+        (way,) = barriers(own, own)
+        assert np.isnan(way.energy) and way.why_not.startswith(why)
+        assert way.words == f"reachable; no barrier can be given: {way.why_not}"
+        assert way.as_json()["why_not"] == way.why_not
 
 
 def test_equilibria_of_something_else_are_refused() -> None:

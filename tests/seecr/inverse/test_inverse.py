@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -238,6 +239,42 @@ def test_a_load_that_no_pull_can_balance_is_told_as_such() -> None:
     assert less == "cable a would have to pull 1 N, less than 1.5 N"
     large = why_not_held(matrix, np.array([0.0, 2e4, 0.0]), low, np.array([6000.0, 9e4]), names)
     assert large == "cable a would have to pull 10000 N, more than 6000 N"
+
+
+@pytest.mark.parametrize("highest", [np.inf, 50.0])
+def test_without_a_load_it_is_the_lower_limit_that_is_told(highest: float) -> None:
+    """Refused once as if no pulls could balance nothing; slack cables do."""
+    robot = replace(robot_named("planar_two_cable"), gravity=np.zeros(3))
+    found = correct(robot, np.array([0.3, 0, 0.3, 1, 0, 0, 0]), lowest=2.0, highest=highest)
+    cable = robot.cable_names
+    assert found.why_not == (
+        "without a load all cables could be slack, but not with the lower limit: "
+        f"{cable[0]} would have to pull 0 N, less than 2 N; "
+        f"{cable[1]} would have to pull 0 N, less than 2 N",
+    )
+
+
+@pytest.mark.parametrize("size", [1e-12, 1.0, 1e4])
+def test_the_lower_limit_is_told_whatever_its_size(size: float) -> None:
+    """Three cables from above, on a point: nothing pulls against them."""
+    up = np.array([[2.0, -1.0, 0.0], [1.0, 1.0, 1.0]])
+    low, high, names = np.full(3, size), np.full(3, np.inf), ["a", "b", "c"]
+    said = why_not_held(up, np.zeros(2), low, high, names)
+    assert said.startswith(
+        "without a load all cables could be slack, but not with the lower limit: cable"
+    )
+    assert said.count(f"{size:.3g} N" if size < 1e3 else f"{size:.0f} N") >= 2
+    nothing = why_not_held(up, np.zeros(2), 0.0 * low, high, names)
+    assert nothing.startswith("tensions at their limits would balance")
+    loaded = why_not_held(up, np.array([0.0, size]), low, high, names)
+    assert loaded.startswith("cable") and "without a load" not in loaded
+
+
+def test_a_search_for_a_reason_that_fails_gives_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    ended = SimpleNamespace(status=4, x=None)
+    monkeypatch.setattr("scipy.optimize.linprog", lambda *_, **__: ended)
+    said = why_not_held(np.ones((1, 1)), np.ones(1), np.zeros(1), np.full(1, 0.5), ["a"])
+    assert said == "no tensions within the limits balance the load there"
 
 
 def test_the_inverse_of_play_is_played_back() -> None:

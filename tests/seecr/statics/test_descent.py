@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numba import njit
 from random_robots import KINDS, random_poses, random_robot
 
 from seecr.commands.data import Commands
 from seecr.compiled.algebra import cholesky
-from seecr.compiled.columns import GAP, REST, STRAIN, TENSION
-from seecr.compiled.joints import place_joints
+from seecr.compiled.columns import EXTERNAL_MOMENT, GAP, N_LOAD, REST, STRAIN, TENSION
+from seecr.compiled.joints import N_CURRENT, place_joints
+from seecr.compiled.platform import work_of_moment
 from seecr.compiled.rotation import rotated_less, turned
 from seecr.compiled.steps import residual_size
 from seecr.description.joints import pose_of_values
@@ -82,7 +84,7 @@ def test_joints_move_the_platform_as_the_product_of_exponentials(seed: int) -> N
     pose, screws = pose_of_values(robot, first)
     expected, now = pose_of_values(robot, first + step)
     unit = np.array([robot.length if j.kind == "hinge" else 1.0 for j in robot.joints])
-    deviation, current = np.empty(7), np.empty_like(screws[0])
+    deviation, current = np.empty(7), np.empty((len(screws[0]), N_CURRENT))
     place_joints(screws[0], step * unit, robot.length, pose[0, :3], deviation, current)
     moved = np.concatenate([pose[0, :3] + deviation[:3],
                             quat_multiply(deviation[3:], pose[0, 3:])])  # fmt: skip
@@ -200,6 +202,41 @@ def test_a_constant_moment_has_no_energy_but_a_gradient() -> None:
     assert np.all(np.isnan(turned.energy)) and np.all(np.isfinite(plain.energy))
     change = turned.gradient - plain.gradient
     assert change == pytest.approx(-moment / np.array([1, 1, 1] + 3 * [robot.length]), rel=1e-9)
+
+
+def test_a_moment_has_an_energy_where_its_work_does_not_depend_on_the_way() -> None:
+    """On hinges that are all parallel, or whose outer ones turn about the moment's own axis."""
+    turns = {"x": [1.0, 0, 0], "y": [0, 1.0, 0], "z": [0, 0, 1.0]}
+    moment, length, rng = 3.0, 0.5, np.random.default_rng(8)
+
+    @njit  # type: ignore[untyped-decorator]
+    def work(load: np.ndarray, current: np.ndarray, length: float) -> float:
+        return float(work_of_moment(load, current, length))
+
+    for axes, about, has_energy in [
+        ("y", "x", True), ("y", "y", True), ("yy", "z", True), ("xy", "x", True),
+        ("xxyy", "x", True), ("xy", "y", False), ("xy", "z", False), ("xyx", "x", False),
+        ("xyz", "x", False), ("", "x", False),
+    ]:  # fmt: skip
+        screws = np.array([[1.0, *turns[axis], *rng.normal(size=3)] for axis in axes])
+        load = np.zeros(N_LOAD)
+        load[EXTERNAL_MOMENT : EXTERNAL_MOMENT + 3] = moment * np.array(turns[about])
+        current, place = np.zeros((len(axes), N_CURRENT)), np.zeros(7)
+        for values in (np.zeros(len(axes)), rng.normal(size=len(axes))):
+            torque, h = np.zeros(len(axes)), 1e-6
+            for k, step in enumerate(np.eye(len(axes))):
+                works = []
+                for s in (h, -h):
+                    place_joints(screws, values + s * step, length, np.zeros(7), place, current)
+                    works.append(work(load, current, length))
+                torque[k] = (works[0] - works[1]) / (2.0 * h)
+            if not has_energy:
+                place_joints(screws, values, length, np.zeros(7), place, current) if axes else None
+                assert np.isnan(work(load, current, length)), (axes, about)
+                continue
+            place_joints(screws, values, length, np.zeros(7), place, current)
+            along = current[:, 1:4] @ load[EXTERNAL_MOMENT : EXTERNAL_MOMENT + 3] / length
+            assert torque == pytest.approx(along, abs=1e-8), (axes, about)
 
 
 def test_threads_change_nothing() -> None:
