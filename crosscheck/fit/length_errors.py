@@ -149,7 +149,7 @@ class Lines:
         return out
 
     def _first_kinks(self, errors: Array) -> Kinks:
-        """The first cables that go slack on the way to other errors (n, m), one a row at most."""
+        """The first cables that go slack on the way to other errors (n, m), at most one per row."""
         slopes = self.rate[:, TENSION]
         change = (slopes @ (errors - self.errors)[..., None])[..., 0]
         own = np.diagonal(slopes, axis1=1, axis2=2)

@@ -17,6 +17,7 @@ COUNTED = re.compile(rf"\{{[^{{}}]*\}} (?:(?!on )\w+ )?(?:{NOUNS})s\b")
 ALLOWED = {
     "{name} rows", "{what} columns", "{kind.name} readings", "{effect.name} leaves readings",
     "{_MOST_POSES:.0e} poses", "{_ROWS} rows", "{tried} effects", "{m} cables",
+    "{_MOST_CHANGES} poses",
 }  # fmt: skip
 
 
