@@ -147,6 +147,8 @@ def measure_next(
             out += _to_separate(plan, options, effect, rival)
         if not effect.rivals:
             out.append(f"to confirm {effect.effect}: {effect.check}")
+        if effect.common is not None:
+            out.append(effect.common.advice)
     if len(alternatives) > 1 or (alternatives and verdict is DiagnosisVerdict.MANY_EFFECTS):
         out += _to_decide(alternatives)
     if verdict is DiagnosisVerdict.MANY_EFFECTS:

@@ -16,6 +16,7 @@ from crosscheck.calibration.search import SetSearch
 from crosscheck.calibration.sets import Names
 from crosscheck.diagnosis.advice import check_of
 from crosscheck.diagnosis.chances import PROBABLE, Chances, chances_of
+from crosscheck.diagnosis.common_part import common_part
 from crosscheck.diagnosis.listed import diagnosis_of, left_out
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect, NotListed
 from crosscheck.diagnosis.rivals import Rival, loss_of_its_part
@@ -91,6 +92,7 @@ def _missing(sought: SetSearch, search: Search, chances: Chances, name: str) -> 
         held_out_rms=step.held_out.rms,
         share=share_of(before, step),
         probability=chances.of(name),
+        common=common_part(search, term, best),
     )
 
 

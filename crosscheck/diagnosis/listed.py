@@ -10,6 +10,7 @@ from crosscheck.calibration.sets import Names
 from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.advice import check_of, measure_next
 from crosscheck.diagnosis.chances import Chances
+from crosscheck.diagnosis.common_part import common_part
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect, NotListed
 from crosscheck.diagnosis.rivals import Rival, rivals_of
 from crosscheck.diagnosis.search import Search
@@ -49,6 +50,7 @@ def diagnosis_of(
     after = rms_by_kind(search.problem, last.fit.state.raw)
     seen = None if chances.imitated is None else chances.imitated.seen
     is_unknown = verdict is DiagnosisVerdict.UNKNOWN_EFFECT
+    alike = [one.common.note for one in missing if one.common is not None]
     doubts = [] if is_unknown else doubts_about(missing, chances)
     return Diagnosis(
         verdict=verdict,
@@ -60,7 +62,9 @@ def diagnosis_of(
         floor=floor,
         candidates=tuple(_with_equals(candidates, missing)),
         measure_next=tuple(measure_next(search, missing, verdict, where, alternatives, seen)),
-        notes=tuple(dict.fromkeys([*notes, *overestimated(search.problem, after), *doubts])),
+        notes=tuple(
+            dict.fromkeys([*notes, *overestimated(search.problem, after), *alike, *doubts])
+        ),
         search=search,
         whiteness=search.last.whiteness,
         where=where,
@@ -72,11 +76,15 @@ def _with_equals(
     candidates: Sequence[NotListed], missing: Sequence[MissingEffect]
 ) -> Iterator[NotListed]:
     """What may stand for a listed effect is not listed for that reason, and for no other."""
-    listed = {name: one.effect for one in reversed(missing) for name in one.indistinguishable}
+    reasons = {
+        rival.name: Reason(Why.IN_COMMON, by=(one.effect,))
+        for one in reversed(missing)
+        for rival in ([] if one.common is None else one.common.rivals)
+    }
+    for one in reversed(missing):
+        reasons |= dict.fromkeys(one.indistinguishable, Reason(Why.ALIKE, by=(one.effect,)))
     for row in candidates:
-        first = listed.get(row.effect)
-        alike = None if first is None else Reason(Why.ALIKE, by=(first,))
-        yield row if alike is None else replace(row, why_not=alike)
+        yield replace(row, why_not=reasons[row.effect]) if row.effect in reasons else row
 
 
 def missing_of(
@@ -104,6 +112,7 @@ def missing_of(
         held_out_rms=step.held_out.rms,
         share=share_of(before, step),
         probability=chances.of(name),
+        common=common_part(found, term, best),
     )
 
 

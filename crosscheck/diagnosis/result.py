@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.chances import NOT_WEIGHED, Chances
+from crosscheck.diagnosis.common_part import CommonPart
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.noise import Whiteness
@@ -39,6 +40,8 @@ class MissingEffect(Result):
         held_out_rms: the same on held-out runs.
         share: part of the unexplained chi2 (on held-out runs) that it removed.
         probability: posterior probability that it, or an equivalent, is missing.
+        common: what its values of all cables have in common, if another effect explains that as
+            well; None otherwise.
     """
 
     term: Term
@@ -50,6 +53,7 @@ class MissingEffect(Result):
     held_out_rms: Rms
     share: float
     probability: float
+    common: CommonPart | None = None
 
     @property
     def effect(self) -> str:
@@ -107,6 +111,7 @@ class MissingEffect(Result):
             **self.rms,
             "held_out": self.held_out_rms,
             "share_of_error_removed": self.share,
+            **({} if self.common is None else {"common_part": self.common.as_json()}),
         }
 
 

@@ -18,8 +18,8 @@ from seecr.effects.base import Layout
 
 # An effect is only refitted in place of another if it can imitate this part of its signal.
 _LIKELY = 0.9
-# A rival that leaves this much more chi2 can be told apart, whatever its evidence.
-_TOLD_APART = 9.0
+TOLD_APART = 9.0
+"""A rival that leaves this much more chi2 can be told apart, whatever its evidence."""
 # Least evidence that the further parameters of an effect that contains another must gain.
 _FURTHER = 1.0
 # A converged trial is not fitted further if it is so many times as far off as a rival may be.
@@ -49,12 +49,12 @@ class Rival:
         return self.loss <= -EQUAL
 
 
-def rivals_of(found: Search, name: str, apart: float = _TOLD_APART) -> list[Rival]:
+def rivals_of(found: Search, name: str, apart: float = TOLD_APART) -> list[Rival]:
     """Effects that explain as well in place of ``name`` in the final model; see `in_place_of`."""
     return [rival for rival in in_place_of(found, name, apart) if not rival.is_better]
 
 
-def in_place_of(found: Search, name: str, apart: float = _TOLD_APART) -> list[Rival]:
+def in_place_of(found: Search, name: str, apart: float = TOLD_APART) -> list[Rival]:
     """Effects that explain as well as ``name`` in the final model or better, the best first.
 
     Args:
@@ -108,7 +108,7 @@ def _in_its_place(found: Search, candidate: Candidate, without: Fit, apart: floa
     if trial.fit is None or not trial.fit.valid:
         return None
     if trial.fit.settled and not trial.fit.state.prediction.has_history:
-        far = min(far, final.fit.chi2 + _MENDED * max(apart, _TOLD_APART) * left)
+        far = min(far, final.fit.chi2 + _MENDED * max(apart, TOLD_APART) * left)
     if trial.fit.chi2 > far:
         return None
     best = trials.refit(trial.fit.terms, trial.fit.state)
@@ -127,7 +127,7 @@ def _likely(found: Search, name: str, without: Fit) -> list[Candidate]:
     pool, best = _tried_beside(found, name)
     # structure that remained then counts as noise
     left = max(best / max(final.whiteness.dof, 1), final.whiteness.inflation**2)
-    margin = _MENDED * _TOLD_APART * max(1.0, left)
+    margin = _MENDED * TOLD_APART * max(1.0, left)
 
     def likely(fitted: Fit, other: str) -> bool:
         if fitted.chi2 < best + margin:

@@ -42,6 +42,7 @@ class Why(Enum):
     EXPLAINED_BETTER = "{by} explains the same better"
     NOT_NEEDED = "not needed"
     ALIKE = "indistinguishable from {by}, which is listed"
+    IN_COMMON = "may be what all cables have in common of {by}, which is listed"
     NOT_NEEDED_BESIDE = "not needed once {by} {are} in the model (probability {chance})"
     CARRIES_LITTLE = (
         "probable ({chance}) but not certain: it explains little once {by} {are} in the model"
