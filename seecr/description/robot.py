@@ -168,6 +168,11 @@ class Robot:
         return np.array([joint.kind == "hinge" for joint in self.joints])
 
     @property
+    def turns(self) -> bool:
+        """Whether the platform can turn at all: on slides alone it cannot."""
+        return bool(self.hinges.any())
+
+    @property
     def up(self) -> Array:
         """Unit vector (3,) against gravity; base z if there is none.
 
