@@ -238,6 +238,7 @@ DESCRIPTION = {
     "seecr.pose",
     "seecr.description.robot",
     "seecr.description.mjcf",
+    "seecr.description.hindrances",
     "seecr.effects",
 }
 

@@ -73,7 +73,7 @@ def prepare(
     problem = Problem(robot, data, data.sigma, every, considered=considered)
     if not problem.measured.any():
         return Prepared(
-            problem, terms, tuple(data.notes), "", Refusal(Unfit.NO_READINGS, data.n_rows)
+            problem, terms, (*robot.notes, *data.notes), "", Refusal(Unfit.NO_READINGS, data.n_rows)
         )
     laid = laid_out(data, terms)
     plain = problem.experiment.predict(laid.terms.effects)
@@ -87,7 +87,15 @@ def prepare(
             known = replace(problem, sigma=data.sigma)
             problem, estimates = estimate_sigma(known, plain)
     odd = [*doubts(problem, plain.readings), *oversized(problem, plain)]
-    notes = (*data.notes, *_filled_in(problem), *odd, *problem.left_out, *estimates, *said)
+    notes = (
+        *robot.notes,
+        *data.notes,
+        *_filled_in(problem),
+        *odd,
+        *problem.left_out,
+        *estimates,
+        *said,
+    )
     problem = problem.with_groups(groups_of(data, terms))
     refusal = refusal_of(problem, plain.pose[:, :3], data.sigma)
     return Prepared(problem, terms, notes, blocks_note(problem), refusal, int(found.free.sum()))

@@ -250,7 +250,11 @@ class Measurements(Result):
         )
 
     def as_commands(self, robot: Robot) -> Commands:
-        """The commands and known loads, as the statics takes them."""
+        """The commands and known loads, as the statics takes them.
+
+        With the lines of the file, by which answers name rows; of several files' rows none has a
+        line of its own.
+        """
         poses = self.command_pose
         if poses is None:
             poses = np.tile(robot.reference_pose, (self.n_rows, 1))
@@ -265,6 +269,7 @@ class Measurements(Result):
             stands=self.stands,
             clock=self.file if self.files else None,
             parts=self.parts,
+            line=None if self.files else self.line,
         )
 
     @property

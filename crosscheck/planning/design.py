@@ -64,7 +64,7 @@ def make_plan(
     full, assumed = expected_sigma(robot, stated, kinds)
     free = [layout_of(name, robot) for name in commands.free]
     plan = planned(robot, commands, full, read, Terms(Term(one, one.null) for one in free))
-    notes = [*commands.notes, *assumed, *_unsolved(plan)]
+    notes = [*robot.notes, *commands.notes, *assumed, *_unsolved(plan)]
     if not plan.problem.use.any():
         return Plan(plan, (), {}, ((), np.zeros((0, 0))), (), (), tuple(notes))
     progress("sensitivities", 0.1)

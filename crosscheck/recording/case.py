@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 
 from crosscheck.recording.material import Material, gather
 from crosscheck.recording.panels import Panels
-from crosscheck.recording.series import LANES, SHARES, Series
+from crosscheck.recording.series import LANES, Series
 from seecr.recording import layout, shapes
 from seecr.recording.colours import COMMAND, MUJOCO, SEECR
 from seecr.recording.scene import LEGEND, Scene, write_legend
@@ -61,7 +61,7 @@ def blueprint(material: Material) -> rrb.Blueprint:
     return layout.blueprint(
         rrb.Horizontal(
             rrb.Vertical(scene, layout.legend(LEGEND), lanes, row_shares=[high_part, 0.1, share]),
-            rrb.Vertical(*Series.views(material), row_shares=SHARES),
+            rrb.Vertical(*Series.views(material), row_shares=Series.shares(material)),
             rrb.Vertical(
                 layout.text("Read me", "text/read_me"),
                 layout.text("Now", "text/now"),

@@ -42,9 +42,9 @@ _QUANTITIES: dict[str, tuple[str, Rgba]] = {
     "tension": ("tension [N]", colours.GREEN),
 }
 _QUANTITY_NAMES = [name for name, _colour in _QUANTITIES.values()]
-# Heights of the plots, top to bottom, in parts and in points of a window of 1920 by 1080.
-SHARES = (2.8, 3.0, 3.8, 3.6)
-_WIDTH, _HEIGHTS = 640.0, [1000.0 * share / sum(SHARES) - 55.0 for share in SHARES]
+# Heights of the plots in parts of the column; its size in points of a window of 1920 by 1080.
+_PARTS = {DEVIATION: 2.8, TILT: 3.0, TENSION: 3.8, DIFFERENCE: 3.6}
+_WIDTH, _HEIGHT = 640.0, 1000.0
 
 
 class Series:
@@ -55,24 +55,33 @@ class Series:
 
     @staticmethod
     def views(material: Material) -> list[rrb.TimeSeriesView]:
-        """The plots, top to bottom."""
+        """The plots, top to bottom; none of rotations where the platform never turns."""
         moved, turned = _components(material)
+        titles = {
+            DEVIATION: ("Deviation from the command [mm]", moved),
+            TILT: ("Rotation from the command [°]", turned),
+        }
         return [
-            layout.plot(
-                "Deviation from the command [mm]", _both(DEVIATION, moved),
-                _components_legend(material, moved, _HEIGHTS[0]),
-            ),
-            layout.plot(
-                "Rotation from the command [°]", _both(TILT, turned),
-                _components_legend(material, turned, _HEIGHTS[1]),
+            *(
+                layout.plot(
+                    title, _both(root, names),
+                    _components_legend(material, names, _size(material, root)),
+                )
+                for root, (title, names) in titles.items()
+                if root in _shares(material)
             ),
             _tension_view(material),
             layout.plot(
                 "log10 |SEECR - MuJoCo| (crosses: before the polish, lines: limits)",
                 [f"{SETTLED}/**", f"{DIFFERENCE}/**", f"{LIMIT}/**"],
-                legend_of(_logarithms(material), _QUANTITY_NAMES, (_WIDTH, _HEIGHTS[3])),
+                legend_of(_logarithms(material), _QUANTITY_NAMES, _size(material, DIFFERENCE)),
             ),
         ]  # fmt: skip
+
+    @staticmethod
+    def shares(material: Material) -> list[float]:
+        """Heights of the plots, in parts."""
+        return list(_shares(material).values())
 
     def over_poses(self, index: Index) -> None:
         """Both physics at every pose, their difference and its limits."""
@@ -106,7 +115,8 @@ class Series:
     def _deviation(self, who: str, index: Index, poses: Array, command: Array) -> None:
         for name, values in plots.deviation(poses, command).items():
             root = DEVIATION if name in plots.TRANSLATIONS else TILT
-            self.recording.scalars(f"{root}/{who}/{entity_of(name)}", index, values)
+            if root in _shares(self.material):
+                self.recording.scalars(f"{root}/{who}/{entity_of(name)}", index, values)
 
     def _tension(self, who: str, index: Index, tensions: Array) -> None:
         for name, values in zip(self.material.robot.cable_names, tensions.T, strict=True):
@@ -137,7 +147,8 @@ class Series:
         """Lines for SEECR and dots for MuJoCo, or two kinds of dots if poses are unrelated."""
         for name, colour in _COMPONENTS.items():
             root = DEVIATION if name in plots.TRANSLATIONS else TILT
-            self._pair(root, entity_of(name), name, colour)
+            if root in _shares(self.material):
+                self._pair(root, entity_of(name), name, colour)
         names = self.material.robot.cable_names
         shades = colours.cable_colours(self.material.robot.n_cables)
         said = {group[0]: joined([names[k] for k in group]) for group in _drawn(self.material)}
@@ -168,6 +179,17 @@ def _verdict_style(recording: Recording) -> None:
     plots.state_colours(recording, VERDICT, shades)
 
 
+def _shares(material: Material) -> dict[str, float]:
+    """Heights of the plots, in parts, by what they plot."""
+    return {root: p for root, p in _PARTS.items() if root != TILT or material.robot.turns}
+
+
+def _size(material: Material, root: str) -> tuple[float, float]:
+    """Width and height of a plot, in points."""
+    shares = _shares(material)
+    return _WIDTH, _HEIGHT * shares[root] / sum(shares.values()) - 55.0
+
+
 def _components(material: Material) -> tuple[list[str], list[str]]:
     """Components that are worth a line: those that move at all."""
     parts = plots.deviation(material.seecr.pose, material.command)
@@ -184,7 +206,7 @@ def _largest(material: Material, names: list[str]) -> float:
     return max(float(np.nanmax(np.abs(parts[name]), initial=0.0)) for name in names)
 
 
-def _components_legend(material: Material, names: list[str], height: float) -> Legend:
+def _components_legend(material: Material, names: list[str], size: tuple[float, float]) -> Legend:
     """The legend's place for some components of the deviation, over poses and the settling."""
     still = _still(_largest(material, names))
     if still is not None:
@@ -195,7 +217,7 @@ def _components_legend(material: Material, names: list[str], height: float) -> L
     if material.motion is not None:
         moving = plots.deviation(material.settling.pose, material.command[material.watched])
         curves.append(np.stack([moving[name] for name in names], axis=1))
-    return legend_of(curves, names, (_WIDTH, height))
+    return legend_of(curves, names, size)
 
 
 def _tensions(material: Material) -> list[Array]:
@@ -207,7 +229,7 @@ def _tensions(material: Material) -> list[Array]:
 def _tension_legend(material: Material, groups: list[list[int]]) -> Legend:
     names = material.robot.cable_names
     said = [joined([names[k] for k in group]) for group in groups]
-    return legend_of(_tensions(material), said, (_WIDTH, _HEIGHTS[2]))
+    return legend_of(_tensions(material), said, _size(material, TENSION))
 
 
 def _drawn(material: Material) -> list[list[int]]:

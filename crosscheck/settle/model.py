@@ -14,6 +14,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from seecr.description.hindrances import hindrances
 from seecr.description.mjcf import not_mjcf, quiet_mujoco
 from seecr.errors import InputFileError
 
@@ -76,16 +77,10 @@ def check_cables(model: mujoco.MjModel, body: int, where: str) -> None:
             )
 
 
-def hindrances(model: mujoco.MjModel) -> tuple[str, ...]:
-    """Names of features present that would hide or shift the equilibrium."""
-    found = {
-        "joint limits": model.jnt_limited.any(),
-        "tendon limits": model.tendon_limited.any(),
-        "dry friction": model.dof_frictionloss.any() or model.tendon_frictionloss.any(),
-        "damping": model.dof_damping.any() or model.tendon_damping.any(),
-        "contacts": model.geom_contype.any() and model.geom_conaffinity.any(),
-    }
-    return tuple(what for what, there in found.items() if there)
+def ignored_in(model: mujoco.MjModel, platform: int) -> tuple[str, ...]:
+    """Names of features present that would hide, shift or delay the equilibrium."""
+    damped = model.dof_damping.any() or model.tendon_damping.any()
+    return (*hindrances(model, platform), *(("damping",) if damped else ()))
 
 
 def switch_off(model: mujoco.MjModel) -> None:
@@ -98,7 +93,7 @@ def switch_off(model: mujoco.MjModel) -> None:
 
 
 def ignored_note(name: str | Path, ignored: Sequence[str]) -> str:
-    """A sentence about the :func:`hindrances` of a file."""
+    """A sentence about what is :func:`ignored_in` a file."""
     return (
         f"{name}: switched off here: {', '.join(ignored)}; only springs and gravity act on the "
         "platform, as in the statics"

@@ -20,7 +20,7 @@ from crosscheck.settle.model import (
     change_mass_unit,
     check_cables,
     compile_model,
-    hindrances,
+    ignored_in,
     platform_of,
     switch_off,
 )
@@ -94,7 +94,7 @@ class Physics:
         """
         self.model, self.parts, self.body = model, parts, parts.platform
         self.is_free = int(model.jnt_type[model.body_jntadr[parts.platform]]) == _FREE
-        self.ignored = hindrances(model)
+        self.ignored = ignored_in(model, parts.platform)
         switch_off(model)
         self.mass = float(model.body_mass[parts.platform])
         self.mass_unit = 2.0 ** round(float(np.log2(self.mass / _MASS_IN_MUJOCO)))

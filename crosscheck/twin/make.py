@@ -18,7 +18,6 @@ from crosscheck.given import GivenRobot, copy_robot, file_of, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import GivenCommands, commands_of
 from crosscheck.measurements.write import write_measurements
-from crosscheck.settle.model import compile_model, hindrances, ignored_note
 from crosscheck.twin.answer import NAME, Answer, Moves, seal
 from crosscheck.twin.hidden import choose, values_of
 from crosscheck.twin.lab import (
@@ -56,7 +55,7 @@ class Twin(Result):
         kept: (n,) bool, commands that were measured: those at which MuJoCo came to rest.
         hidden: the effects.
         answer: the content of the sealed file.
-        notes: features of the MJCF that the truth ignores, and notes about the given poses.
+        notes: what the truth leaves out of the MJCF, and notes about the given poses.
     """
 
     robot: Robot
@@ -152,7 +151,7 @@ def make_twin(
         kept=made.at_rest,
         hidden=tuple(one for one, _ in made.alone),
         answer=_answer(made, robot, seed),
-        notes=(*_notes(path), *(() if given is None else given.notes)),
+        notes=(*robot.notes, *(() if given is None else given.notes)),
     )
     if out is not None:
         _write(twin, path, Path(out))
@@ -181,9 +180,3 @@ def _write(twin: Twin, robot_path: Path, out: Path) -> None:
         write_measurements(folder / "measured.csv", twin.measured)
         copy_robot(robot_path, folder / "robot.xml")
         write_text(folder / NAME, seal(twin.answer))
-
-
-def _notes(path: Path) -> tuple[str, ...]:
-    """Features of the MJCF that the truth ignores, as it is built from the robot's numbers."""
-    found = hindrances(compile_model(path))
-    return (ignored_note(path, found),) if found else ()

@@ -174,8 +174,9 @@ def model_at(given: Path | None, robot: Robot) -> Model | None:
 
 
 def notes_of(model: Model | None, solution: Solution) -> tuple[str, ...]:
-    """What is to be told of commands, of a model, and of answers that are beyond its data."""
-    said = outside(solution.robot, solution.command)
+    """What is to be told of a robot, of commands, of a model, and of answers beyond its data."""
+    robot = solution.robot
+    said = (*robot.notes, *outside(robot, solution.command))
     return said if model is None else (*said, *model.notes, *model.beyond(solution))
 
 

@@ -73,7 +73,7 @@ def command(
     out.parent.mkdir(parents=True, exist_ok=True)
     files = {out: found.text} | ({beside: found.mujoco_text} if found.mujoco_text else {})
     write_texts(files, "cannot write the MJCF")
-    notes = [*(own.notes if own else ())]
+    notes = [*machine.notes, *(own.notes if own else ())]
     if beside not in files and beside.exists():
         notes.append(f"{beside.name} is of an earlier export: now no such file is needed")
     if as_json:

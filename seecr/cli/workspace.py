@@ -142,7 +142,9 @@ def command(
             inside = found.feasible if at_least is None else found.likely(at_least)
             pairs = found.crossings(inside)
             places = boundary(machine, *pairs, tolerance=edge, at_least=at_least, **asked)
-        notes = [*own.notes, *beyond_line(found, own.reach)] if own else []
+        notes = [*machine.notes]
+        if own is not None:
+            notes += [*own.notes, *beyond_line(found, own.reach)]
         status = 3 if found.elastic and not np.any(found.rests) else 0
         text = json_text({
             "made": made_by(machine.source, model), "exit_status": status, "notes": notes,

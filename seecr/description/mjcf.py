@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from seecr.counted import counted
+from seecr.description.hindrances import hindrances
 from seecr.description.robot import ABSURD, Joint, Robot
 from seecr.description.shipped import robot_file
 from seecr.errors import RobotError, SeecrError
@@ -65,8 +66,8 @@ def load_robot(path: str | Path) -> Robot:
     The file has one moving body with a free joint or with slide and hinge joints. Each cable is a
     spatial tendon through two sites, one fixed to the world (the exit point A_i) and one on the
     body (the anchor point B_i), with ``springlength="0 l0"`` and a stiffness. Mass, centre of mass
-    and gravity are those of the compiled model. Limits of joints and tendons, damping, dry friction
-    and contacts are ignored.
+    and gravity are those of the compiled model. Limits of joints and tendons, dry friction and
+    contacts are left out, as ``Robot.notes`` tells; so is damping, which shifts no equilibrium.
 
     Args:
         path: the MJCF file, or the name of a shipped robot.
@@ -106,6 +107,7 @@ def load_robot(path: str | Path) -> Robot:
         joints=joints,
         cable_names=tuple(names),
         source=path,
+        left_out=hindrances(model, body),
     )
     _check_sizes(robot, _body_name(model, body), path)
     return robot

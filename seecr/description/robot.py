@@ -57,6 +57,8 @@ class Robot:
         source: the file it was read from.
         inertia: of the platform about its centre of mass, in its frame, (3, 3) [kg m^2]; zero if
             unknown. It affects no equilibrium.
+        left_out: what the file has that may hold or stop the platform beside its cables, such as
+            "contacts"; statics leave it out.
     """
 
     name: str
@@ -72,6 +74,7 @@ class Robot:
     cable_names: tuple[str, ...] = ()
     source: Path | None = None
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    left_out: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         m = np.shape(self.exit_points)[0]
@@ -136,6 +139,18 @@ class Robot:
             )
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user of the robot's file should know: a sentence about :attr:`left_out`."""
+        if not self.left_out:
+            return ()
+        *others, last = self.left_out
+        names = f"{', '.join(others)} and {last}" if others else last
+        return (
+            f"{self.source or self.name} has {names}: left out here, where nothing but its cables "
+            "holds the platform",
+        )
+
+    @property
     def n_cables(self) -> int:
         """Number of cables m."""
         return len(self.exit_points)
@@ -151,6 +166,11 @@ class Robot:
         if not self.joints:
             return np.repeat([False, True], 3)
         return np.array([joint.kind == "hinge" for joint in self.joints])
+
+    @property
+    def turns(self) -> bool:
+        """Whether the platform can turn at all: on slides alone it cannot."""
+        return bool(self.hinges.any())
 
     @property
     def up(self) -> Array:

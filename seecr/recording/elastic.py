@@ -51,6 +51,11 @@ class Layer:
     top: float
 
     @property
+    def end(self) -> str:
+        """The end of its colours, with the unit."""
+        return f"{self.top:.4g}{'' if self.unit == '°' else ' '}{self.unit}"
+
+    @property
     def words(self) -> str:
         """On its scale."""
         beyond = self.unit and np.nanmax(self.values, initial=0.0) > self.top
@@ -64,15 +69,16 @@ class Elastic:
     found: Workspace
 
     @cached_property
-    def layers(self) -> tuple[Layer, Layer, Layer]:
-        """How far off its command, how tilted, and with how many slack cables it rests."""
+    def layers(self) -> tuple[Layer, ...]:
+        """How far off its command, how tilted if it can turn, with how many slack cables."""
         found = self.found
         away = 1e3 * np.linalg.norm(found.deviation, axis=-1).astype(float)
         turn = np.degrees(np.linalg.norm(found.rotation, axis=-1).astype(float))
         slack = np.where(found.rests, found.slack, np.nan).astype(float)
+        tilted = Layer("turn", "turned", "°", turn, colour_end(found, turn))
         return (
             Layer("away", "off the command", "mm", away, colour_end(found, away)),
-            Layer("turn", "turned", "°", turn, colour_end(found, turn)),
+            *((tilted,) if found.robot.turns else ()),
             Layer("slack", "slack cables", "", slack, float(found.robot.n_cables)),
         )
 
@@ -127,9 +133,9 @@ class Elastic:
         lost = int(np.sum(~found.rests))
         if lost:
             yield f"Without a point: {counted(lost, 'command')} where it does not come to rest."
-        away, turn, _ = self.layers
+        ends = [layer.end for layer in self.layers if layer.unit]
         yield (
-            f"Colours end at {away.top:.4g} mm and {turn.top:.4g}°, as in the figure: 95 % of the "
+            f"Colours end at {' and '.join(ends)}, as in the figure: 95 % of the "
             "poses that can be held are below. Points are at the commands; white arrows lead from "
             "there to where the platform rests."
         )
@@ -195,13 +201,16 @@ class Elastic:
         for name, some, shade in (
             ("moves", ~robot.hinges, colours.SKY), ("turns", robot.hinges, colours.ORANGE),
         ):  # fmt: skip
+            if name == "turns" and not robot.turns:
+                continue
             yield f"{_ELASTIC}/softest/{name}", long[:, some] @ axes[some], shade
 
     def tabs(self, low: Array, high: Array) -> list[rrb.Container]:
-        """The tabs of the layout: three quantities beside each other, and the softest direction."""
+        """The tabs of the layout: the quantities beside each other, and the softest direction."""
+        aspect = 3.0 * _ASPECT / len(self.layers)
         views = [
             rrb.Vertical(
-                self._view(low, high, layer.name, self._title(layer), _ASPECT),
+                self._view(low, high, layer.name, self._title(layer), aspect),
                 layout.legend(_legend_of(layer)),
                 row_shares=[0.9, 0.1],
             )
@@ -209,7 +218,9 @@ class Elastic:
         ]
         # a view has one place in the layout
         words = [layout.text("Shown", _SHOWN) for _ in range(2)]
-        soft = "Softest direction, a grid step long. Blue: moves along, orange: turns about"
+        soft = "Softest direction, a grid step long. Blue: moves along"
+        if self.found.robot.turns:
+            soft += ", orange: turns about"
         return [
             rrb.Vertical(
                 rrb.Horizontal(*views), words[0], row_shares=[0.88, 0.12], name="Where it rests"

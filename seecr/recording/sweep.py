@@ -31,6 +31,7 @@ __all__ = ["write_sweep_recording"]
 # Width of a plot, in points of a window of 1920 by 1080.
 _WIDTH = 850.0
 _LANES, _AWAY, _TURN, _PULL = "lanes", "plot/deviation", "plot/rotation", "plot/tension"
+_TITLES = {_AWAY: "Deviation from the command [mm]", _TURN: "Rotation from the command [°]"}
 
 
 def write_sweep_recording(solution: Solution, path: str | Path, commanded: bool = True) -> None:
@@ -71,19 +72,20 @@ def _blueprint(
     low, high = shapes.extent(robot, seen)
     scene = layout.scene_view(robot, low, high, name, 1.2 * layout.COLUMN_ASPECT / (0.87 - share))
     lanes = layout.lanes("Which cables pull, which are slack", _LANES)
-    size = (_WIDTH, 1000.0 / (3 if commanded else 1) - 55.0)
-    drawn = [_tension_view(solution, size)]
-    if commanded:
-        parts = plots.deviation(solution.pose, solution.command)
-        moved = {name: parts.pop(name) for name in plots.TRANSLATIONS}
-        drawn = [
-            _component_view("Deviation from the command [mm]", _AWAY, moved, size),
-            _component_view("Rotation from the command [°]", _TURN, parts, size),
-            *drawn,
-        ]
+    off = _off_command(solution) if commanded else {}
+    size = (_WIDTH, 1000.0 / (len(off) + 1) - 55.0)
+    drawn = [_component_view(_TITLES[root], root, parts, size) for root, parts in off.items()]
+    drawn.append(_tension_view(solution, size))
     left = rrb.Vertical(scene, layout.legend(LEGEND), lanes, row_shares=[0.9 - share, 0.1, share])
     root = rrb.Horizontal(left, rrb.Vertical(*drawn), column_shares=[6, 5])
     return layout.blueprint(root, timeline=timeline)
+
+
+def _off_command(solution: Solution) -> dict[str, dict[str, Array]]:
+    """Deviations from the command by plot and name; no rotations where the platform never turns."""
+    parts = plots.deviation(solution.pose, solution.command)
+    moved = {name: parts.pop(name) for name in plots.TRANSLATIONS}
+    return {_AWAY: moved, _TURN: parts} if solution.robot.turns else {_AWAY: moved}
 
 
 def _component_view(
@@ -111,12 +113,12 @@ def _said(names: Sequence[str], groups: list[list[int]]) -> dict[int, str]:
 
 
 def _plots(recording: Recording, index: Index, solution: Solution, commanded: bool) -> None:
-    if commanded:
-        parts = plots.deviation(solution.pose, solution.command)
-        for (name, values), colour in zip(parts.items(), colours.SERIES, strict=False):
-            entity = f"{_AWAY if name in plots.TRANSLATIONS else _TURN}/{entity_of(name)}"
-            recording.scalars(entity, index, values)
-            plots.as_line(recording, entity, name, colour, 1.5)
+    off = _off_command(solution) if commanded else {}
+    lines = [(root, *line) for root, parts in off.items() for line in parts.items()]
+    for (root, name, values), colour in zip(lines, colours.SERIES, strict=False):
+        entity = f"{root}/{entity_of(name)}"
+        recording.scalars(entity, index, values)
+        plots.as_line(recording, entity, name, colour, 1.5)
     known = np.asarray(np.isfinite(solution.pose).all(axis=1))
     nowhere = np.zeros(solution.slack.shape, dtype=bool)
     states = plots.lane_states(solution.slack, nowhere, known)

@@ -44,7 +44,8 @@ def map_figure(
     edge: Array | None = None,
     at_least: float | None = None,
 ) -> None:
-    """Slices of a workspace: margins, slack cables, and deviation and rotation in equilibrium.
+    """Slices of a workspace: margins, slack cables, and deviation and rotation, if it can turn, in
+    equilibrium.
 
     If the map has probabilities, they come second.
 
@@ -64,7 +65,8 @@ def map_figure(
     if found.chance is not None:
         panels.append(_chance_panel)
     if np.any(found.rests):
-        panels += [_slack_panel, _away_panel, _turn_panel]
+        panels += [_slack_panel, _away_panel]
+        panels += [_turn_panel] if found.robot.turns else []
     n = len(cut.picked)
     size = (0.9 + 2.9 * n, 0.7 + 2.3 * len(panels))
     with figure(path, len(panels), n, sharex=True, sharey=True, figsize=size) as axes:

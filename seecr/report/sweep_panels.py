@@ -35,7 +35,7 @@ def sweep_figure(
     runs: ArrayLike | None = None,
     spread: Spread | None = None,
 ) -> None:
-    """Deviation, rotation, tensions and slack cables along a sweep.
+    """Deviation, rotation if it can turn, tensions and slack cables along a sweep.
 
     Args:
         path: the file.
@@ -53,7 +53,8 @@ def sweep_figure(
     whole = _Sweep(solution, spread, at, np.flatnonzero(number[1:] != number[:-1]) + 1, mark)
     panels = [_tensions, _slack]
     if commanded:
-        panels = [_deviations, _rotations, *panels]
+        turned = [_rotations] if solution.robot.turns else []
+        panels = [_deviations, *turned, *panels]
     with figure(path, len(panels), 1, sharex=True, figsize=(7.4, 2.1 * len(panels))) as axes:
         for panel, ax in zip(panels, axes[:, 0], strict=True):
             panel(ax, whole)

@@ -54,6 +54,17 @@ class Readback:
                 return column.cast("int64").to_numpy() / 1e9
         raise AssertionError(f"{entity} has no rows over settling_time")
 
+    @property
+    def views(self) -> set[str]:
+        """Names of the views of the layout."""
+        (store,) = self.reader.blueprints()
+        name, names = "ViewBlueprint:display_name", set()
+        for chunk in self.reader.stream(store=store):
+            batch = chunk.to_record_batch()
+            if name in batch.schema.names:
+                names.add(batch.column(batch.schema.names.index(name)).to_pylist()[0][0])
+        return names
+
     def static(self, entity: str, component: str) -> Any:
         return self.column(entity, component, None)[0]
 

@@ -188,6 +188,11 @@ def test_the_legend_gives_the_scale_in_newtons(back: Readback, result: CaseResul
     ]
 
 
+def test_a_platform_that_turns_has_a_panel_of_rotations(back: Readback) -> None:
+    assert {"Deviation from the command [mm]", "Rotation from the command [°]"} <= back.views
+    assert any(e.startswith("/plot/tilt") for e in back.entities("pose"))
+
+
 def test_the_layout_is_in_the_file(written: Path) -> None:
     reader = RrdReader(written)
     (store,) = reader.blueprints()
@@ -326,6 +331,10 @@ def test_any_robot(size: float, tmp_path: Path) -> None:
     back = Readback(tmp_path / "odd.rrd")
     radius = back.static("/scene/mujoco/cables/taut", "LineStrips3D:radii")[0]
     assert 1e-3 < radius / size < 6e-3
+    # it cannot turn
+    assert "Deviation from the command [mm]" in back.views
+    assert "Rotation from the command [°]" not in back.views
+    assert not any(e.startswith("/plot/tilt") for e in back.entities("pose"))
     lanes = sorted(e for e in back.entities("pose") if e.startswith("/lanes/haul"))
     assert len(lanes) == 4
     half = back.column("/scene/seecr/platform", "Boxes3D:half_sizes")[0][0]

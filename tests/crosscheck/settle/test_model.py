@@ -13,7 +13,7 @@ from crosscheck.settle.model import (
     change_mass_unit,
     check_cables,
     compile_model,
-    hindrances,
+    ignored_in,
     ignored_note,
     platform_of,
 )
@@ -45,13 +45,15 @@ SLIDE = '<joint name="x" type="slide"'
     ],
 )
 def test_what_hinders_is_named_one_by_one(old, new, name):
-    assert hindrances(planar(old, new)) == (name,)
+    model = planar(old, new)
+    assert ignored_in(model, platform_of(model, "r")) == (name,)
     assert Physics.of(planar(old, new)).ignored == (name,)
 
 
 @pytest.mark.parametrize("name", model_names())
 def test_nothing_hinders_a_shipped_robot(name):
-    assert hindrances(compile_model(model_path(name))) == ()
+    model = compile_model(model_path(name))
+    assert ignored_in(model, platform_of(model, name)) == ()
 
 
 def test_the_note_is_one_sentence_with_the_file_and_all_names():

@@ -396,8 +396,8 @@ def test_damping_friction_limits_and_contacts_do_not_shift_the_rest_state():
     assert other.physics.ignored == (
         "joint limits",
         "dry friction",
-        "damping",
         "contacts",
+        "damping",
     )
     rested = other.settle(pose[0], rest)
     assert rested.pose == pytest.approx(plain.pose, abs=1e-10)

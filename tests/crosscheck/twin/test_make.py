@@ -438,12 +438,12 @@ def test_an_answer_that_says_something_else_is_none(answer):
 def test_what_of_the_mjcf_plays_no_part_is_told_once(tmp_path):
     rough = tmp_path / "rough.xml"
     text = model_path("planar_vertical").read_text(encoding="utf-8")
-    rough.write_text(text.replace('<joint name="x"', '<joint name="x" damping="2"'))
+    rough.write_text(text.replace('<joint name="x"', '<joint name="x" frictionloss="2"'))
     args = ["twin", str(rough), "--hide", "1", "--effects", "0", "--out", str(tmp_path / "case")]
     run = CliRunner().invoke(main, [*args, "--json"])
     assert run.exit_code == 0
     (note,) = json.loads(run.stdout)["notes"]
-    assert note.startswith(f"{rough}: switched off here: damping;")
+    assert note.startswith(f"{rough} has dry friction: left out here")
     assert run.stderr == f"note: {note}\n"
 
 

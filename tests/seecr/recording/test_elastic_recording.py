@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from recordings import Readback, headless_viewer
+from slab import slides
 
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
@@ -200,3 +201,20 @@ def test_the_viewer_has_nothing_to_complain_about(found: Workspace, tmp_path: Pa
         assert [(view.name, view.reports) for view in state.views if view.reports] == []
         # a view with two places in the layout was dropped, and said so here alone
         assert not any("broken references" in str(line) for line in viewer.get_logs())
+
+
+def test_a_platform_that_cannot_turn_has_no_view_of_rotations(tmp_path: Path) -> None:
+    titles = {"Off the command [mm]", "Turned [°]", "Slack cables"}
+    for robot, left in ((VERTICAL, titles), (slides(), titles - {"Turned [°]"})):
+        found = workspace_map(robot, X, np.array([0.0]), np.linspace(0.1, 0.3, 3))
+        assert np.any(found.rests)
+        write_map_recording(found, tmp_path / "map.rrd")
+        back = Readback(tmp_path / "map.rrd")
+        assert back.views & titles == left
+        turns = "Turned [°]" in left
+        soft = "Softest direction, a grid step long. Blue: moves along"
+        assert soft + (", orange: turns about" if turns else "") in back.views
+        drawn = {entity for entity, _, _ in back.chunks}
+        assert any("/softest/turns" in one or "/turn/" in one for one in drawn) == turns
+        shown = back.static("/shown", "TextDocument:text")[0]
+        assert ("°" in shown) == turns

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from slab import slides
 
 from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
 from seecr.report.map_slices import map_figure
 from seecr.workspace.grid import Workspace
@@ -117,3 +119,11 @@ def test_the_edge_with_a_probability_is_told_from_that_without(drawn: Drawn) -> 
 
 def test_a_map_says_whose_it_is(drawn: Drawn) -> None:
     assert drawn(a_map(*[1.0] * 9)).get_suptitle() == "demobot_cogiro"
+
+
+@pytest.mark.parametrize(
+    ("robot", "turns"), [(slides(), False), (load_robot("planar_vertical"), True)]
+)
+def test_turns_are_drawn_where_the_platform_can(drawn: Drawn, robot: Robot, turns: bool) -> None:
+    figure = drawn(workspace_map(robot, AXIS, np.array([0.0]), np.array([0.15, 0.2])))
+    assert ("turned [°]" in [ax.get_ylabel() for ax in figure.axes]) == turns

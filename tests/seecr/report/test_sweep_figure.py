@@ -12,6 +12,7 @@ import pytest
 from calibrated import KEPT, MODEL, ROBOT, model_of
 from click.testing import CliRunner
 from matplotlib.figure import Figure
+from slab import slides
 
 from seecr.cli import main
 from seecr.equilibrium.solving import solve
@@ -128,3 +129,11 @@ def band(filled: Any, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     corners = filled.get_paths()[0].vertices
     at = [corners[np.isclose(corners[:, 0], one), 1] for one in along]
     return np.array([y.min() for y in at]), np.array([y.max() for y in at])
+
+
+def test_rotations_are_drawn_where_the_platform_turns(drawn: Drawn, sweep: Solution) -> None:
+    labels = [ax.get_ylabel() for ax in drawn(sweep)]
+    assert "rotation [°]" in labels and len(labels) == 4
+    still = slides()
+    labels = [ax.get_ylabel() for ax in drawn(solve(still, still.reference_pose))]
+    assert "rotation [°]" not in labels and len(labels) == 3
