@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from crosscheck.calibration.worth import ByWidth, log_gains, log_positive
+from crosscheck.calibration.worth import ByWidth, log_positive
 from crosscheck.fit.definite import inverse_of
 from seecr.pose import Array
 
@@ -123,9 +123,7 @@ class Solved:
         gram, own = self.gram, self.gram.groups[name].columns
         if name in self.chosen:
             at = self._place(name)
-            precise = inverse_of(self.inverse[np.ix_(at, at)])
-            left = precise - np.eye(len(at)) / self.chosen[name] ** 2
-            return left, precise @ self.values[at]
+            return self._beside_others(name, at, inverse_of(self.inverse[np.ix_(at, at)]))
         cross = gram.normal[np.ix_(self.columns, own)]
         left = gram.normal[np.ix_(own, own)] - cross.T @ self.inverse @ cross
         return left, gram.gradient[own] - cross.T @ self.values
@@ -133,8 +131,7 @@ class Solved:
     def gains(self, name: str) -> Array:
         """ln evidence that an effect gains beside the (other) members, for each of its widths."""
         group = self.gram.groups[name]
-        normal, gradient = self.beside(name)
-        return log_gains(normal, gradient, group.widths, group.one_sided)
+        return ByWidth.of(*self.beside(name), group.widths).gains_if(group.one_sided)
 
     def gain(self, name: str) -> float:
         """The ln evidence that an effect gains beside the (other) members, averaged over widths."""
@@ -146,18 +143,27 @@ class Solved:
 
         A narrow member may be replaced by others, in the linear model also by negative ones.
         """
-        gains, own = self.gains(name), self._place(name)
+        member, own = self.gram.groups[name], self._place(name)
+        precise = inverse_of(self.inverse[np.ix_(own, own)])
+        group = ByWidth.of(*self._beside_others(name, own, precise), member.widths)
+        gains = group.gains_if(member.one_sided)
         others = np.setdiff1d(np.flatnonzero(self._bounded), own)
         if len(others) == 0:
             return gains
-        group = ByWidth.of(*self.beside(name), self.gram.groups[name].widths)
         # the others follow the member by its covariance with them
         with_own = self.inverse[np.ix_(others, own)]
-        rate = with_own @ inverse_of(self.inverse[np.ix_(own, own)])
+        rate = with_own @ precise
         values, variance = group.seen(rate)
         alone = self.inverse[others, others] - np.sum(rate * with_own, axis=1)
         values = values + self.values[others] - rate @ self.values[own]
         return np.asarray(gains + log_positive(values, variance + np.maximum(alone, 1e-300)))
+
+    def _beside_others(
+        self, name: str, own: NDArray[np.intp], precise: Array
+    ) -> tuple[Array, Array]:
+        """`beside` of a member, from its places and the inverse of its own covariance."""
+        left = precise - np.eye(len(own)) / self.chosen[name] ** 2
+        return left, precise @ self.values[own]
 
     def _place(self, name: str) -> NDArray[np.intp]:
         counts = [len(self.gram.groups[n].columns) for n in self.chosen]
@@ -174,16 +180,18 @@ def best_widths(gram: Gram, start: Widths, price: float = 0.0) -> dict[str, floa
         start: the set with its initial widths.
         price: a width is only changed if that gains more than this ln evidence.
     """
-    chosen = dict(start)
+    solved = gram.solved(start)
     for _ in range(_ROUNDS):
-        before = dict(chosen)
+        before = solved.chosen
         for name, width in before.items():
             widths = gram.groups[name].widths
-            gains = gram.solved(chosen).gains_of_member(name) - price * (widths != width)
-            chosen[name] = float(widths[int(np.argmax(gains))])
-        if chosen == before:
+            gains = solved.gains_of_member(name) - price * (widths != width)
+            best = float(widths[int(np.argmax(gains))])
+            if best != width:
+                solved = gram.solved({**solved.chosen, name: best})
+        if solved.chosen == before:
             break
-    return chosen
+    return solved.chosen
 
 
 def averaged(gram: Gram, chosen: Widths) -> float:

@@ -49,6 +49,13 @@ class ByWidth:
         """(k,) ln evidence gained, with Gaussian priors."""
         return gains_along(self.power, self.along, self.widths)
 
+    def gains_if(self, one_sided: ArrayLike) -> Array:
+        """(k,) the same, if some of the parameters (p,) cannot be negative."""
+        bounded = np.broadcast_to(one_sided, len(self.power))
+        if not bounded.any():
+            return self.gains
+        return np.asarray(self.gains + log_positive(*self.seen(np.eye(len(self.power))[bounded])))
+
     def seen(self, rate: Array) -> tuple[Array, Array]:
         """Most probable values and variances (k, q) of rate @ z, for rate (q, p)."""
         square, rate = self.widths[:, None] ** 2, rate @ self.axes
@@ -67,10 +74,7 @@ def log_gains(
         widths: (k,) prior standard deviations of z.
         one_sided: (p,) parameters that cannot be negative; each is treated by itself.
     """
-    group, bounded = ByWidth.of(normal, gradient, widths), np.broadcast_to(one_sided, len(gradient))
-    if not bounded.any():
-        return group.gains
-    return np.asarray(group.gains + log_positive(*group.seen(np.eye(len(gradient))[bounded])))
+    return ByWidth.of(normal, gradient, widths).gains_if(one_sided)
 
 
 def log_positive(values: Array, variance: Array) -> Array:
