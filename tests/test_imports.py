@@ -333,12 +333,25 @@ def test_what_is_compiled_takes_arrays_alone() -> None:
     assert {place(t) for t in taken if t.startswith("seecr")} == {"seecr.compiled"}
 
 
+HEAVY_SCIPY = ("scipy.stats", "scipy.signal")
+
+
 @pytest.mark.parametrize(
     "module", ["seecr", "crosscheck", "crosscheck.cli", "seecr.cli", "seecr.description.robot"]
 )
 def test_importing_is_light(module: str) -> None:
     heavy = ("numba", "mujoco", "rerun", "matplotlib", "pyarrow", "scipy")
     code = f"import sys, {module}; print(*[m for m in {heavy!r} if m in sys.modules])"
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
+    )
+    assert run.stdout.split() == []
+
+
+@pytest.mark.parametrize("module", ["crosscheck.comparison", "crosscheck.diagnosis.verdict"])
+def test_what_few_data_need_waits_for_them(module: str) -> None:
+    """``scipy.stats`` and ``scipy.signal`` take most of a second to import."""
+    code = f"import sys, {module}; print(*[m for m in sys.modules if m in {HEAVY_SCIPY!r}])"
     run = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
     )

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 from crosscheck.add.result import Addition
 from crosscheck.comparison.coloured import coloured_noise
@@ -186,7 +186,7 @@ def is_nothing(distance: float, count: int) -> bool:
     """
     if not np.isfinite(distance):
         return False
-    return bool(stats.chi2.cdf(distance**2, count) <= stats.chi2.cdf(1.0, 1))
+    return bool(special.chdtr(count, distance**2) <= special.chdtr(1, 1.0))
 
 
 def whiteness_of(problem: Problem, found: Fit) -> Whiteness:

@@ -12,7 +12,7 @@ from collections.abc import Collection
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 from crosscheck.calibration.colour import Colour
 from crosscheck.calibration.joint import JointFit, Setting
@@ -94,7 +94,7 @@ def outliers_cluster(setting: Setting, joint: JointFit) -> bool:
     for pairs in (next_rows(problem), nearest_rows(problem)):
         for group, rate in zip(groups, part, strict=True):
             both = int((group[pairs[:, 0]] & group[pairs[:, 1]]).sum()) if len(pairs) else 0
-            if both and stats.poisson.sf(both - 1, len(pairs) * rate**2) < _CHANCE:
+            if both and special.pdtrc(both - 1, len(pairs) * rate**2) < _CHANCE:
                 return True
     return False
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 from crosscheck.calibration.colour import Chain, Colour
 from crosscheck.fit.problem import KINDS
@@ -44,7 +44,7 @@ def _weights(row: NDArray[np.int64], residual: Array, scale: float) -> Array:
     rows, group, count = np.unique(row, return_inverse=True, return_counts=True)
     power: Array = np.bincount(group, residual**2, minlength=len(rows)).astype(float)
     # the fit may not have converged yet: take the size of the bulk if it is larger than the noise
-    bulk = np.sqrt(np.median(power / stats.chi2.median(count)))
+    bulk = np.sqrt(np.median(power / (2.0 * special.gammaincinv(0.5 * count, 0.5))))
     power = power / max(scale, float(bulk)) ** 2
     odds = np.log(_CHANCE / (1.0 - _CHANCE)) - count * np.log(LARGER)
     odds = odds + 0.5 * power * (1.0 - LARGER**-2)

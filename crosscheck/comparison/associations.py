@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 from crosscheck.comparison.cable_space import cable_errors, independent_part
 from crosscheck.comparison.quantities import (
@@ -188,7 +188,7 @@ def _p(between: Array, won: Array, within: Array, lost: Array) -> Array:
     safe = np.where(good, lost, 1.0)
     with np.errstate(over="ignore"):  # rows that are identical have no variance within
         f = (between / np.maximum(won, 1)) / np.maximum(within / safe, 1e-300)
-    return np.where(good, stats.f.sf(f, np.maximum(won, 1), safe), 1.0)
+    return np.where(good, special.fdtrc(np.maximum(won, 1), safe, f), 1.0)
 
 
 def _squares(table: Array, index: Any, bins: int, constant: bool) -> tuple[Array, Array, Array]:

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special, stats
+from scipy import special
 
 from crosscheck.fit.definite import roots_of
 from crosscheck.fit.gauss_newton import Fit
@@ -158,5 +158,5 @@ def p_value(drop: float, parameters: int, one_sided: bool) -> float:
     """
     if drop <= 0.0:
         return 1.0
-    p = float(stats.chi2.sf(drop, max(parameters, 1)))
+    p = float(special.chdtrc(max(parameters, 1), drop))
     return 0.5 * p if one_sided and parameters == 1 else p

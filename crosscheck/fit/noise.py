@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import spatial, special, stats
+from scipy import spatial, special
 
 from crosscheck.fit.problem import Problem
 from seecr.pose import Array, rotvec_from_quat
@@ -82,7 +82,7 @@ def whiteness(problem: Problem, white: Array, parameters: int) -> Whiteness:
     return Whiteness(
         chi2=chi2,
         dof=dof,
-        p=float(stats.chi2.sf(chi2, dof)),
+        p=float(special.chdtrc(dof, chi2)),
         scale=float(np.sqrt(chi2 / dof)),
         lag=lag[0],
         lag_errors=lag[1],
@@ -132,8 +132,8 @@ def best_of(errors: float, tests: int) -> float:
     If P is the probability of a smaller value in one test, it is P^tests for the best (Sidak).
     """
     if errors < _TAIL:
-        return float(special.ndtri_exp(tests * stats.norm.logcdf(errors)))
-    return -float(special.ndtri_exp(stats.norm.logsf(errors) + np.log(tests)))
+        return float(special.ndtri_exp(tests * special.log_ndtr(errors)))
+    return -float(special.ndtri_exp(special.log_ndtr(-errors) + np.log(tests)))
 
 
 def next_rows(problem: Problem) -> NDArray[np.int64]:

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.words import rms_words
@@ -115,6 +114,8 @@ def _place_in_run(data: Measurements) -> NDArray[np.int64]:
 
 def _turns(robot: Robot, data: Measurements) -> NDArray[np.bool_]:
     """(n,) rows at which a cable reverses or the load changes, and the row before such a change."""
+    from scipy import signal  # takes half a second to import, and few logs are this long
+
     commands = data.as_commands(robot)
     told = commands.change(robot)
     turns = np.zeros(data.n_rows, dtype=bool)

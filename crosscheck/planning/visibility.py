@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from scipy import optimize, stats
+from scipy import optimize, special
 
 from crosscheck.fit import imitation
 from crosscheck.fit.candidates import candidates_for
@@ -72,9 +72,9 @@ class Signal:
 @lru_cache(maxsize=256)
 def needed(directions: int, tried: int) -> float:
     """Squared signal that a test finds: the noncentrality for POWER at the level LEVEL/tried."""
-    limit = stats.chi2.isf(LEVEL / tried, directions)
+    limit = special.chdtri(directions, LEVEL / tried)
     return float(
-        optimize.brentq(lambda nc: stats.ncx2.sf(limit, directions, nc) - POWER, 1e-6, 1e4)
+        optimize.brentq(lambda nc: 1.0 - special.chndtr(limit, directions, nc) - POWER, 1e-6, 1e4)
     )
 
 
