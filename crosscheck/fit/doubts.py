@@ -18,8 +18,8 @@ from seecr.pose import (
 )
 
 # A model is worse than none if it is so many times as far from the readings as the commands are,
-# and as the noise is. Tensions that are off by the last factor must have another cause.
-_WORSE, _NOISE, _OTHER_TENSION = 3.0, 10.0, 20.0
+# and as the noise is.
+_WORSE, _NOISE = 3.0, 10.0
 _LEAST_ROWS = 4
 # Rotations are in doubt where they change so many times less than the model expects, if it expects
 # at least so much [rad]; or where they fit so many times better when taken backwards.
@@ -43,7 +43,6 @@ def doubts(problem: Problem, readings: Readings) -> list[str]:
         *said,
         *_other_turns(problem, readings),
         *_backwards(problem, readings, raw),
-        *_other_tensions(problem, raw),
     ]
 
 
@@ -118,21 +117,4 @@ def _backwards(problem: Problem, readings: Readings, raw: Array) -> list[str]:
         f"Orientations are {short(np.degrees(here))} deg from those that the model expects, and "
         f"only {short(np.degrees(there))} deg if every rotation is inverted: does the tracker "
         "report how the base is turned as seen from the platform?"
-    ]
-
-
-def _other_tensions(problem: Problem, raw: Array) -> list[str]:
-    columns = BY_NAME["tension"].columns
-    counted = problem.counted[:, columns] & np.isfinite(raw[:, columns])
-    if counted.any(axis=1).sum() < _LEAST_ROWS:
-        return []
-    read = problem.data.tensions[counted]
-    usual = float(np.sqrt(np.mean(read**2)))
-    expected = float(np.sqrt(np.mean((read - raw[:, columns][counted]) ** 2)))
-    if usual <= 0.0 or expected <= 0.0 or 1.0 / _OTHER_TENSION < usual / expected < _OTHER_TENSION:
-        return []
-    return [
-        f"Tensions of {short(usual)} N were measured where the model expects {short(expected)} N "
-        "(rms): is it another unit, the file of another robot, or a pretension that the model "
-        "lacks?"
     ]

@@ -15,6 +15,7 @@ from crosscheck.fit.parts import groups_of, laid_out
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.fit.state import State
+from crosscheck.fit.tension_unit import tension_doubts
 from crosscheck.fit.unstated import estimate_sigma, oversized
 from crosscheck.measurements.data import Measurements
 from seecr.description.robot import Robot
@@ -86,7 +87,11 @@ def prepare(
         if estimates:  # the first residuals also contained the error of the frame
             known = replace(problem, sigma=data.sigma)
             problem, estimates = estimate_sigma(known, plain)
-    odd = [*doubts(problem, plain.readings), *oversized(problem, plain)]
+    odd = [
+        *doubts(problem, plain.readings),
+        *tension_doubts(problem, plain),
+        *oversized(problem, plain),
+    ]
     notes = (
         *robot.notes,
         *data.notes,

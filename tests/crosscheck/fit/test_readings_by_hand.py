@@ -14,6 +14,7 @@ from crosscheck.fit.fitness import commands_table
 from crosscheck.fit.known import known_left, known_readings
 from crosscheck.fit.parts import groups_of, laid_out, names_in
 from crosscheck.fit.problem import Problem
+from crosscheck.fit.tension_unit import other_tensions
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.commands.loads import Loads
 from seecr.effects import ApartLayout, Own, Terms, Values
@@ -56,7 +57,7 @@ def test_a_model_farther_off_than_the_commands_is_doubted_with_both_distances() 
 
 @pytest.mark.parametrize(("pull", "doubted"), [(19.0, 0), (21.0, 1), (1 / 19.0, 0), (1 / 21.0, 1)])
 def test_tensions_twenty_times_as_large_are_of_another_unit(pull: float, doubted: int) -> None:
-    said = doubts(problem(), predicted(pull=pull))
+    said = other_tensions(problem(), problem().residuals(predicted(pull=pull)))
     assert len(said) == doubted and all("is it another unit" in one for one in said)
 
 
