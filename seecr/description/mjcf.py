@@ -238,10 +238,21 @@ def _moving_body(model: mujoco.MjModel, path: Path) -> int:
 
 def _refuse_other_forces(model: mujoco.MjModel, body: int, path: Path) -> None:
     """Refuse what would change the equilibrium but is not read here."""
+    import mujoco
+
+    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_SPRING:
+        raise RobotError(
+            f"{path}: the flag spring is disabled; expected springs, the cables are springs"
+        )
     if model.body_gravcomp[body] != 0:
         raise RobotError(
             f"{path}: body {_body_name(model, body)} has gravcomp "
             f"{model.body_gravcomp[body]:g}; expected none, the cables carry the weight"
+        )
+    if np.any(model.opt.wind) and (model.opt.density > 0 or model.opt.viscosity > 0):
+        raise RobotError(
+            f"{path}: the option wind pushes the platform; expected none, and the push as an "
+            "effect: external_wrench"
         )
     curved = np.flatnonzero(np.any(model.tendon_stiffnesspoly, axis=1))
     if len(curved):

@@ -240,6 +240,14 @@ CURVED = 'stiffness="200 30"'
             "body platform has gravcomp 1; expected none, the cables carry the weight",
         ),
         (
+            {"rest": '<option><flag spring="disable"/></option>'},
+            "the flag spring is disabled; expected springs, the cables are springs",
+        ),
+        (
+            {"rest": '<option wind="3 0 0" density="1.2"/>'},
+            "the option wind pushes the platform; expected none, and the push as an effect: ext",
+        ),
+        (
             {"rest": '<actuator><motor tendon="left"/></actuator>'},
             "has an actuator; expected passive cables and one platform only",
         ),
@@ -339,3 +347,8 @@ def test_numbers_that_no_robot_has_name_the_file_and_the_cable(tmp_path: Path) -
     there = WORLD.replace("0 0 2", "0.4 0 1")
     text = refusal(mjcf(tmp_path, world=there))
     assert text.startswith("robot two ropes: left has its anchor point on its exit point at the")
+
+
+def test_wind_in_no_medium_and_a_medium_without_wind_push_nothing(tmp_path: Path) -> None:
+    for option in ('wind="3 0 0"', 'density="1.2" viscosity="2e-5"'):
+        assert load_robot(mjcf(tmp_path, rest=f"<option {option}/>")).n_cables == 2
