@@ -15,6 +15,7 @@ import crosscheck
 from crosscheck.fit.exchanged import exchanges, misfits
 from crosscheck.fit.prepare import prepare
 from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.measurements.read import load_measurements
 from crosscheck.measurements.together import together
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
@@ -195,6 +196,24 @@ def test_a_comparison_tells_and_changes_nothing() -> None:
     found = crosscheck.compare(COGIRO, data)
     assert sum("seem exchanged" in note for note in found.notes) == 1
     np.testing.assert_array_equal(found.problem.data.tensions, data.tensions)
+
+
+def test_neither_trial_data_nor_real_robots_are_doubted(shared_data: Path) -> None:
+    folders = [f.parent for f in sorted(shared_data.glob("*/*/measured.csv"))]
+    assert len(folders) >= 32
+    for folder in folders:
+        robot = load_robot(folder / "robot.xml")
+        notes = prepare(robot, load_measurements(folder / "measured.csv", robot), Terms()).notes
+        assert not any("exchanged" in one or "as if they were in" in one for one in notes), folder
+
+
+@pytest.mark.parametrize("pair", [(1, 2), (2, 4), (3, 4)])
+def test_lengths_of_a_real_robot(shared_data: Path, pair: Sequence[int]) -> None:
+    folder = shared_data / "real" / "hangprinter"
+    robot = load_robot(folder / "robot.xml")
+    data = load_measurements(folder / "measured.csv", robot)
+    (said,) = told(paid_out(data, order(*pair, m=4)), robot)
+    assert f"length_{pair[0]} and length_{pair[1]} seem exchanged" in said
 
 
 def test_misfits_leave_out_constants_and_are_no_less_than_noise() -> None:
