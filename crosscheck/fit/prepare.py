@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from crosscheck.fit.doubts import doubts
+from crosscheck.fit.exchanged import exchange_doubts
 from crosscheck.fit.fitness import refusal_of
 from crosscheck.fit.freed import freed
 from crosscheck.fit.held_out import blocks_note
@@ -90,6 +91,7 @@ def prepare(
     odd = [
         *doubts(problem, plain.readings),
         *tension_doubts(problem, plain),
+        *exchange_doubts(problem, plain),
         *oversized(problem, plain),
     ]
     notes = (

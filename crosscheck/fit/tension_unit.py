@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from crosscheck.fit.problem import TENSION, Problem
-from crosscheck.fit.pulls import carried
+from crosscheck.fit.pulls import Pulls
 from crosscheck.units import short
 from seecr.pose import Array
 from seecr.prediction.experiment import Prediction
@@ -28,8 +28,7 @@ def tension_doubts(problem: Problem, at: Prediction) -> list[str]:
     Args:
         problem: the data with their noise. at: what the model as it stands predicts.
     """
-    part = carried(problem, at.pose, at.readings.tensions)
-    named = list(_units(problem, part))
+    named = list(_units(problem, Pulls(problem, at).carried()))
     return named or other_tensions(problem, problem.residuals(at.readings))
 
 

@@ -13,7 +13,7 @@ from made_data import measured, soft_cogiro, term
 
 import crosscheck
 from crosscheck.fit.prepare import prepare
-from crosscheck.fit.pulls import carried
+from crosscheck.fit.pulls import Pulls
 from crosscheck.fit.tension_unit import unit_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.together import together
@@ -136,5 +136,5 @@ def test_a_unit_needs_rows_that_agree() -> None:
 def test_the_carried_part_is_one_where_tensions_are_as_expected() -> None:
     ready = prepare(COGIRO, read_of(), Terms()).problem
     at = ready.experiment.predict(())
-    part = carried(ready, at.pose, at.readings.tensions)
+    part = Pulls(ready, at).carried()
     np.testing.assert_allclose(part, 1.0, atol=0.1)
