@@ -28,8 +28,6 @@ from seecr.statics import batch
 from seecr.statics.tables import Tables
 from seecr.threads import in_parts
 
-# Step of a rest length for finite differences [robot's length].
-_STEP = 1e-5
 # Newton steps to the tightness of a cable.
 _TIGHTNESS = 60
 
@@ -57,11 +55,10 @@ class Rates:
 
 def rates_of(tables: Tables, at: batch.Evaluation) -> Rates:
     """The derivatives for tables at an evaluation of them."""
-    step = _STEP * tables.length
-    force, tension = batch.change_by_cable(tables, tables.lengthened(-step), at)
-    pulls = np.broadcast_to(tension[:, None, :] != 0.0, force.shape)
-    each = np.divide(force, tension[:, None, :], out=np.zeros_like(force), where=pulls)
-    return Rates(each, tension / step, force / step)
+    pull, by_length = batch.change_by_length(tables, at)
+    pulls = np.broadcast_to(by_length[:, None, :] != 0.0, pull.shape)
+    each = np.divide(pull, by_length[:, None, :], out=np.zeros_like(pull), where=pulls)
+    return Rates(each, by_length, pull)
 
 
 def with_rest(tables: Tables, rest: Array) -> Tables:
@@ -90,8 +87,8 @@ def next_rest(tables: Tables, rest: Array, by_length: Array, now: Array, wanted:
     2 at most.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        # the tension of a plain cable is linear in 1/l0, so the slope over the step is exact
-        slope = -by_length * rest * (rest - _STEP * tables.length)
+        # the tension of a plain cable is linear in 1/l0
+        slope = -by_length * rest**2
         inverse = 1.0 / rest + (wanted - now) / slope * _hanging(tables, now, wanted)
         return np.asarray(rest / np.clip(inverse * rest, 0.5, 2.0))
 

@@ -19,7 +19,7 @@ from seecr.holding.balance import is_straight, straight_balance
 from seecr.holding.distribution import tension_limits, wanted_tensions
 from seecr.holding.hanging import least_of_heavy
 from seecr.holding.inside import balances, counted_balance
-from seecr.holding.lengths import Held, hold, holds_firmly
+from seecr.holding.lengths import Held, hold, hold_again, holds_firmly
 from seecr.holding.unheld import why_not_held
 from seecr.inverse.nearest import Nearest, Reaching, nearest, poses_in_place
 from seecr.inverse.told import told_lengths
@@ -376,9 +376,8 @@ class _Search:
         trial = replace(commands, lengths=plain, told=True)
         return assemble(Experiment(self.robot, trial).setup(self.effects))
 
-    def _held(self, commands: Commands, past: Prediction | None = None) -> tuple[Held, Tables]:
-        tables = self._tables(commands) if past is None else past.tables
-        limits = self.limits
+    def _held(self, commands: Commands) -> tuple[Held, Tables]:
+        tables, limits = self._tables(commands), self.limits
         return hold(tables, limits.aim, limits.low, limits.high), tables
 
     def _reaching(self, rows: NDArray[np.intp], scale: Array, *, fix_position: bool) -> Reaching:
@@ -419,6 +418,7 @@ class _Search:
 
     def _lengths(self, commands: Commands, held: Held) -> tuple[Array, Prediction]:
         """Told lengths that pay out the rest lengths of ``held``, and the prediction with them."""
+        limits = self.limits
         for _ in range(_ROUNDS):
             told = told_lengths(self.robot, commands, self.effects, held.rest)
             trial = replace(commands, lengths=told, told=True)
@@ -428,7 +428,7 @@ class _Search:
             missed = np.abs(pose_difference(prediction.pose, commands.pose)).max(axis=1)
             if np.all(missed[held.fine] <= _MISSED * self.robot.length):
                 break
-            held, _ = self._held(commands, prediction)
+            held = hold_again(prediction.tables, held, limits.aim, limits.low, limits.high)
         return told, prediction
 
 

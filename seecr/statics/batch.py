@@ -258,6 +258,29 @@ def change_by_cable(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array,
     return _solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, m * plus.n_dof))
 
 
+def change_by_length(tables: Tables, at: Evaluation) -> tuple[Array, Array]:
+    """Derivatives by each cable's rest length: gradient (n, d, m), its own tension (n, m) [N/m].
+
+    Args:
+        tables: of n poses.
+        at: where the platform is; nothing is solved.
+    """
+    from seecr.compiled import lengthening  # takes a while to import
+
+    n, m = tables.cables.shape[:2]
+    gradient, tension = np.empty((n, m, tables.n_dof)), np.empty((n, m))
+
+    def run(part: slice) -> None:
+        lengthening.change_by_length(
+            tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
+            at.deviation[part], at.values[part], tables.length, at.guess[part], gradient[part],
+            tension[part],
+        )  # fmt: skip
+
+    in_parts(run, n)
+    return _solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, m * tables.n_dof))
+
+
 def _solved(gradient: Array, tension: Array, failed: Array) -> tuple[Array, Array]:
     """Zero change for rows in which a cable's equations could not be solved beside the pose."""
     lost = np.isnan(failed).any(axis=1)

@@ -346,3 +346,16 @@ def test_rotations_that_are_rounding_are_printed_as_none() -> None:
     found = correct(robot, robot.reference_pose + np.array([0, 0, 40.0, 0, 0, 0, 0]))
     found.solution.pose[0, 4] = 1e-15
     assert found.left[0, 3] > 0.0 and " mm and 0 deg away" in "\n".join(found.lines())
+
+
+def test_lengths_of_crept_cables_are_found_from_the_history_they_have() -> None:
+    """Sought from plain cables they were slack where they were to pull: few rows stayed."""
+    robot, n = robot_named("ipanema"), 12
+    poses = np.tile(robot.reference_pose, (n, 1))
+    poses[:, 0] += np.linspace(-1.0, 1.0, n)
+    commands = Commands(poses, time=10.0 * np.arange(n))
+    effects = [typical(robot, catalogue()["creep"])]
+    found = correct(robot, commands, effects=effects, lowest=50.0, highest=3000.0, aim="middle")
+    assert found.reached.all()
+    plain = correct(robot, commands, lowest=50.0, highest=3000.0, aim="middle")
+    assert found.solution.tensions == pytest.approx(plain.solution.tensions, rel=1e-7)
