@@ -159,7 +159,7 @@ def balance_of(tables: Tables, low: Array, about: Array | None = None) -> tuple[
 
 
 def is_straight(tables: Tables, others: Tables) -> bool:
-    """Whether free platforms hang on straight cables whose ends and loads do not move along.
+    """Whether platforms hang on straight cables whose ends and loads do not move along.
 
     Args:
         tables, others: of the same rows at different poses.
@@ -167,25 +167,25 @@ def is_straight(tables: Tables, others: Tables) -> bool:
     ends = [*range(EXIT, EXIT + 3), *range(ANCHOR, ANCHOR + 3)]
     same = np.array_equal(tables.cables[..., ends], others.cables[..., ends])
     same &= np.array_equal(tables.load, others.load)
-    free = tables.screws.shape[1] == 0
-    return bool(same and free and not np.any(tables.cables[..., [RADIUS, WEIGHT, LIFT]]))
+    return bool(same and not np.any(tables.cables[..., [RADIUS, WEIGHT, LIFT]]))
 
 
-def straight_balance(tables: Tables, rows: NDArray[np.intp], poses: Array) -> tuple[Array, Array]:
-    """The same balance as :func:`balance_of` for poses (k, 7) of some rows (k,).
+def straight_balance(tables: Tables, rows: NDArray[np.intp], away: Array) -> tuple[Array, Array]:
+    """The same balance as :func:`balance_of` at displacements (k, d) [m] of rows (k,) of tables.
 
-    It is for tables that are :func:`is_straight`: the pulls' directions follow from the poses
-    alone, without rest lengths and tensions, ten times as fast.
+    Displacements are along the tables' coordinates, rotations times the robot's length. It is for
+    tables that are :func:`is_straight`: the pulls' directions follow from the poses alone, without
+    rest lengths and tensions, ten times as fast.
     """
     from seecr.compiled.turning import straight_balance_batch  # takes a while to import
 
-    (m, d), k = (tables.cables.shape[1], tables.n_dof), len(poses)
-    matrices, loads, places = np.empty((k, d, m)), np.empty((k, d)), np.array(poses, order="C")
+    (m, d), k = (tables.cables.shape[1], tables.n_dof), len(rows)
+    matrices, loads, moves = np.empty((k, d, m)), np.empty((k, d)), np.ascontiguousarray(away)
 
     def run(part: slice) -> None:
         straight_balance_batch(
-            tables.cables, tables.load, rows[part], places[part], tables.length,
-            matrices[part], loads[part],
+            tables.cables, tables.load, tables.poses, tables.screws, rows[part], moves[part],
+            tables.length, matrices[part], loads[part],
         )  # fmt: skip
 
     in_parts(run, k)

@@ -15,7 +15,7 @@ from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.errors import InputError
-from seecr.holding.balance import is_straight, straight_balance
+from seecr.holding.balance import is_straight
 from seecr.holding.distribution import tension_limits, wanted_tensions
 from seecr.holding.hanging import least_of_heavy
 from seecr.holding.inside import balances, counted_balance
@@ -390,8 +390,6 @@ class _Search:
         def balance(
             poses: Array, some: NDArray[np.intp], about: Array | None = None
         ) -> tuple[Array, Array]:
-            if straight:
-                return straight_balance(own, some, poses)
             part = replace(self.given.rows(rows[some]), pose=poses)
             return counted_balance(self._tables(part), limits.low, limits.high, about)
 
@@ -401,7 +399,7 @@ class _Search:
 
         return Reaching.within(
             self.robot, self.given.pose[rows], balance, stays, (limits.low, limits.high),
-            scale[rows], fix_position=fix_position,
+            scale[rows], fix_position=fix_position, straight=own if straight else None,
         )  # fmt: skip
 
     def _nearest(self, rows: NDArray[np.intp], scale: Array, fix_position: bool) -> Nearest:
