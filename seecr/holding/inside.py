@@ -42,6 +42,8 @@ _ROUNDS, _HALVED, _ENOUGH = 14, 7, 1e-10
 _PULLS = 1e-3
 # Part of the load that may stay unbalanced if the matrix is singular.
 _BALANCED = 1e-9
+# Part of that by which a search for any tensions may itself be off.
+_PART = 1e-2
 # Least tightness [weight]: the cable is then half as long again as its span.
 _LOOSEST = 12.0**-0.5
 # Letting cables hang loosely gains less than this many of their weights.
@@ -277,11 +279,31 @@ def can_balance(
     matrices: Array, loads: Array, low: Array, high: Array, scale: Array
 ) -> NDArray[np.bool_]:
     """(n,) whether tensions within limits balance A tau = load; see :func:`innermost`."""
-    margins = _innermost(matrices, loads, low, high, scale)[0]
-    out, odd = margins >= -_BALANCED * scale, np.flatnonzero(np.isnan(margins))
+    found = _decided(matrices, loads, low, high, scale)
+    out, odd = found > 0.0, np.flatnonzero(np.isnan(found))
     if len(odd):
         out[odd] = distribute(matrices[odd], loads[odd], low[odd], low[odd], high[odd])[1]
     return np.asarray(out)
+
+
+def _decided(matrices: Array, loads: Array, low: Array, high: Array, scale: Array) -> Array:
+    """(n,) positive where tensions balance, to rounding; NaN where W is singular or too narrow."""
+    from seecr.compiled.feasible import MOST, feasible_of  # takes a while to import
+
+    room, spare = _BALANCED * scale, matrices.shape[2] - matrices.shape[1]
+    if not 0 <= spare <= MOST:
+        return _innermost(matrices, loads, low, high, scale)[0] + room
+    whole, load, least, most = map(np.ascontiguousarray, (matrices, loads, low, high))
+    out = np.empty(len(whole))
+
+    def run(part: slice) -> None:
+        feasible_of(
+            whole[part], load[part], least[part], most[part], room[part], _PART * room[part],
+            out[part],
+        )  # fmt: skip
+
+    in_parts(run, len(whole))
+    return out
 
 
 def innermost(
