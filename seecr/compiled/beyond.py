@@ -14,6 +14,8 @@ from seecr.compiled.margin import null_space
 
 # Lines that cross at less than this angle [rad] are parallel.
 _PARALLEL = 1e-9
+# Sums that differ by less than this part are equal.
+_SAME = 1e-12
 
 
 @jit_inner
@@ -58,8 +60,9 @@ def least_beyond(matrix, load, low, high, tension):
     for k in range(more, 2):
         null[m + k - more, k] = 1.0
     best, at_x, at_y = np.inf, 0.0, 0.0
-    for i in range(n):
-        for j in range(i):
+    # from the last cable on: of equal sums the first cables exceed their limits
+    for i in range(n - 1, -1, -1):
+        for j in range(i - 1, -1, -1):
             for side in range(4):
                 to_i, to_j = ends[i, side % 2], ends[j, side // 2]
                 if not (np.isfinite(to_i) and np.isfinite(to_j)):
@@ -67,7 +70,7 @@ def least_beyond(matrix, load, low, high, tension):
                 crosses, x, y = _crossing(null, i, j, to_i, to_j)
                 if crosses:
                     total = _exceeding(particular, null, x, y, low, high, tension)
-                    if total < best:
+                    if total < (1.0 - _SAME) * best:
                         best, at_x, at_y = total, x, y
     _exceeding(particular, null, at_x, at_y, low, high, tension)
     return best < np.inf

@@ -273,7 +273,8 @@ def test_the_lower_limit_is_told_whatever_its_size(size: float) -> None:
 def test_a_search_for_a_reason_that_fails_gives_none(monkeypatch: pytest.MonkeyPatch) -> None:
     ended = SimpleNamespace(status=4, x=None)
     monkeypatch.setattr("scipy.optimize.linprog", lambda *_, **__: ended)
-    said = why_not_held(np.ones((1, 1)), np.ones(1), np.zeros(1), np.full(1, 0.5), ["a"])
+    low, high = np.zeros(4), np.full(4, 0.2)
+    said = why_not_held(np.ones((1, 4)), np.ones(1), low, high, list("abcd"))
     assert said == "no tensions within the limits balance the load there"
 
 
