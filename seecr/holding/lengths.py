@@ -94,11 +94,11 @@ def hold_again(tables: Tables, held: Held, aim: Array, low: Array, high: Array) 
         held: as held before. aim, low, high: as for :func:`hold`.
     """
     if bends(tables):
-        limits = limits_of(tables, low, high)
-        start = np.where(
-            held.fine[:, None], held.rest, rest_for(tables, first_tensions(tables, limits[0]))
-        )
-        return _hold_bent(tables, aim, low, limits, _ROUNDS, start)
+        out = _hold(tables, aim, *limits_of(tables, low, high), _ROUNDS, held.rest)
+        lost = np.flatnonzero(~out.fine)
+        if len(lost):
+            out.put(lost, hold(take(tables, lost), aim[lost], low, high))
+        return out
     rest = rest_for(tables, held.tensions)
     slack = _slack(tables, held.tensions, limits_of(tables, low, high)[0])
     return Held(_loosened(tables, rest, slack & held.fine[:, None]), held.tensions, held.fine)

@@ -40,6 +40,8 @@ alone.
 
 # Rounds for history or users' laws, and the error of the pose at which they end [robot's length].
 _ROUNDS, _MISSED = 40, 1e-10
+# Round from which lengths of poses that come no nearer are changed by half as much.
+_SWINGS = 8
 # A pose counts as reached if it is missed by less than this [m, and rad times the length].
 _REACHED = 1e-6
 # Strain of a cable up to which the nearest poses are sought where no highest tension is given:
@@ -416,8 +418,8 @@ class _Search:
 
     def _lengths(self, commands: Commands, held: Held) -> tuple[Array, Prediction]:
         """Told lengths that pay out the rest lengths of ``held``, and the prediction with them."""
-        limits = self.limits
-        for _ in range(_ROUNDS):
+        limits, before = self.limits, np.full(len(commands), np.inf)
+        for number in range(_ROUNDS):
             told = told_lengths(self.robot, commands, self.effects, held.rest)
             trial = replace(commands, lengths=told, told=True)
             prediction = Experiment(self.robot, trial).predict(self.effects)
@@ -426,7 +428,12 @@ class _Search:
             missed = np.abs(pose_difference(prediction.pose, commands.pose)).max(axis=1)
             if np.all(missed[held.fine] <= _MISSED * self.robot.length):
                 break
+            last = held.rest
             held = hold_again(prediction.tables, held, limits.aim, limits.low, limits.high)
+            # a cable at the edge of sticking goes to and fro between two lengths: half way then
+            swings = (number >= _SWINGS) & (missed >= 0.9 * before)
+            held.rest = np.where(swings[:, None], 0.5 * (last + held.rest), held.rest)
+            before = missed
         return told, prediction
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot
 from seecr.holding.balance import straight_balance
-from seecr.holding.distribution import balanced, distribute
+from seecr.holding.distribution import balanced, distribute, nearly_balanced
 from seecr.holding.inside import can_balance
 from seecr.pose import Array, pose_add, pose_difference
 from seecr.statics.tables import Tables
@@ -161,8 +161,11 @@ class Reaching:
 
     def lack(self, away: Array, rows: Rows) -> tuple[Array, NDArray[np.bool_]]:
         """(k,) approximate residual of the balance [load]; and whether the pose can be held."""
-        least, (matrix, load) = self.least[rows], self.at(away, rows)
-        tensions, held = distribute(matrix, load, least, least, self.most[rows])
+        least, most, (matrix, load) = self.least[rows], self.most[rows], self.at(away, rows)
+        if matrix.shape[2] < matrix.shape[1]:
+            tensions, held = nearly_balanced(matrix, load, least, most), np.zeros(len(rows), bool)
+        else:
+            tensions, held = distribute(matrix, load, least, least, most)
         left = np.abs(np.einsum("ndm,nm->nd", matrix, tensions) - load).max(axis=1)
         return left / self.scale[rows], held
 
@@ -174,9 +177,11 @@ class Reaching:
         """Starting points, held or not, with the tensions that come nearest to balance."""
         if len(rows) == 0:
             return Spots(away, rows, np.empty((0, self.least.shape[1])), np.empty(0))
-        each = zip(rows, *self.at(away, rows), strict=True)
-        found = [balanced(a, load, self.least[i], self.most[i]) for i, a, load in each]
-        tensions = np.array([one for one, _ in found]).reshape(len(rows), self.least.shape[1])
+        matrix, load = self.at(away, rows)
+        least, most = self.least[rows], self.most[rows]
+        tensions, held = distribute(matrix, load, least, least, most)
+        for i in np.flatnonzero(~held):
+            tensions[i] = balanced(matrix[i], load[i], least[i], most[i])[0]
         # the balance linearised at these tensions
         matrix, load = self.at(away, rows, tensions)
         left = np.abs(np.einsum("ndm,nm->nd", matrix, tensions) - load).max(axis=1)
