@@ -9,9 +9,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from seecr.compiled.algebra import copy_vector, solve_3x3
 from seecr.compiled.cable import cable_pull
 from seecr.compiled.change import (
+    add_load,
     make_change_space,
     moved_arm,
     place_platform,
@@ -29,6 +32,7 @@ from seecr.compiled.columns import (
     REST,
     SLACK,
     STRAIN,
+    TENSION,
     UP,
     WEIGHT,
     WINCH_SIDE,
@@ -113,31 +117,39 @@ def _change(row, start, move, up, guess, space):
 
 
 @jit_allocating
-def change_by_length(
-    cables, load, poses, screws, deviation, values, length, guess, gradient, tension
+def pull_and_change(
+    cables, load, poses, screws, deviation, values, length, guess, gradient, pulls, by_length,
+    tension,
 ):  # fmt: skip
-    """Derivatives by each cable's rest length: of the gradient (n, m, d), of its tension (n, m).
+    """Gradient (n, d) and tensions (n, m) [N], and their derivatives by each cable's rest length.
 
-    NaN where a cable's equations could not be solved. Both outputs [N/m] are filled.
+    The derivatives [N/m] are ``by_length`` (n, m, d) of the gradient and ``tension`` (n, m) of each
+    cable's own tension. NaN where a cable's equations could not be solved. All four are filled;
+    ``guess`` (n, m, 3) is overwritten with the catenaries found.
     """
     n, m = cables.shape[:2]
-    space, per = make_change_space(screws.shape[1]), 1.0 / length
-    place, start, move, keep = space[0], space[3], space[4], space[5]
+    space, per, total = make_change_space(screws.shape[1]), 1.0 / length, np.empty(6)
+    place, start, move, one = space[0], space[3], space[4], space[11]
     for r in range(n):
         pose, up = poses[r], load[r, UP:]
         place_platform(screws[r], values[r], length, pose, deviation[r], space)
+        total[:] = 0.0
         for i in range(m):
             row = cables[r, i]
             a, b, c, dx, dy, dz = moved_arm(row[ANCHOR : ANCHOR + 3], pose, place)
             start[0], start[1], start[2] = pose[0] + a, pose[1] + b, pose[2] + c
             move[0], move[1], move[2] = place[0] + dx, place[1] + dy, place[2] + dz
-            copy_vector(guess[r, i], keep)
-            tension[r, i] = _change(row, start, move, up, keep, space)
+            tension[r, i] = _change(row, start, move, up, guess[r, i], space)
+            force, pulls[r, i] = space[6], space[9][TENSION]
             if math.isnan(tension[r, i]):
-                move[0] = math.nan
-            space[11][:] = 0.0
-            take_force(a + dx, b + dy, c + dz, move[0], move[1], move[2], per, space[11])
-            put_gradient(space, gradient[r, i])
+                move[0] = force[0] = math.nan
+            take_force(a + dx, b + dy, c + dz, force[0], force[1], force[2], per, total)
+            one[:] = 0.0
+            take_force(a + dx, b + dy, c + dz, move[0], move[1], move[2], per, one)
+            put_gradient(space, by_length[r, i])
+        copy_vector(total, one)
+        add_load(1.0, load[r], pose, per, space)
+        put_gradient(space, gradient[r])
 
 
 @jit_allocating

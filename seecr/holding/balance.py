@@ -47,18 +47,22 @@ class Rates:
     by_length: Array
     pull: Array
 
+    def only(self, rows: NDArray[np.bool_]) -> Rates:
+        """Some rows (n,)."""
+        return Rates(self.by_tension[rows], self.by_length[rows], self.pull[rows])
+
     def load(self, at: batch.Evaluation) -> Array:
         """The load (n, d) [N] to be balanced, at an evaluation with these derivatives."""
         made = np.einsum("ndm,nm->nd", self.by_tension, at.states[..., TENSION])
         return np.asarray(made - at.gradient)
 
 
-def rates_of(tables: Tables, at: batch.Evaluation) -> Rates:
-    """The derivatives for tables at an evaluation of them."""
-    pull, by_length = batch.change_by_length(tables, at)
+def linearised(tables: Tables, start: batch.Evaluation) -> tuple[batch.Evaluation, Rates]:
+    """The balance of tables at the deviations of ``start``, and its derivatives there."""
+    at, pull, by_length = batch.pull_and_change(tables, start)
     pulls = np.broadcast_to(by_length[:, None, :] != 0.0, pull.shape)
     each = np.divide(pull, by_length[:, None, :], out=np.zeros_like(pull), where=pulls)
-    return Rates(each, by_length, pull)
+    return at, Rates(each, by_length, pull)
 
 
 def with_rest(tables: Tables, rest: Array) -> Tables:
@@ -153,8 +157,7 @@ def balance_of(tables: Tables, low: Array, about: Array | None = None) -> tuple[
     now = with_rest(
         tables, rest_for(tables, first_tensions(tables, low) if about is None else about)
     )
-    at = batch.evaluate(now, here(now), threads=None)
-    rates = rates_of(now, at)
+    at, rates = linearised(now, here(now))
     return rates.by_tension, rates.load(at)
 
 

@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 
 from seecr.compiled.columns import REST, TENSION, WEIGHT
 from seecr.holding.balance import (
+    Rates,
     balance_of,
     bends,
     first_tensions,
     here,
+    linearised,
     loose_rest,
     next_rest,
-    rates_of,
     tightness,
     with_rest,
 )
@@ -144,9 +145,9 @@ def _tightened(tables: Tables, least: Array, most: Array, hopeless: float) -> In
     rows, bent, start = np.arange(n), bends(tables), here(tables)
     for k in range(_ROUNDS if bent else 1):
         now = with_rest(take(tables, rows), out.rest[rows])
-        at = batch.evaluate(now, batch.take_evaluation(start, rows), threads=None)
+        at, rates = linearised(now, batch.take_evaluation(start, rows))
         batch.put_evaluation(start, rows, at)
-        rates, own = rates_of(now, at), at.states[..., TENSION]
+        own = at.states[..., TENSION]
         out.matrices[rows], out.loads[rows] = rates.by_tension, rates.load(at)
         out.margins[rows], out.tensions[rows] = innermost(
             rates.by_tension, out.loads[rows], least[rows], most[rows], now.scale
@@ -197,15 +198,15 @@ class _Line:
         return np.where(self.loose, loose_rest(law, np.where(self.loose, wanted, 1.0))[0], tight)
 
 
-def _line_about(tables: Tables, at: batch.Evaluation, size: Array) -> _Line:
+def _line_about(tables: Tables, at: batch.Evaluation, rates: Rates, size: Array) -> _Line:
     """The balance linearised at an evaluation.
 
     Args:
         tables: of n poses.
-        at: an evaluation of them.
+        at, rates: an evaluation of them, and its derivatives.
         size: (n, m) [N] tightness of cables that may be loose, NaN for all others.
     """
-    rates, loose, tension = rates_of(tables, at), ~np.isnan(size), at.states[..., TENSION]
+    loose, tension = ~np.isnan(size), at.states[..., TENSION]
     value = np.where(loose, size, tension)
     longer = loose_rest(tables, np.where(loose, size, 1.0))[1]
     matrix = np.where(loose[:, None], rates.pull * longer[:, None], rates.by_tension)
@@ -259,9 +260,9 @@ def _hang(
     left, start = np.arange(len(rest)), here(tables)
     for _ in range(_NEWTON):
         now = with_rest(take(tables, left), rest[left])
-        at = batch.evaluate(now, batch.take_evaluation(start, left), threads=None)
+        at, rates = linearised(now, batch.take_evaluation(start, left))
         batch.put_evaluation(start, left, at)
-        line = _line_about(now, at, size[left])
+        line = _line_about(now, at, rates, size[left])
         upper = np.where(line.loose, line.value + high[left] - line.tension, high[left])
         upper = np.maximum(upper, least[left])
         value, possible = distribute(line.matrix, line.load, line.value, least[left], upper)

@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 
 from seecr.compiled.columns import TENSION
 from seecr.compiled.outcomes import TOLERANCE
-from seecr.holding.balance import Rates, bends, first_tensions, here, next_rest, rates_of, with_rest
+from seecr.holding.balance import (
+    Rates,
+    bends,
+    first_tensions,
+    here,
+    linearised,
+    next_rest,
+    with_rest,
+)
 from seecr.holding.distribution import distribute
 from seecr.holding.hanging import bridged_lengths, rest_for
 from seecr.holding.inside import Inside, farthest_inside, limits_of
@@ -110,8 +118,7 @@ def _hold_straight(tables: Tables, aim: Array, least: Array, most: Array, rounds
     The tensions are found at once, and the lengths for them from each cable's own law.
     """
     now = with_rest(tables, rest_for(tables, first_tensions(tables, least)))
-    at = batch.evaluate(now, here(now), threads=None)
-    rates = rates_of(now, at)
+    at, rates = linearised(now, here(now))
     load = rates.load(at)
     wanted, possible = distribute(rates.by_tension, load, aim, least, most)
     lack = np.abs(np.einsum("ndm,nm->nd", rates.by_tension, wanted) - load).max(axis=1)
@@ -185,15 +192,16 @@ def _hold(
     start, short = here(tables), np.full(n, np.inf)
     for _ in range(rounds):
         now = with_rest(take(tables, rows), out.rest[rows])
-        at = batch.evaluate(now, batch.take_evaluation(start, rows), threads=None)
+        at, rates = linearised(now, batch.take_evaluation(start, rows))
         batch.put_evaluation(start, rows, at)
         missed = np.abs(at.states[..., TENSION] - wanted).max(axis=1)
         fine = (at.residual <= _BALANCED) & (missed <= _NONE * now.scale)
         out.fine[rows] = fine
-        rows, now, at = rows[~fine], take(now, ~fine), batch.take_evaluation(at, ~fine)
-        if len(rows) == 0:
+        if fine.all():
             break
-        rates = rates_of(now, at)
+        if fine.any():
+            rows, now, at = rows[~fine], take(now, ~fine), batch.take_evaluation(at, ~fine)
+            rates = rates.only(~fine)
         # a cable that has just gone slack has no derivatives: those of when it pulled are near
         idle = rates.by_length >= 0.0
         rates.by_tension = np.where(idle[:, None, :], known.by_tension[rows], rates.by_tension)

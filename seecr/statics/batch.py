@@ -258,27 +258,34 @@ def change_by_cable(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array,
     return _solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, m * plus.n_dof))
 
 
-def change_by_length(tables: Tables, at: Evaluation) -> tuple[Array, Array]:
-    """Derivatives by each cable's rest length: gradient (n, d, m), its own tension (n, m) [N/m].
+def pull_and_change(tables: Tables, at: Evaluation) -> tuple[Evaluation, Array, Array]:
+    """Wrench and tensions at the deviations of ``at``, and derivatives by each cable's rest length.
 
-    Args:
-        tables: of n poses.
-        at: where the platform is; nothing is solved.
+    Returns:
+        gradient, residual, tensions and catenaries, without a stiffness; and the derivatives [N/m]
+        of the gradient, (n, d, m), and of each cable's own tension, (n, m).
     """
     from seecr.compiled import lengthening  # takes a while to import
 
-    n, m = tables.cables.shape[:2]
-    gradient, tension = np.empty((n, m, tables.n_dof)), np.empty((n, m))
+    (n, m), d = tables.cables.shape[:2], tables.n_dof
+    out, pulls = Evaluation.empty(n, m, d), np.empty((n, m))
+    out.deviation[:], out.values[:], out.guess[:] = at.deviation, at.values, at.guess
+    gradient, tension = np.empty((n, m, d)), np.empty((n, m))
 
     def run(part: slice) -> None:
-        lengthening.change_by_length(
+        lengthening.pull_and_change(
             tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
-            at.deviation[part], at.values[part], tables.length, at.guess[part], gradient[part],
-            tension[part],
+            out.deviation[part], out.values[part], tables.length, out.guess[part],
+            out.gradient[part], pulls[part], gradient[part], tension[part],
         )  # fmt: skip
 
     in_parts(run, n)
-    return _solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, m * tables.n_dof))
+    out.states[..., TENSION] = pulls
+    lost = np.isnan(out.gradient).any(axis=1)
+    out.residual = np.where(lost, np.inf, residual_size(out.gradient) / tables.scale)
+    out.outcome = np.where(lost, CABLE_LAW, CONVERGED)
+    out.gradient[lost] = 0.0
+    return out, *_solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, m * d))
 
 
 def _solved(gradient: Array, tension: Array, failed: Array) -> tuple[Array, Array]:

@@ -177,11 +177,9 @@ class Reaching:
         """Starting points, held or not, with the tensions that come nearest to balance."""
         if len(rows) == 0:
             return Spots(away, rows, np.empty((0, self.least.shape[1])), np.empty(0))
-        matrix, load = self.at(away, rows)
-        least, most = self.least[rows], self.most[rows]
-        tensions, held = distribute(matrix, load, least, least, most)
-        for i in np.flatnonzero(~held):
-            tensions[i] = balanced(matrix[i], load[i], least[i], most[i])[0]
+        each = zip(rows, *self.at(away, rows), strict=True)
+        found = [balanced(a, load, self.least[i], self.most[i]) for i, a, load in each]
+        tensions = np.array([one for one, _ in found]).reshape(len(rows), self.least.shape[1])
         # the balance linearised at these tensions
         matrix, load = self.at(away, rows, tensions)
         left = np.abs(np.einsum("ndm,nm->nd", matrix, tensions) - load).max(axis=1)

@@ -45,7 +45,9 @@ def test_derivatives_by_length_are_those_of_differences(
     if lifted:
         tables.cables[..., LIFT] = 2e-5
     at = batch.evaluate(tables, found.found)
-    pull, tension = batch.change_by_length(tables, at)
+    there, pull, tension = batch.pull_and_change(tables, at)
+    assert there.gradient == pytest.approx(at.gradient, abs=1e-11 * tables.scale.max())
+    assert there.states[..., TENSION] == pytest.approx(at.states[..., TENSION], rel=1e-12)
     sides = tables.lengthened(step), tables.lengthened(-step)
     force, own = batch.change_by_cable(*sides, at)
     assert np.all(tension < 0.0)
@@ -57,7 +59,7 @@ def test_a_slack_cable_does_not_change() -> None:
     found = predicted("demobot_cogiro", ())
     longer = with_rest(found.tables, rest_for(found.tables, np.full((5, 8), 0.7)))
     longer.cables[:, 3] = found.tables.lengthened(0.1).cables[:, 3]
-    pull, tension = batch.change_by_length(longer, here(longer))
+    _at, pull, tension = batch.pull_and_change(longer, here(longer))
     assert np.all(tension[:, 3] == 0.0) and np.all(pull[:, :, 3] == 0.0)
     assert np.all(np.delete(tension, 3, axis=1) < 0.0)
 
