@@ -57,7 +57,7 @@ def place_platform(screws, values, length, pose, deviation, space):
 
 
 @jit_inner
-def _moved_arm(point, pose, place):
+def moved_arm(point, pose, place):
     """Arm (3,) of a platform point at the commanded pose, and its change up to the current pose."""
     a, b, c = point[0], point[1], point[2]
     dx, dy, dz = rotated_less(pose[3], pose[4], pose[5], pose[6], a, b, c)
@@ -67,7 +67,7 @@ def _moved_arm(point, pose, place):
 
 
 @jit_inner
-def _take_force(ax, ay, az, fx, fy, fz, per, gradient):
+def take_force(ax, ay, az, fx, fy, fz, per, gradient):
     """Subtract a force on a platform point with a given arm from the gradient (6,)."""
     gradient[0] -= fx
     gradient[1] -= fy
@@ -82,7 +82,7 @@ def add_pull(sign, row, pose, up, per, guess, space):
     """Add a cable's part times ``sign`` to the gradient (6,); returns that of its tension."""
     place, start, move, keep = space[0], space[3], space[4], space[5]
     force, stiffness, slope, state, work, gradient = space[6:12]
-    a, b, c, dx, dy, dz = _moved_arm(row[ANCHOR : ANCHOR + 3], pose, place)
+    a, b, c, dx, dy, dz = moved_arm(row[ANCHOR : ANCHOR + 3], pose, place)
     start[0], start[1], start[2] = pose[0] + a, pose[1] + b, pose[2] + c
     move[0], move[1], move[2] = place[0] + dx, place[1] + dy, place[2] + dz
     copy_vector(guess, keep)
@@ -90,7 +90,7 @@ def add_pull(sign, row, pose, up, per, guess, space):
         gradient[0] = np.nan
         return np.nan
     fx, fy, fz = sign * force[0], sign * force[1], sign * force[2]
-    _take_force(a + dx, b + dy, c + dz, fx, fy, fz, per, gradient)
+    take_force(a + dx, b + dy, c + dz, fx, fy, fz, per, gradient)
     return sign * state[TENSION]
 
 
@@ -98,9 +98,9 @@ def add_pull(sign, row, pose, up, per, guess, space):
 def add_load(sign, load, pose, per, space):
     """Add the contribution of the weight and the external wrench, times ``sign``."""
     place, gradient = space[0], space[11]
-    a, b, c, dx, dy, dz = _moved_arm(load[CENTRE_OF_MASS : CENTRE_OF_MASS + 3], pose, place)
+    a, b, c, dx, dy, dz = moved_arm(load[CENTRE_OF_MASS : CENTRE_OF_MASS + 3], pose, place)
     fx, fy, fz = load[FORCE_OF_WEIGHT], load[FORCE_OF_WEIGHT + 1], load[FORCE_OF_WEIGHT + 2]
-    _take_force(a + dx, b + dy, c + dz, sign * fx, sign * fy, sign * fz, per, gradient)
+    take_force(a + dx, b + dy, c + dz, sign * fx, sign * fy, sign * fz, per, gradient)
     for k in range(3):
         gradient[k] -= sign * load[EXTERNAL_FORCE + k]
         gradient[3 + k] -= sign * load[EXTERNAL_MOMENT + k] * per

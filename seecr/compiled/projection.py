@@ -18,6 +18,8 @@ _NEARLY = 1e-9
 _MOST_EVER = 1e6
 # A proof that nothing balances must exceed rounding by this part.
 _PROVEN = 1e-10
+# Sweeps over the cables, and the change [largest tension] that ends them.
+_SWEEPS, _CHANGE = 60, 1e-9
 
 
 @jit_inner
@@ -171,3 +173,45 @@ def project_batch(matrix, load, aim, low, high, tension, outcome):
     """:func:`project` for n poses: (n, d, m), (n, d), (n, m) each; fills tension and outcome."""
     for r in range(matrix.shape[0]):
         outcome[r] = project(matrix[r], load[r], aim[r], low[r], high[r], tension[r])
+
+
+@jit_inner
+def _sweep(matrix, low, high, tension, left):
+    """Each tension once to where the residual is least with the others; the largest change."""
+    d, m = matrix.shape
+    most = 0.0
+    for i in range(m):
+        square, along = 0.0, 0.0
+        for k in range(d):
+            square += matrix[k, i] ** 2
+            along += matrix[k, i] * left[k]
+        if square == 0.0:
+            continue
+        new = min(max(tension[i] - along / square, low[i]), high[i])
+        change = new - tension[i]
+        tension[i] = new
+        most = max(most, abs(change))
+        for k in range(d):
+            left[k] += matrix[k, i] * change
+    return most
+
+
+@jit_allocating
+def nearest_batch(matrix, load, low, high, tension):
+    """Tensions (n, m) within limits that minimise |A tension - load|, one after another in turn.
+
+    Args:
+        matrix: (n, d, m). load: (n, d). low, high: (n, m). tension: (n, m), filled.
+    """
+    left = np.empty(matrix.shape[1])
+    for r in range(matrix.shape[0]):
+        largest = 0.0
+        for i in range(matrix.shape[2]):
+            tension[r, i] = low[r, i]
+        _unbalanced(matrix[r], load[r], tension[r], left)
+        for _ in range(_SWEEPS):
+            change = _sweep(matrix[r], low[r], high[r], tension[r], left)
+            for i in range(matrix.shape[2]):
+                largest = max(largest, tension[r, i])
+            if change <= _CHANGE * largest:
+                break

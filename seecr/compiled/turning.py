@@ -352,19 +352,28 @@ def turn_batch(
 
 
 @jit_allocating
-def straight_balance_batch(cables, load, rows, poses, length, matrices, loads):
-    """The balance of free platforms on straight cables at k poses; fills the last two.
+def straight_balance_batch(
+    cables, load, poses, screws, rows, away, length, matrices, loads
+):  # fmt: skip
+    """The balance of platforms on straight cables at k displaced poses; fills the last two.
 
     Args:
-        cables: (n, m, N_COLUMNS). load: (n, N_LOAD). rows: (k,) which of these each pose is for.
-        poses: (k, 7). length: [m].
-        matrices: (k, 6, m), loads: (k, 6) [N], torques over the length: matrix tau = load.
+        cables: (n, m, N_COLUMNS). load: (n, N_LOAD). poses: (n, 7). screws: (n, d or 0, 7).
+        rows: (k,) which of these each displacement is for.
+        away: (k, d) [m] displacements of a step's kind, rotations times the length.
+        length: [m].
+        matrices: (k, d, m), loads: (k, d) [N], torques over the length: matrix tau = load.
     """
     m, d = cables.shape[1], loads.shape[1]
-    space, place = make_turning_space(m, d, 0, 3), np.zeros(7)
-    place[3] = 1.0
-    for r in range(poses.shape[0]):
-        _balance(cables[rows[r]], load[rows[r]], poses[r], place, length, space)
+    space, still, values = make_turning_space(m, d, screws.shape[1], 3), np.zeros(7), np.zeros(d)
+    place, trial_values = space[7], space[8]
+    still[3] = 1.0
+    for r in range(rows.shape[0]):
+        row = rows[r]
+        advance(
+            still, values, away[r], length, screws[row], poses[row], place, trial_values, space[0]
+        )
+        _balance(cables[row], load[row], poses[row], place, length, space)
         for k in range(d):
             loads[r, k] = space[4][k]
             for i in range(m):

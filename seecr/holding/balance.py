@@ -28,8 +28,6 @@ from seecr.statics import batch
 from seecr.statics.tables import Tables
 from seecr.threads import in_parts
 
-# Step of a rest length for finite differences [robot's length].
-_STEP = 1e-5
 # Newton steps to the tightness of a cable.
 _TIGHTNESS = 60
 
@@ -49,19 +47,22 @@ class Rates:
     by_length: Array
     pull: Array
 
+    def only(self, rows: NDArray[np.bool_]) -> Rates:
+        """Some rows (n,)."""
+        return Rates(self.by_tension[rows], self.by_length[rows], self.pull[rows])
+
     def load(self, at: batch.Evaluation) -> Array:
         """The load (n, d) [N] to be balanced, at an evaluation with these derivatives."""
         made = np.einsum("ndm,nm->nd", self.by_tension, at.states[..., TENSION])
         return np.asarray(made - at.gradient)
 
 
-def rates_of(tables: Tables, at: batch.Evaluation) -> Rates:
-    """The derivatives for tables at an evaluation of them."""
-    step = _STEP * tables.length
-    force, tension = batch.change_by_cable(tables, tables.lengthened(-step), at)
-    pulls = np.broadcast_to(tension[:, None, :] != 0.0, force.shape)
-    each = np.divide(force, tension[:, None, :], out=np.zeros_like(force), where=pulls)
-    return Rates(each, tension / step, force / step)
+def linearised(tables: Tables, start: batch.Evaluation) -> tuple[batch.Evaluation, Rates]:
+    """The balance of tables at the deviations of ``start``, and its derivatives there."""
+    at, pull, by_length = batch.pull_and_change(tables, start)
+    pulls = np.broadcast_to(by_length[:, None, :] != 0.0, pull.shape)
+    each = np.divide(pull, by_length[:, None, :], out=np.zeros_like(pull), where=pulls)
+    return at, Rates(each, by_length, pull)
 
 
 def with_rest(tables: Tables, rest: Array) -> Tables:
@@ -90,8 +91,8 @@ def next_rest(tables: Tables, rest: Array, by_length: Array, now: Array, wanted:
     2 at most.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        # the tension of a plain cable is linear in 1/l0, so the slope over the step is exact
-        slope = -by_length * rest * (rest - _STEP * tables.length)
+        # the tension of a plain cable is linear in 1/l0
+        slope = -by_length * rest**2
         inverse = 1.0 / rest + (wanted - now) / slope * _hanging(tables, now, wanted)
         return np.asarray(rest / np.clip(inverse * rest, 0.5, 2.0))
 
@@ -156,13 +157,12 @@ def balance_of(tables: Tables, low: Array, about: Array | None = None) -> tuple[
     now = with_rest(
         tables, rest_for(tables, first_tensions(tables, low) if about is None else about)
     )
-    at = batch.evaluate(now, here(now), threads=None)
-    rates = rates_of(now, at)
+    at, rates = linearised(now, here(now))
     return rates.by_tension, rates.load(at)
 
 
 def is_straight(tables: Tables, others: Tables) -> bool:
-    """Whether free platforms hang on straight cables whose ends and loads do not move along.
+    """Whether platforms hang on straight cables whose ends and loads do not move along.
 
     Args:
         tables, others: of the same rows at different poses.
@@ -170,25 +170,25 @@ def is_straight(tables: Tables, others: Tables) -> bool:
     ends = [*range(EXIT, EXIT + 3), *range(ANCHOR, ANCHOR + 3)]
     same = np.array_equal(tables.cables[..., ends], others.cables[..., ends])
     same &= np.array_equal(tables.load, others.load)
-    free = tables.screws.shape[1] == 0
-    return bool(same and free and not np.any(tables.cables[..., [RADIUS, WEIGHT, LIFT]]))
+    return bool(same and not np.any(tables.cables[..., [RADIUS, WEIGHT, LIFT]]))
 
 
-def straight_balance(tables: Tables, rows: NDArray[np.intp], poses: Array) -> tuple[Array, Array]:
-    """The same balance as :func:`balance_of` for poses (k, 7) of some rows (k,).
+def straight_balance(tables: Tables, rows: NDArray[np.intp], away: Array) -> tuple[Array, Array]:
+    """The same balance as :func:`balance_of` at displacements (k, d) [m] of rows (k,) of tables.
 
-    It is for tables that are :func:`is_straight`: the pulls' directions follow from the poses
-    alone, without rest lengths and tensions, ten times as fast.
+    Displacements are along the tables' coordinates, rotations times the robot's length. It is for
+    tables that are :func:`is_straight`: the pulls' directions follow from the poses alone, without
+    rest lengths and tensions, ten times as fast.
     """
     from seecr.compiled.turning import straight_balance_batch  # takes a while to import
 
-    (m, d), k = (tables.cables.shape[1], tables.n_dof), len(poses)
-    matrices, loads, places = np.empty((k, d, m)), np.empty((k, d)), np.array(poses, order="C")
+    (m, d), k = (tables.cables.shape[1], tables.n_dof), len(rows)
+    matrices, loads, moves = np.empty((k, d, m)), np.empty((k, d)), np.ascontiguousarray(away)
 
     def run(part: slice) -> None:
         straight_balance_batch(
-            tables.cables, tables.load, rows[part], places[part], tables.length,
-            matrices[part], loads[part],
+            tables.cables, tables.load, tables.poses, tables.screws, rows[part], moves[part],
+            tables.length, matrices[part], loads[part],
         )  # fmt: skip
 
     in_parts(run, k)

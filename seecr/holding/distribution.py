@@ -106,6 +106,27 @@ def distribute(
     return tensions, outcome == FOUND
 
 
+def nearly_balanced(matrices: Array, loads: Array, low: Array, high: Array) -> Array:
+    """Tensions (n, m) within limits (n, m) [N] that come nearest to balance: of few cables.
+
+    They are exact but for rounding where the pulls of cables are far from parallel.
+
+    Args:
+        matrices: (n, d, m) with m < d. loads: (n, d).
+    """
+    from seecr.compiled.projection import nearest_batch  # slow to import
+
+    n, _, m = matrices.shape
+    tensions = np.empty((n, m))
+    whole, load, least, most = map(np.ascontiguousarray, (matrices, loads, low, high))
+
+    def run(part: slice) -> None:
+        nearest_batch(whole[part], load[part], least[part], most[part], tensions[part])
+
+    in_parts(run, n)
+    return tensions
+
+
 def balanced(matrix: Array, load: Array, low: Array, high: Array) -> tuple[Array, float]:
     """Tensions (m,) within limits that come nearest to balance, and |A tau - load| / |load|.
 

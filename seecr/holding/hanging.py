@@ -1,16 +1,17 @@
 """Cables with weight: their least tensions, and approximate lengths for given tensions.
 
-The lengths are those of inextensible catenaries, then stretched: starting values for Newton's
-method.
+The lengths are those of inextensible catenaries, then stretched as their law and history say:
+starting values for Newton's method.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from seecr.compiled.columns import ANCHOR, EA, EXIT, GAP, REST, UP, WEIGHT
+from seecr.compiled.columns import ANCHOR, EXIT, GAP, REST, UP, WEIGHT
 from seecr.pose import Array, quat_to_matrix
 from seecr.statics.tables import Tables
+from seecr.threads import in_parts
 
 # Least mean tension [weight of the cable], and the largest bend of a catenary, that are considered.
 _LEAST, _MOST_BENT = 0.8, 1.0
@@ -43,15 +44,31 @@ def _weights(tables: Tables) -> Array:
 
 
 def rest_for(tables: Tables, tensions: Array) -> Array:
-    """(n, m) [m] rest lengths with which cables have approximately these tensions (n, m) [N]."""
+    """(n, m) [m] rest lengths with which cables have these tensions (n, m) [N].
+
+    They are exact for cables without weight, and approximate for others.
+    """
     bridged, weight = bridged_lengths(tables), _weights(tables)
     if not weight.any():
-        return np.asarray(bridged / (1.0 + tensions / tables.cables[..., EA]))
+        return _straight_rest(tables, bridged, tensions)
     rise = _rises(tables)
     # the tension at the exit point includes the weight that hangs below it
     mean = tensions - 0.5 * weight * rise
     arcs = _arcs(0.5 * weight / np.maximum(mean, np.maximum(_LEAST * weight, 1e-300)), rise)
-    return np.asarray(bridged * arcs / (1.0 + np.maximum(mean, 0.0) / tables.cables[..., EA]))
+    return _straight_rest(tables, bridged * arcs, np.maximum(mean, 0.0))
+
+
+def _straight_rest(tables: Tables, spans: Array, tensions: Array) -> Array:
+    """(n, m) [m] rest lengths with which straight cables over these spans have these tensions."""
+    from seecr.compiled.lengthening import rest_lengths_for  # takes a while to import
+
+    out, pulls = np.empty_like(spans), np.array(tensions, order="C")
+
+    def run(part: slice) -> None:
+        rest_lengths_for(tables.cables[part], spans[part], pulls[part], out[part])
+
+    in_parts(run, len(spans))
+    return out
 
 
 def _arcs(light: Array, rise: Array) -> Array:

@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 
 from seecr.compiled.columns import REST, TENSION, WEIGHT
 from seecr.holding.balance import (
+    Rates,
     balance_of,
     bends,
     first_tensions,
     here,
+    linearised,
     loose_rest,
     next_rest,
-    rates_of,
     tightness,
     with_rest,
 )
@@ -42,6 +43,8 @@ _ROUNDS, _HALVED, _ENOUGH = 14, 7, 1e-10
 _PULLS = 1e-3
 # Part of the load that may stay unbalanced if the matrix is singular.
 _BALANCED = 1e-9
+# Part of that by which a search for any tensions may itself be off.
+_PART = 1e-2
 # Least tightness [weight]: the cable is then half as long again as its span.
 _LOOSEST = 12.0**-0.5
 # Letting cables hang loosely gains less than this many of their weights.
@@ -142,9 +145,9 @@ def _tightened(tables: Tables, least: Array, most: Array, hopeless: float) -> In
     rows, bent, start = np.arange(n), bends(tables), here(tables)
     for k in range(_ROUNDS if bent else 1):
         now = with_rest(take(tables, rows), out.rest[rows])
-        at = batch.evaluate(now, batch.take_evaluation(start, rows), threads=None)
+        at, rates = linearised(now, batch.take_evaluation(start, rows))
         batch.put_evaluation(start, rows, at)
-        rates, own = rates_of(now, at), at.states[..., TENSION]
+        own = at.states[..., TENSION]
         out.matrices[rows], out.loads[rows] = rates.by_tension, rates.load(at)
         out.margins[rows], out.tensions[rows] = innermost(
             rates.by_tension, out.loads[rows], least[rows], most[rows], now.scale
@@ -195,15 +198,15 @@ class _Line:
         return np.where(self.loose, loose_rest(law, np.where(self.loose, wanted, 1.0))[0], tight)
 
 
-def _line_about(tables: Tables, at: batch.Evaluation, size: Array) -> _Line:
+def _line_about(tables: Tables, at: batch.Evaluation, rates: Rates, size: Array) -> _Line:
     """The balance linearised at an evaluation.
 
     Args:
         tables: of n poses.
-        at: an evaluation of them.
+        at, rates: an evaluation of them, and its derivatives.
         size: (n, m) [N] tightness of cables that may be loose, NaN for all others.
     """
-    rates, loose, tension = rates_of(tables, at), ~np.isnan(size), at.states[..., TENSION]
+    loose, tension = ~np.isnan(size), at.states[..., TENSION]
     value = np.where(loose, size, tension)
     longer = loose_rest(tables, np.where(loose, size, 1.0))[1]
     matrix = np.where(loose[:, None], rates.pull * longer[:, None], rates.by_tension)
@@ -257,9 +260,9 @@ def _hang(
     left, start = np.arange(len(rest)), here(tables)
     for _ in range(_NEWTON):
         now = with_rest(take(tables, left), rest[left])
-        at = batch.evaluate(now, batch.take_evaluation(start, left), threads=None)
+        at, rates = linearised(now, batch.take_evaluation(start, left))
         batch.put_evaluation(start, left, at)
-        line = _line_about(now, at, size[left])
+        line = _line_about(now, at, rates, size[left])
         upper = np.where(line.loose, line.value + high[left] - line.tension, high[left])
         upper = np.maximum(upper, least[left])
         value, possible = distribute(line.matrix, line.load, line.value, least[left], upper)
@@ -277,11 +280,31 @@ def can_balance(
     matrices: Array, loads: Array, low: Array, high: Array, scale: Array
 ) -> NDArray[np.bool_]:
     """(n,) whether tensions within limits balance A tau = load; see :func:`innermost`."""
-    margins = _innermost(matrices, loads, low, high, scale)[0]
-    out, odd = margins >= -_BALANCED * scale, np.flatnonzero(np.isnan(margins))
+    found = _decided(matrices, loads, low, high, scale)
+    out, odd = found > 0.0, np.flatnonzero(np.isnan(found))
     if len(odd):
         out[odd] = distribute(matrices[odd], loads[odd], low[odd], low[odd], high[odd])[1]
     return np.asarray(out)
+
+
+def _decided(matrices: Array, loads: Array, low: Array, high: Array, scale: Array) -> Array:
+    """(n,) positive where tensions balance, to rounding; NaN where W is singular or too narrow."""
+    from seecr.compiled.feasible import MOST, feasible_of  # takes a while to import
+
+    room, spare = _BALANCED * scale, matrices.shape[2] - matrices.shape[1]
+    if not 0 <= spare <= MOST:
+        return _innermost(matrices, loads, low, high, scale)[0] + room
+    whole, load, least, most = map(np.ascontiguousarray, (matrices, loads, low, high))
+    out = np.empty(len(whole))
+
+    def run(part: slice) -> None:
+        feasible_of(
+            whole[part], load[part], least[part], most[part], room[part], _PART * room[part],
+            out[part],
+        )  # fmt: skip
+
+    in_parts(run, len(whole))
+    return out
 
 
 def innermost(

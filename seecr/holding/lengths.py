@@ -13,9 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.compiled.columns import STRAIN, TENSION
+from seecr.compiled.columns import TENSION
 from seecr.compiled.outcomes import TOLERANCE
-from seecr.holding.balance import Rates, bends, first_tensions, here, next_rest, rates_of, with_rest
+from seecr.holding.balance import (
+    Rates,
+    bends,
+    first_tensions,
+    here,
+    linearised,
+    next_rest,
+    with_rest,
+)
 from seecr.holding.distribution import distribute
 from seecr.holding.hanging import bridged_lengths, rest_for
 from seecr.holding.inside import Inside, farthest_inside, limits_of
@@ -49,23 +57,21 @@ class Held:
     Attributes:
         rest: (n, m) [m].
         tensions: (n, m) [N].
-        strains: (n, m).
         fine: (n,) bool, the pose can be held within the limits.
     """
 
     rest: Array
     tensions: Array
-    strains: Array
     fine: NDArray[np.bool_]
 
     def only(self, rows: NDArray[np.bool_]) -> Held:
         """Some rows (n,)."""
-        return Held(self.rest[rows], self.tensions[rows], self.strains[rows], self.fine[rows])
+        return Held(self.rest[rows], self.tensions[rows], self.fine[rows])
 
     def put(self, rows: NDArray[np.intp], other: Held) -> None:
         """Overwrite rows with those of another."""
         self.rest[rows], self.tensions[rows] = other.rest, other.tensions
-        self.strains[rows], self.fine[rows] = other.strains, other.fine
+        self.fine[rows] = other.fine
 
 
 def hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int = _ROUNDS) -> Held:
@@ -79,10 +85,61 @@ def hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int = _ROU
         rounds: most rounds of Newton's method.
     """
     least, most = limits_of(tables, low, high)
-    out = _hold(tables, aim, least, most, rounds, rest_for(tables, first_tensions(tables, least)))
+    if not bends(tables):
+        return _hold_straight(tables, aim, least, most, rounds)
+    return _hold_bent(
+        tables, aim, low, (least, most), rounds, rest_for(tables, first_tensions(tables, least))
+    )
+
+
+def hold_again(tables: Tables, held: Held, aim: Array, low: Array, high: Array) -> Held:
+    """Rest lengths that hold poses again, after nothing but the cables' history has changed.
+
+    On straight cables the tensions stay as they are: only the lengths for them are others.
+
+    Args:
+        tables: of n poses.
+        held: as held before. aim, low, high: as for :func:`hold`.
+    """
+    if bends(tables):
+        out = _hold(tables, aim, *limits_of(tables, low, high), _ROUNDS, held.rest)
+        lost = np.flatnonzero(~out.fine)
+        if len(lost):
+            out.put(lost, hold(take(tables, lost), aim[lost], low, high))
+        return out
+    rest = rest_for(tables, held.tensions)
+    slack = _slack(tables, held.tensions, limits_of(tables, low, high)[0])
+    return Held(_loosened(tables, rest, slack & held.fine[:, None]), held.tensions, held.fine)
+
+
+def _hold_straight(tables: Tables, aim: Array, least: Array, most: Array, rounds: int) -> Held:
+    """Hold poses on straight cables, whose pulls have directions that do not depend on the lengths.
+
+    The tensions are found at once, and the lengths for them from each cable's own law.
+    """
+    now = with_rest(tables, rest_for(tables, first_tensions(tables, least)))
+    at, rates = linearised(now, here(now))
+    load = rates.load(at)
+    wanted, possible = distribute(rates.by_tension, load, aim, least, most)
+    lack = np.abs(np.einsum("ndm,nm->nd", rates.by_tension, wanted) - load).max(axis=1)
+    rest = rest_for(tables, wanted)
+    rows = np.flatnonzero(possible | (lack < _NEAR * tables.scale))
+    if len(rows) == len(tables):
+        return _hold(tables, aim, least, most, rounds, rest, wanted)
+    out = Held(rest, wanted, np.zeros(len(tables), dtype=bool))
+    some = take(tables, rows), aim[rows], least[rows], most[rows], rounds, rest[rows], wanted[rows]
+    out.put(rows, _hold(*some))
+    return out
+
+
+def _hold_bent(
+    tables: Tables, aim: Array, low: Array, limits: tuple[Array, Array], rounds: int, rest: Array
+) -> Held:
+    """Hold poses on cables whose directions depend on their tensions, from rest lengths (n, m)."""
+    out = _hold(tables, aim, *limits, rounds, rest)
     lost = np.flatnonzero(~out.fine)
-    if len(lost) and tables.cables.shape[1] >= tables.n_dof and bends(tables):
-        _from_inside(out, lost, tables, aim, rounds, low, (least, most))
+    if len(lost) and tables.cables.shape[1] >= tables.n_dof:
+        _from_inside(out, lost, tables, aim, rounds, low, limits)
     return out
 
 
@@ -115,34 +172,40 @@ def _put_loose(out: Held, rows: NDArray[np.intp], tables: Tables, start: Inside)
     if len(rows):
         now = with_rest(tables, start.rest[start.loose])
         at = batch.evaluate(now, here(now), threads=None)
-        states = at.states[..., TENSION], at.states[..., STRAIN]
-        out.put(rows, Held(start.rest[start.loose], *states, np.ones(len(rows), dtype=bool)))
+        fine = np.ones(len(rows), dtype=bool)
+        out.put(rows, Held(start.rest[start.loose], at.states[..., TENSION], fine))
 
 
-def _hold(tables: Tables, aim: Array, least: Array, most: Array, rounds: int, rest: Array) -> Held:
-    """See :func:`hold`; with limits (n, m), and rest lengths (n, m) [m] to start from."""
+def _hold(
+    tables: Tables, aim: Array, least: Array, most: Array, rounds: int, rest: Array,
+    wanted: Array | None = None,
+) -> Held:  # fmt: skip
+    """See :func:`hold`; with limits (n, m), and rest lengths (n, m) [m] to start from.
+
+    Args:
+        wanted: (n, m) [N] tensions there if they are known to be those nearest to the aim.
+    """
     n, m = tables.cables.shape[:2]
-    out = Held(rest.copy(), np.zeros((n, m)), np.zeros((n, m)), np.zeros(n, dtype=bool))
-    rows, known, wanted = np.arange(n), None, out.tensions
+    out = Held(rest.copy(), np.zeros((n, m)), np.zeros(n, dtype=bool))
+    rows, wanted = np.arange(n), np.full((n, m), np.inf) if wanted is None else wanted
+    known = Rates(*(np.zeros((n, *each, m)) for each in ((tables.n_dof,), (), (tables.n_dof,))))
     start, short = here(tables), np.full(n, np.inf)
     for _ in range(rounds):
         now = with_rest(take(tables, rows), out.rest[rows])
-        at = batch.evaluate(now, batch.take_evaluation(start, rows), threads=None)
+        at, rates = linearised(now, batch.take_evaluation(start, rows))
         batch.put_evaluation(start, rows, at)
         missed = np.abs(at.states[..., TENSION] - wanted).max(axis=1)
         fine = (at.residual <= _BALANCED) & (missed <= _NONE * now.scale)
         out.fine[rows] = fine
-        rows, now, at = rows[~fine], take(now, ~fine), batch.take_evaluation(at, ~fine)
-        if len(rows) == 0:
+        if fine.all():
             break
-        rates = rates_of(now, at)
-        if known is not None:
-            # a cable that has just gone slack has no derivatives: those of when it pulled are near
-            idle = rates.by_length >= 0.0
-            rates.by_tension = np.where(idle[:, None, :], known.by_tension[rows], rates.by_tension)
-            rates.by_length = np.where(idle, known.by_length[rows], rates.by_length)
-        else:
-            known = Rates(rates.by_tension.copy(), rates.by_length.copy(), rates.pull)
+        if fine.any():
+            rows, now, at = rows[~fine], take(now, ~fine), batch.take_evaluation(at, ~fine)
+            rates = rates.only(~fine)
+        # a cable that has just gone slack has no derivatives: those of when it pulled are near
+        idle = rates.by_length >= 0.0
+        rates.by_tension = np.where(idle[:, None, :], known.by_tension[rows], rates.by_tension)
+        rates.by_length = np.where(idle, known.by_length[rows], rates.by_length)
         known.by_tension[rows], known.by_length[rows] = rates.by_tension, rates.by_length
         load = rates.load(at)
         wanted, possible = distribute(rates.by_tension, load, aim[rows], least[rows], most[rows])
@@ -155,13 +218,22 @@ def _hold(tables: Tables, aim: Array, least: Array, most: Array, rounds: int, re
         going = nears & np.isfinite(longer).all(axis=1)
         out.rest[rows[going]] = longer[going]
         rows, wanted = rows[going], wanted[going]
-    out.tensions, out.strains = start.states[..., TENSION], start.states[..., STRAIN]
+    out.tensions = start.states[..., TENSION]
     # rounding may keep a row that balances to nine digits from balancing to the last
     out.fine |= (start.residual < TOLERANCE) & _within(out.tensions, least, most, tables.scale)
-    slack = (out.tensions <= _NONE * tables.scale[:, None]) & (least <= 0.0)
-    longer = (1.0 + _MARGIN) * bridged_lengths(tables)
-    out.rest = np.where(slack & out.fine[:, None], longer, out.rest)
+    slack = _slack(tables, out.tensions, least) & out.fine[:, None]
+    out.rest = _loosened(tables, out.rest, slack)
     return out
+
+
+def _slack(tables: Tables, tensions: Array, least: Array) -> NDArray[np.bool_]:
+    """(n, m) cables that pull nothing, and may."""
+    return np.asarray((tensions <= _NONE * tables.scale[:, None]) & (least <= 0.0))
+
+
+def _loosened(tables: Tables, rest: Array, slack: NDArray[np.bool_]) -> Array:
+    """(n, m) [m] rest lengths with a margin in slack cables, which keeps them slack."""
+    return np.where(slack, (1.0 + _MARGIN) * bridged_lengths(tables), rest)
 
 
 def holds_firmly(tables: Tables, aim: Array, low: Array, high: Array) -> NDArray[np.bool_]:

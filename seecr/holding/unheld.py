@@ -1,7 +1,8 @@
 """Why a pose cannot be held: which tensions would have to be beyond their limits.
 
 The limits in the balance A tau = load are exceeded by as little as possible, in newtons summed over
-the cables: a linear program, whose solution exceeds few limits (HiGHS, by SciPy).
+the cables: a linear program, whose solution exceeds few limits. With up to two more cables than
+degrees of freedom all its corners are tried; else HiGHS solves it, by SciPy.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from seecr.pose import Array
 # A limit exceeded by less than this part of the load, or of the largest lower limit, is rounding; a
 # load below this part of that limit is none.
 _ROUNDING = 1e-7
+# Most cables beyond the degrees of freedom for which all corners are tried.
+_SPARE = 2
 # Most cables named in a sentence.
 _MOST = 3
 # How SciPy's linear program ends.
@@ -100,6 +103,20 @@ def _least_beyond(
     matrix: Array, load: Array, low: Array, high: Array, scale: float
 ) -> tuple[int, Array]:
     """How the search ended; (m,) [N] tensions above the upper or below the lower limits, or NaN."""
+    d, m = matrix.shape
+    if 0 <= m - d <= _SPARE:
+        from seecr.compiled.beyond import least_beyond  # takes a while to import
+
+        pulls, rows = np.empty(m), [np.array(one, order="C") for one in (matrix, load, low, high)]
+        if least_beyond(*rows, pulls):
+            return _FOUND, np.minimum(pulls - low, 0.0) + np.maximum(pulls - high, 0.0)
+    return _by_program(matrix, load, low, high, scale)
+
+
+def _by_program(
+    matrix: Array, load: Array, low: Array, high: Array, scale: float
+) -> tuple[int, Array]:
+    """The same by HiGHS, for any number of cables."""
     from scipy.optimize import linprog
 
     m = matrix.shape[1]

@@ -15,11 +15,11 @@ from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.errors import InputError
-from seecr.holding.balance import is_straight, straight_balance
+from seecr.holding.balance import is_straight
 from seecr.holding.distribution import tension_limits, wanted_tensions
 from seecr.holding.hanging import least_of_heavy
 from seecr.holding.inside import balances, counted_balance
-from seecr.holding.lengths import Held, hold, holds_firmly
+from seecr.holding.lengths import Held, hold, hold_again, holds_firmly
 from seecr.holding.unheld import why_not_held
 from seecr.inverse.nearest import Nearest, Reaching, nearest, poses_in_place
 from seecr.inverse.told import told_lengths
@@ -40,6 +40,8 @@ alone.
 
 # Rounds for history or users' laws, and the error of the pose at which they end [robot's length].
 _ROUNDS, _MISSED = 40, 1e-10
+# Round from which lengths of poses that come no nearer are changed by half as much.
+_SWINGS = 8
 # A pose counts as reached if it is missed by less than this [m, and rad times the length].
 _REACHED = 1e-6
 # Strain of a cable up to which the nearest poses are sought where no highest tension is given:
@@ -376,9 +378,8 @@ class _Search:
         trial = replace(commands, lengths=plain, told=True)
         return assemble(Experiment(self.robot, trial).setup(self.effects))
 
-    def _held(self, commands: Commands, past: Prediction | None = None) -> tuple[Held, Tables]:
-        tables = self._tables(commands) if past is None else past.tables
-        limits = self.limits
+    def _held(self, commands: Commands) -> tuple[Held, Tables]:
+        tables, limits = self._tables(commands), self.limits
         return hold(tables, limits.aim, limits.low, limits.high), tables
 
     def _reaching(self, rows: NDArray[np.intp], scale: Array, *, fix_position: bool) -> Reaching:
@@ -391,8 +392,6 @@ class _Search:
         def balance(
             poses: Array, some: NDArray[np.intp], about: Array | None = None
         ) -> tuple[Array, Array]:
-            if straight:
-                return straight_balance(own, some, poses)
             part = replace(self.given.rows(rows[some]), pose=poses)
             return counted_balance(self._tables(part), limits.low, limits.high, about)
 
@@ -402,7 +401,7 @@ class _Search:
 
         return Reaching.within(
             self.robot, self.given.pose[rows], balance, stays, (limits.low, limits.high),
-            scale[rows], fix_position=fix_position,
+            scale[rows], fix_position=fix_position, straight=own if straight else None,
         )  # fmt: skip
 
     def _nearest(self, rows: NDArray[np.intp], scale: Array, fix_position: bool) -> Nearest:
@@ -419,7 +418,8 @@ class _Search:
 
     def _lengths(self, commands: Commands, held: Held) -> tuple[Array, Prediction]:
         """Told lengths that pay out the rest lengths of ``held``, and the prediction with them."""
-        for _ in range(_ROUNDS):
+        limits, before = self.limits, np.full(len(commands), np.inf)
+        for number in range(_ROUNDS):
             told = told_lengths(self.robot, commands, self.effects, held.rest)
             trial = replace(commands, lengths=told, told=True)
             prediction = Experiment(self.robot, trial).predict(self.effects)
@@ -428,7 +428,12 @@ class _Search:
             missed = np.abs(pose_difference(prediction.pose, commands.pose)).max(axis=1)
             if np.all(missed[held.fine] <= _MISSED * self.robot.length):
                 break
-            held, _ = self._held(commands, prediction)
+            last = held.rest
+            held = hold_again(prediction.tables, held, limits.aim, limits.low, limits.high)
+            # a cable at the edge of sticking goes to and fro between two lengths: half way then
+            swings = (number >= _SWINGS) & (missed >= 0.9 * before)
+            held.rest = np.where(swings[:, None], 0.5 * (last + held.rest), held.rest)
+            before = missed
         return told, prediction
 
 

@@ -258,6 +258,36 @@ def change_by_cable(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array,
     return _solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, m * plus.n_dof))
 
 
+def pull_and_change(tables: Tables, at: Evaluation) -> tuple[Evaluation, Array, Array]:
+    """Wrench and tensions at the deviations of ``at``, and derivatives by each cable's rest length.
+
+    Returns:
+        gradient, residual, tensions and catenaries, without a stiffness; and the derivatives [N/m]
+        of the gradient, (n, d, m), and of each cable's own tension, (n, m).
+    """
+    from seecr.compiled import lengthening  # takes a while to import
+
+    (n, m), d = tables.cables.shape[:2], tables.n_dof
+    out, pulls = Evaluation.empty(n, m, d), np.empty((n, m))
+    out.deviation[:], out.values[:], out.guess[:] = at.deviation, at.values, at.guess
+    gradient, tension = np.empty((n, m, d)), np.empty((n, m))
+
+    def run(part: slice) -> None:
+        lengthening.pull_and_change(
+            tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
+            out.deviation[part], out.values[part], tables.length, out.guess[part],
+            out.gradient[part], pulls[part], gradient[part], tension[part],
+        )  # fmt: skip
+
+    in_parts(run, n)
+    out.states[..., TENSION] = pulls
+    lost = np.isnan(out.gradient).any(axis=1)
+    out.residual = np.where(lost, np.inf, residual_size(out.gradient) / tables.scale)
+    out.outcome = np.where(lost, CABLE_LAW, CONVERGED)
+    out.gradient[lost] = 0.0
+    return out, *_solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, m * d))
+
+
 def _solved(gradient: Array, tension: Array, failed: Array) -> tuple[Array, Array]:
     """Zero change for rows in which a cable's equations could not be solved beside the pose."""
     lost = np.isnan(failed).any(axis=1)

@@ -18,6 +18,7 @@ from seecr.inverse.nearest.problem import Reaching, Rows
 from seecr.inverse.nearest.screen import spread, toward
 from seecr.inverse.nearest.seeds import Candidates, about_wanted, from_sample
 from seecr.pose import Array
+from seecr.statics.tables import take
 
 # Searches per row; every so-many-th candidate is checked exactly, which is slow with sag.
 _SEARCHES, _EVERY = 1, 3
@@ -35,17 +36,18 @@ def part_of(problem: Reaching, rows: Rows) -> Reaching:
         balance=lambda poses, some, about=None: problem.balance(poses, rows[some], about),
         stays=lambda poses, some: problem.stays(poses, rows[some]),
         least=problem.least[rows], most=problem.most[rows], scale=problem.scale[rows],
+        straight=None if problem.straight is None else take(problem.straight, rows),
     )  # fmt: skip
 
 
-def firm_ends(problem: Reaching, poses: Array, ends: Array) -> Candidates:
+def firm_ends(problem: Reaching, places: Array, ends: Array) -> Candidates:
     """Firm poses near the wanted ones.
 
     Args:
-        poses: (k, 7) a sample of poses that can be held.
+        places: (k, 7) or (k, d) coordinates of a sample of poses that can be held.
         ends: (n, d) [m] displacements from the wanted poses to unstable ends of searches.
     """
-    first = from_sample(problem, poses).and_more(about_wanted(problem))
+    first = from_sample(problem, places).and_more(about_wanted(problem))
     firm = _firm_of(problem, Candidates(first.away[::_EVERY], first.rows[::_EVERY]))
     first = Candidates(*toward(problem, firm.away, firm.rows, problem.firm))
     few = spread(problem, first.away, first.rows, _SEARCHES)
@@ -58,7 +60,7 @@ def firm_ends(problem: Reaching, poses: Array, ends: Array) -> Candidates:
 def _out_to(problem: Reaching, firm: Candidates, ends: Array) -> Candidates:
     """Firm poses on straight lines from ends (n, d) to the reference and the nearest firm poses."""
     n, near = len(ends), ends.copy()
-    home = problem.to(np.tile(problem.robot.reference_pose, (n, 1)), np.arange(n))
+    home = problem.to(np.tile(problem.home, (n, 1)), np.arange(n))
     best, rows = nearest_of(firm)
     near[rows] = best
     twice = np.tile(ends, (2, 1))

@@ -36,7 +36,7 @@ def poses_in_place(problem: Reaching, tables: Tables) -> Array:
     _try_all(best, np.zeros((len(rows), len(problem.free))), rows)
     # those of straight cables without pulleys are near
     some = rows[turned.found & ~best.firm]
-    _try_all(best, problem.allowed(problem.to(turned.poses[some], some)), some)
+    _try_all(best, problem.allowed(problem.to(problem.coordinates(turned.poses[some]), some)), some)
     left, fresh = ~best.firm, np.flatnonzero(best.firm)
     while left.any():
         if len(fresh):
@@ -67,6 +67,6 @@ def _from_neighbours(best: Best, rows: Rows, fresh: Rows) -> Rows:
     near = cKDTree(place[fresh]).query(place[rows], k=min(_NEIGHBOURS, len(fresh)))[1]
     near = near.reshape(len(rows), -1)
     each, of = np.repeat(rows, near.shape[1]), fresh[near.ravel()]
-    turned = problem.to(problem.placed(best.away[of], of), each)
+    turned = problem.to(problem.moved(best.away[of], of), each)
     _try_all(best, problem.allowed(turned), each)
     return rows[best.firm[rows]]

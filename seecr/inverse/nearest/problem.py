@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot
-from seecr.holding.distribution import balanced, distribute
+from seecr.holding.balance import straight_balance
+from seecr.holding.distribution import balanced, distribute, nearly_balanced
 from seecr.holding.inside import can_balance
 from seecr.pose import Array, pose_add, pose_difference
+from seecr.statics.tables import Tables
 
 Rows = NDArray[np.intp]
 
@@ -59,6 +61,7 @@ class Reaching:
     most: Array  # (n, m) [N]
     scale: Array  # (n,) [N] load
     free: Array  # (d,) how far each coordinate may go from its wanted value: 0 or infinity
+    straight: Tables | None = None  # (n,) of the wanted poses; None if cables are not straight
 
     @classmethod
     def within(
@@ -71,12 +74,15 @@ class Reaching:
         scale: Array,
         *,
         fix_position: bool = False,
+        straight: Tables | None = None,
     ) -> Reaching:
         """The problem of wanted poses (n, 7).
 
         Args:
             limits: (m,) smallest and largest tensions [N]. scale: (n,) [N] load.
             fix_position: keep the position and change only the orientation.
+            straight: of the wanted poses, if they are :func:`seecr.holding.balance.is_straight`:
+                their balance then needs neither ``balance`` nor poses.
         """
         low, high = limits
         inside = _INSIDE * scale[:, None]
@@ -86,37 +92,60 @@ class Reaching:
         free = np.full(robot.n_dof, np.inf)
         if fix_position:
             free[~robot.hinges] = 0.0
-        return cls(robot, wanted, values, balance, stays, least, most, scale, free)
+        return cls(robot, wanted, values, balance, stays, least, most, scale, free, straight)
 
     @property
     def is_in_place(self) -> bool:
         """Whether positions are kept."""
         return not np.all(self.robot.hinges | (self.free > 0.0))
 
-    def placed(self, away: Array, rows: Rows) -> Array:
-        """Poses (k, 7) with displacements ``away`` from the wanted ones of rows."""
+    @property
+    def home(self) -> Array:
+        """The coordinates (1, 7) or (1, d) of the reference pose, see :meth:`coordinates`."""
+        return (
+            self.robot.reference_pose[None]
+            if self.values is None
+            else np.zeros_like(self.free)[None]
+        )
+
+    def coordinates(self, poses: Array) -> Array:
+        """Joint values (k, d) at poses (k, 7), which take a search; of free platforms the poses."""
+        return poses if self.values is None else values_of_pose(self.robot, poses)[0]
+
+    def moved(self, away: Array, rows: Rows) -> Array:
+        """The coordinates with displacements ``away`` from the wanted poses of rows."""
         change = away * np.where(self.robot.hinges, 1.0 / self.robot.length, 1.0)
         if self.values is None:
             return pose_add(self.wanted[rows], change)
-        return pose_of_values(self.robot, self.values[rows] + change)[0]
+        return np.asarray(self.values[rows] + change)
 
-    def to(self, poses: Array, rows: Rows) -> Array:
-        """(k, d) displacements of poses (k, 7) from the wanted ones of rows."""
+    def placed(self, away: Array, rows: Rows) -> Array:
+        """Poses (k, 7) with displacements ``away`` from the wanted ones of rows."""
+        there = self.moved(away, rows)
+        return there if self.values is None else pose_of_values(self.robot, there)[0]
+
+    def to(self, there: Array, rows: Rows) -> Array:
+        """(k, d) displacements from the wanted poses of rows to coordinates (k, 7) or (k, d)."""
         if self.values is None:
-            change = pose_difference(poses, self.wanted[rows])
+            change = pose_difference(there, self.wanted[rows])
         else:
-            change = values_of_pose(self.robot, poses)[0] - self.values[rows]
+            change = there - self.values[rows]
             shorter = np.mod(change + np.pi, 2.0 * np.pi) - np.pi  # the shorter way about a hinge
             change = np.where(self.robot.hinges, shorter, change)
         return change * np.where(self.robot.hinges, self.robot.length, 1.0)
 
     def at(self, away: Array, rows: Rows, about: Array | None = None) -> tuple[Array, Array]:
         """Balance (k, d, m) and (k, d) there, linearised in the tensions ``about`` (k, m)."""
+        if self.straight is not None:
+            return straight_balance(self.straight, rows, away)
         return self.balance(self.placed(away, rows), rows, about)
 
     def held(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
         """Whether the poses with these displacements can be held."""
-        return self.holds(self.placed(away, rows), rows)
+        if len(rows) == 0:
+            return np.zeros(0, dtype=bool)
+        limits = self.least[rows], self.most[rows]
+        return can_balance(*self.at(away, rows), *limits, self.scale[rows])
 
     def firm(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
         """Whether the platform is held and stable at these displacements, checked exactly."""
@@ -130,17 +159,13 @@ class Reaching:
         """Whether the platform is stable, at poses that are in balance or nearly so."""
         return self.stays(self.placed(away, rows), rows)
 
-    def holds(self, poses: Array, rows: Rows) -> NDArray[np.bool_]:
-        """Whether poses (k, 7) can be held under the loads of rows."""
-        if len(rows) == 0:
-            return np.zeros(0, dtype=bool)
-        limits = self.least[rows], self.most[rows]
-        return can_balance(*self.balance(poses, rows), *limits, self.scale[rows])
-
     def lack(self, away: Array, rows: Rows) -> tuple[Array, NDArray[np.bool_]]:
         """(k,) approximate residual of the balance [load]; and whether the pose can be held."""
-        least, (matrix, load) = self.least[rows], self.at(away, rows)
-        tensions, held = distribute(matrix, load, least, least, self.most[rows])
+        least, most, (matrix, load) = self.least[rows], self.most[rows], self.at(away, rows)
+        if matrix.shape[2] < matrix.shape[1]:
+            tensions, held = nearly_balanced(matrix, load, least, most), np.zeros(len(rows), bool)
+        else:
+            tensions, held = distribute(matrix, load, least, least, most)
         left = np.abs(np.einsum("ndm,nm->nd", matrix, tensions) - load).max(axis=1)
         return left / self.scale[rows], held
 

@@ -58,27 +58,27 @@ def nearest(problem: Reaching) -> Nearest:
     best, rows = Best.none(problem), np.arange(len(problem.wanted))
     start = problem.start(np.zeros((len(rows), len(problem.free))), rows)
     best.keep(inward(problem, tightened(problem, start)))
-    poses = sample(problem)
-    first = from_sample(problem, poses).and_more(about_wanted(problem))
+    places = sample(problem)
+    first = from_sample(problem, places).and_more(about_wanted(problem))
     best.search(first, _FIRST)
     if not best.found.any():
         return Nearest(problem.wanted.copy(), best.found, best.firm, best.found.copy())
     best.search(about_answers(problem, best.away, np.flatnonzero(best.found)), _SHARED)
-    best.firm_ones(poses)
+    best.firm_ones(places)
     settled = best.settled() & best.firm
     return Nearest(problem.placed(best.away, rows), best.found, best.firm, settled)
 
 
 def any_that_stays(problem: Reaching) -> Best:
     """Any poses at which the platform is held and stable, near or far, if some are found."""
-    best, poses = Best.none(problem), sample(problem)
-    first = from_sample(problem, poses).and_more(about_wanted(problem))
+    best, places = Best.none(problem), sample(problem)
+    first = from_sample(problem, places).and_more(about_wanted(problem))
     spots = screened(problem, first, _FIRST)
     best.keep(spots)
     spots = spots.only(~best.firm[spots.rows])
     if len(spots.rows):
         best.keep(inward(problem, spots))
-        best.firm_ones(poses)
+        best.firm_ones(places)
     return best
 
 
@@ -131,11 +131,11 @@ class Best:
         self.away[rows], self.tensions[rows] = other.away, other.tensions
         self.found[rows], self.firm[rows], self.loose[rows] = other.found, other.firm, other.loose
 
-    def firm_ones(self, poses: Array) -> None:
+    def firm_ones(self, places: Array) -> None:
         """Where a search ended nearer but unstable: the nearest stable pose.
 
         Args:
-            poses: (k, 7) a sample of poses that can be held.
+            places: (k, 7) or (k, d) coordinates of a sample of poses that can be held.
         """
         size = np.where(self.firm, np.linalg.norm(self.away, axis=1), np.inf)
         end = np.linalg.norm(self.loose, axis=1)
@@ -143,7 +143,7 @@ class Best:
         if len(rows) == 0:
             return
         part = part_of(self.problem, rows)
-        away, some = nearest_of(firm_ends(part, poses, self.loose[rows]))
+        away, some = nearest_of(firm_ends(part, places, self.loose[rows]))
         if len(some) == 0:
             return
         away = at_random(part, away, some)

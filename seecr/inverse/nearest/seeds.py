@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seecr.description.joints import pose_of_values
 from seecr.description.robot import Robot
 from seecr.inverse.nearest.problem import Reaching, Rows
 from seecr.pose import Array, quat_from_rotvec
@@ -38,17 +37,19 @@ class Candidates:
 
 
 def sample(problem: Reaching) -> Array:
-    """The reference pose, and poses (k, 7) that can be held under the first row's load.
+    """Coordinates (k, 7) or (k, d) of the reference pose, and of poses that can be held.
 
-    Only the reference pose if positions are kept, since the others are at other positions.
+    They can be held under the first row's load. Only the reference pose if positions are kept,
+    since the others are at other positions.
     """
     if problem.is_in_place:
-        return problem.robot.reference_pose[None]
+        return problem.home
     random = np.random.default_rng(0)
     draw = _turned if problem.values is None else _on_joints
-    poses = draw(problem.robot, random)
-    held = problem.holds(poses, np.zeros(len(poses), dtype=np.intp))
-    return np.concatenate([problem.robot.reference_pose[None], poses[held]])
+    places = draw(problem.robot, random)
+    rows = np.zeros(len(places), dtype=np.intp)
+    held = problem.held(problem.to(places, rows), rows)
+    return np.concatenate([problem.home, places[held]])
 
 
 def _box(robot: Robot) -> Array:
@@ -68,22 +69,23 @@ def _turned(robot: Robot, random: np.random.Generator) -> Array:
 
 
 def _on_joints(robot: Robot, random: np.random.Generator) -> Array:
-    """Poses of a platform on joints: slides over the box, hinges at all angles."""
+    """Values of a platform's joints: slides over the box, hinges at all angles."""
     values, box = np.zeros((_SAMPLE, robot.n_dof)), _box(robot) - robot.reference_pose[:3]
     for i, joint in enumerate(robot.joints):
         along = box @ joint.axis
         slides = joint.kind == "slide"
         low, high = (along.min(), along.max()) if slides else (-np.pi, np.pi)
         values[:, i] = random.uniform(low, high, _SAMPLE)
-    return pose_of_values(robot, values)[0]
+    return values
 
 
-def from_sample(problem: Reaching, poses: Array) -> Candidates:
+def from_sample(problem: Reaching, places: Array) -> Candidates:
     """The reference pose, the poses nearest to each wanted one, and as many others."""
     random, out, rows = np.random.default_rng(1), [], []
     in_place = problem.is_in_place
     for row in range(len(problem.wanted)):
-        every = _in_place(problem, row) if in_place else problem.to(poses, np.full(len(poses), row))
+        mine = np.full(len(places), row)
+        every = _in_place(problem, row) if in_place else problem.to(places, mine)
         some = min(_NEAR, len(every))
         near = np.argsort(np.linalg.norm(every, axis=1))[:some]
         pick = np.concatenate([[0], near, random.choice(len(every), some, replace=False)])
@@ -106,7 +108,7 @@ def _in_place(problem: Reaching, row: int) -> Array:
         every = problem.to(poses, rows)
     else:
         every = robot.length * random.uniform(-np.pi, np.pi, (_IN_PLACE, robot.n_dof))
-    home = problem.to(robot.reference_pose[None], rows[:1])
+    home = problem.to(problem.home, rows[:1])
     every = problem.allowed(np.concatenate([home, every]))
     lack, held = problem.lack(every[1:], rows)
     best = np.argsort(np.where(held, 0.0, lack))[: held.sum() + _NEARLY]
@@ -126,13 +128,13 @@ def about_wanted(problem: Reaching) -> Candidates:
 
 def about_answers(problem: Reaching, away: Array, rows: Rows) -> Candidates:
     """For some rows: their own solutions (n, d), rotated, and the nearest of other rows."""
-    poses, count = problem.placed(away[rows], rows), min(_ABOUT, len(rows))
+    places, count = problem.moved(away[rows], rows), min(_ABOUT, len(rows))
     far = np.linalg.norm(away[rows], axis=1) / problem.robot.length
     widest = np.minimum(_WIDEST * far, np.pi)
     own = _about(problem, away[rows], rows, widest, _ABOUT, np.random.default_rng(3))
     others = np.empty((len(rows), count, away.shape[1]))
     for k, row in enumerate(rows):
-        there = problem.to(poses, np.full(len(poses), row))
+        there = problem.to(places, np.full(len(places), row))
         others[k] = there[np.argsort(np.linalg.norm(there, axis=1))[:count]]
     shared = Candidates(problem.allowed(others.reshape(-1, away.shape[1])), np.repeat(rows, count))
     return own.and_more(shared)
@@ -152,7 +154,7 @@ def _about(
     the reference orientation.
     """
     robot, hinges = problem.robot, problem.robot.hinges
-    home = problem.to(np.tile(robot.reference_pose, (len(rows), 1)), rows)
+    home = problem.to(np.tile(problem.home, (len(rows), 1)), rows)
     out = np.repeat(middle[:, None], count, axis=1)
     turn = random.normal(size=(*out.shape[:2], int(hinges.sum())))
     angle = widest[:, None, None] * robot.length * random.random((*out.shape[:2], 1)) ** 2

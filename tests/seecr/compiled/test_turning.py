@@ -10,12 +10,14 @@ from random_robots import random_poses, random_robot
 
 from seecr.commands.data import Commands
 from seecr.compiled.turning import straight_balance_batch
+from seecr.description.joints import pose_of_values
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.effects.load import ExternalWrench
+from seecr.holding.balance import balance_of, straight_balance
 from seecr.inverse.nearest.turned import Turned, turned_in_place
 from seecr.planar import bar_tilt
-from seecr.pose import Array, quat_rotate, rxyz_from_quat
+from seecr.pose import Array, pose_difference, quat_rotate, rxyz_from_quat
 from seecr.prediction.experiment import Experiment
 from seecr.statics.tables import Tables, assemble
 
@@ -54,12 +56,28 @@ def test_the_balance_at_any_pose_is_equation_3(seed: int) -> None:
     poses, rows = random_poses(rng, robot, 4), np.array([2, 0, 1, 1])
     tables = tables_of(robot, np.tile(robot.reference_pose, (3, 1)), wrench)
     matrices, loads = np.empty((4, 6, robot.n_cables)), np.empty((4, 6))
-    straight_balance_batch(tables.cables, tables.load, rows, poses, robot.length, matrices, loads)
     unit = np.repeat([1.0, 1.0 / robot.length], 3)
+    away = pose_difference(poses, robot.reference_pose) / unit
+    straight_balance_batch(
+        tables.cables, tables.load, tables.poses, tables.screws, rows, away, robot.length,
+        matrices, loads,
+    )  # fmt: skip
     for k, pose in enumerate(poses):
         matrix, load = balance(robot, pose, wrench)
         np.testing.assert_allclose(-matrices[k], unit[:, None] * matrix, atol=1e-12)
         np.testing.assert_allclose(loads[k], unit * load, atol=1e-12 * robot.weight)
+
+
+@pytest.mark.parametrize("name", ["planar_vertical", "planar_two_cable"])
+def test_the_balance_of_a_platform_on_joints_is_that_at_its_pose(name: str) -> None:
+    robot, random = load_robot(name), np.random.default_rng(0)
+    values, away = random.uniform(-0.2, 0.2, (2, 3, robot.n_dof))
+    size = np.where(robot.hinges, robot.length, 1.0)
+    tables, rows = tables_of(robot, pose_of_values(robot, values)[0]), np.array([2, 0, 1])
+    there = tables_of(robot, pose_of_values(robot, values[rows] + away / size)[0])
+    found = straight_balance(tables, rows, away)
+    for mine, theirs in zip(found, balance_of(there, np.zeros(robot.n_cables)), strict=True):
+        np.testing.assert_allclose(mine, theirs, atol=1e-12 * np.abs(theirs).max())
 
 
 def test_a_bar_on_two_cables_tilts_until_three_lines_meet() -> None:

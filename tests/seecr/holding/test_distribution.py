@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog, minimize
+from scipy.optimize import linprog, lsq_linear, minimize
 
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.errors import InputError
-from seecr.holding.distribution import distribute, tension_limits, wanted_tensions
+from seecr.holding.distribution import (
+    distribute,
+    nearly_balanced,
+    tension_limits,
+    wanted_tensions,
+)
 
 SHAPES = [(6, 8), (3, 4), (6, 12), (2, 2)]
 
@@ -78,3 +83,20 @@ def test_limits_and_aims_that_mean_nothing_are_refused() -> None:
     with pytest.raises(InputError, match=r"aim must be \(m,\) or \(n, m\) with m = 8"):
         wanted_tensions([1, 2], low, high)
     np.testing.assert_array_equal(wanted_tensions("middle", low, low + 4), np.full(8, 2.0))
+
+
+@pytest.mark.parametrize("high", [np.inf, 0.6])
+def test_few_cables_come_as_near_to_balance_as_least_squares(high: float) -> None:
+    rng = np.random.default_rng(4)
+    matrices, loads = rng.normal(size=(30, 3, 2)), rng.normal(size=(30, 3))
+    low, most = np.full((30, 2), 0.1), np.full((30, 2), high)
+    found = nearly_balanced(matrices, loads, low, most)
+    assert np.all((found >= low) & (found <= most)) and np.any(found > low)
+    left = np.einsum("ndm,nm->nd", matrices, found) - loads
+    each = zip(matrices, loads, low, most, strict=True)
+    theirs = [np.sqrt(2.0 * lsq_linear(a, b, ends).cost) for a, b, *ends in each]
+    # of pulls that are nearly parallel, sixty sweeps are not enough
+    size = np.linalg.norm(matrices, axis=1)
+    apart = np.abs(np.sum(matrices[..., 0] * matrices[..., 1], axis=1)) < 0.9 * size.prod(axis=1)
+    assert apart.sum() > 20
+    assert np.linalg.norm(left, axis=1)[apart] == pytest.approx(np.array(theirs)[apart], rel=1e-6)

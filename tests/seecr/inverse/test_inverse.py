@@ -273,7 +273,8 @@ def test_the_lower_limit_is_told_whatever_its_size(size: float) -> None:
 def test_a_search_for_a_reason_that_fails_gives_none(monkeypatch: pytest.MonkeyPatch) -> None:
     ended = SimpleNamespace(status=4, x=None)
     monkeypatch.setattr("scipy.optimize.linprog", lambda *_, **__: ended)
-    said = why_not_held(np.ones((1, 1)), np.ones(1), np.zeros(1), np.full(1, 0.5), ["a"])
+    low, high = np.zeros(4), np.full(4, 0.2)
+    said = why_not_held(np.ones((1, 4)), np.ones(1), low, high, list("abcd"))
     assert said == "no tensions within the limits balance the load there"
 
 
@@ -346,3 +347,16 @@ def test_rotations_that_are_rounding_are_printed_as_none() -> None:
     found = correct(robot, robot.reference_pose + np.array([0, 0, 40.0, 0, 0, 0, 0]))
     found.solution.pose[0, 4] = 1e-15
     assert found.left[0, 3] > 0.0 and " mm and 0 deg away" in "\n".join(found.lines())
+
+
+def test_lengths_of_crept_cables_are_found_from_the_history_they_have() -> None:
+    """Sought from plain cables they were slack where they were to pull: few rows stayed."""
+    robot, n = robot_named("ipanema"), 12
+    poses = np.tile(robot.reference_pose, (n, 1))
+    poses[:, 0] += np.linspace(-1.0, 1.0, n)
+    commands = Commands(poses, time=10.0 * np.arange(n))
+    effects = [typical(robot, catalogue()["creep"])]
+    found = correct(robot, commands, effects=effects, lowest=50.0, highest=3000.0, aim="middle")
+    assert found.reached.all()
+    plain = correct(robot, commands, lowest=50.0, highest=3000.0, aim="middle")
+    assert found.solution.tensions == pytest.approx(plain.solution.tensions, rel=1e-7)

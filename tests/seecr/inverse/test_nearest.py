@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import score_nearest
 
-from seecr.description.joints import pose_of_values
+from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects.cable import CableWeight
@@ -160,7 +160,7 @@ def test_a_turn_about_a_hinge_is_as_far_as_its_shorter_way() -> None:
         robot, want[None], values[:1], lambda poses, *_: balance_equations(robot, poses),
         lambda _, rows: np.ones(len(rows), dtype=bool), none, none, np.ones(1), np.ones(3),
     )  # fmt: skip
-    (away,) = problem.to(there[None], np.zeros(1, dtype=np.intp))
+    (away,) = problem.to(problem.coordinates(there[None]), np.zeros(1, dtype=np.intp))
     assert away == pytest.approx((values[1] - values[0]) * [1.0, 1.0, robot.length])
 
 
@@ -203,13 +203,20 @@ def test_every_position_at_which_a_bar_can_rest_is_kept() -> None:
         assert np.abs(found.solution.pose[0, :3] - [x, 0.0, z]).max() < 1e-9
 
 
-def test_a_pose_so_far_away_that_rounding_is_longer_than_the_robot_is_refused() -> None:
-    """Turned poses about it end in numbers that are none, of which no singular values are found."""
+def test_a_pose_so_far_away_that_rounding_is_longer_than_the_robot_has_a_nearest_one() -> None:
+    """It was refused: turned poses about it ended in numbers that are none."""
     robot = load_robot(model_path("planar_vertical"))
     pose = robot.reference_pose.copy()
     pose[0] = 1e20
+    found = correct(robot, pose[None])
+    assert not found.held[0] and found.stays[0]
+    assert np.abs(found.aimed[0, :3] - robot.reference_pose[:3]).max() < 1.0
+
+
+def test_numbers_that_are_none_are_refused_and_no_singular_values_are_sought() -> None:
+    robot = load_robot(model_path("planar_vertical"))
     with pytest.raises(InputError, match=r"cannot reach commanded pose 0, it is off by"):
-        correct(robot, pose[None])
+        values_of_pose(robot, np.where(np.arange(7) < 3, np.nan, robot.reference_pose)[None])
 
 
 def test_starts_are_the_nearest_that_differ_in_rotation() -> None:

@@ -46,7 +46,7 @@ def test_all_ends_are_firm() -> None:
     problem = slab([-0.3], stays_from=BORDER)
     poses = np.tile(problem.robot.reference_pose, (12, 1))
     poses[:, 0] += np.linspace(0.0, 0.24, 12)
-    found = firm_ends(problem, poses, np.zeros((1, 2)))
+    found = firm_ends(problem, problem.coordinates(poses), np.zeros((1, 2)))
     assert len(found.rows) and problem.firm(found.away, found.rows).all()
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from slab import REACH, slab
 
+from seecr.description.joints import pose_of_values
 from seecr.description.mjcf import load_robot
 from seecr.inverse.nearest import seeds
 from seecr.inverse.nearest.problem import Reaching
@@ -40,7 +41,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_sample_is_held_within_the_frame_and_begins_at_the_reference_pose() -> None:
     problem = slab([1.0])
-    poses = seeds.sample(problem)
+    poses = pose_of_values(problem.robot, seeds.sample(problem))[0]
     home = problem.robot.reference_pose
     assert np.array_equal(poses[0], home) and 20 < len(poses) < 400
     assert np.abs(poses[:, 0] - home[0]).max() <= REACH

@@ -1,0 +1,72 @@
+"""How cables change with their rest lengths: against finite differences, and the law inverted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from seecr.commands.data import Commands
+from seecr.compiled.columns import LIFT, TENSION
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
+from seecr.effects import Term, catalogue, layout_of
+from seecr.holding.balance import here, with_rest
+from seecr.holding.hanging import rest_for
+from seecr.prediction.experiment import Experiment, Prediction, effects_of
+from seecr.statics import batch
+
+LAWS = ("nonlinear_elasticity", "hysteresis", "creep", "exit_friction", "frame_compliance")
+ALL = ("pulley_radius", "cable_weight", *LAWS)
+
+
+def predicted(kind: str, names: tuple[str, ...]) -> Prediction:
+    """A short way with effects of plausible sizes, each row with its history."""
+    robot = load_robot(model_path(kind))
+    poses = np.tile(robot.reference_pose, (5, 1))
+    poses[:, 0] += np.linspace(0.0, 0.05 * robot.length, 5)
+    terms = []
+    for name in names:
+        layout = layout_of(catalogue()[name], robot)
+        size = np.where(layout.shape, layout.null, layout.null + 0.7 * layout.scale)
+        terms.append(Term(layout, np.clip(size, layout.lower, layout.upper)))
+    commands = Commands(poses, time=5.0 * np.arange(5))
+    return Experiment(robot, commands).predict(effects_of(terms, robot))
+
+
+@pytest.mark.parametrize("lifted", [False, True])
+@pytest.mark.parametrize("names", [(), LAWS, ("cable_weight",), ALL])
+@pytest.mark.parametrize("kind", ["demobot_cogiro", "planar_vertical"])
+def test_derivatives_by_length_are_those_of_differences(
+    kind: str, names: tuple[str, ...], lifted: bool
+) -> None:
+    found = predicted(kind, names)
+    assert found.solved.all()
+    tables, step = found.tables, 1e-6 * found.setup.robot.length
+    if lifted:
+        tables.cables[..., LIFT] = 2e-5
+    at = batch.evaluate(tables, found.found)
+    there, pull, tension = batch.pull_and_change(tables, at)
+    assert there.gradient == pytest.approx(at.gradient, abs=1e-11 * tables.scale.max())
+    assert there.states[..., TENSION] == pytest.approx(at.states[..., TENSION], rel=1e-11)
+    sides = tables.lengthened(step), tables.lengthened(-step)
+    force, own = batch.change_by_cable(*sides, at)
+    assert np.all(tension < 0.0)
+    assert tension == pytest.approx(own / (2.0 * step), rel=1e-5)
+    assert pull == pytest.approx(force / (2.0 * step), abs=1e-6 * np.abs(pull).max())
+
+
+def test_a_slack_cable_does_not_change() -> None:
+    found = predicted("demobot_cogiro", ())
+    longer = with_rest(found.tables, rest_for(found.tables, np.full((5, 8), 0.7)))
+    longer.cables[:, 3] = found.tables.lengthened(0.1).cables[:, 3]
+    _at, pull, tension = batch.pull_and_change(longer, here(longer))
+    assert np.all(tension[:, 3] == 0.0) and np.all(pull[:, :, 3] == 0.0)
+    assert np.all(np.delete(tension, 3, axis=1) < 0.0)
+
+
+@pytest.mark.parametrize("pulls", [1e-3, 0.7, 20.0])
+def test_lengths_have_their_tensions_whatever_the_law_and_its_history(pulls: float) -> None:
+    tables = predicted("demobot_cogiro", ("pulley_radius", *LAWS)).tables
+    wanted = pulls * np.linspace(0.5, 1.5, 40).reshape(5, 8)
+    now = with_rest(tables, rest_for(tables, wanted))
+    assert batch.evaluate(now, here(now)).states[..., TENSION] == pytest.approx(wanted, abs=1e-11)
