@@ -40,8 +40,9 @@ alone.
 
 # Rounds for history or users' laws, and the error of the pose at which they end [robot's length].
 _ROUNDS, _MISSED = 40, 1e-10
-# Round from which lengths of poses that come no nearer are changed by half as much.
-_SWINGS = 8
+# From this round on every so-many-th ends at the limit of the last changes, if these are in a ratio
+# that is not nearer to one than this.
+_SLOW, _EVERY, _RATIO = 3, 3, 0.99
 # A pose counts as reached if it is missed by less than this [m, and rad times the length].
 _REACHED = 1e-6
 # Strain of a cable up to which the nearest poses are sought where no highest tension is given:
@@ -418,7 +419,7 @@ class _Search:
 
     def _lengths(self, commands: Commands, held: Held) -> tuple[Array, Prediction]:
         """Told lengths that pay out the rest lengths of ``held``, and the prediction with them."""
-        limits, before = self.limits, np.full(len(commands), np.inf)
+        limits, before = self.limits, np.zeros_like(held.rest)
         for number in range(_ROUNDS):
             told = told_lengths(self.robot, commands, self.effects, held.rest)
             trial = replace(commands, lengths=told, told=True)
@@ -430,10 +431,10 @@ class _Search:
                 break
             last = held.rest
             held = hold_again(prediction.tables, held, limits.aim, limits.low, limits.high)
-            # a cable at the edge of sticking goes to and fro between two lengths: half way then
-            swings = (number >= _SWINGS) & (missed >= 0.9 * before)
-            held.rest = np.where(swings[:, None], 0.5 * (last + held.rest), held.rest)
-            before = missed
+            change = held.rest - last
+            if number >= _SLOW and number % _EVERY == 0:
+                held.rest = last + _to_their_limit(change, before)
+            before = change
         return told, prediction
 
 
@@ -462,3 +463,13 @@ def _without(solution: Solution, rows: NDArray[np.bool_]) -> Solution:
         tensions=np.where(kept, solution.tensions, np.nan),
         rest_lengths=np.where(kept, solution.rest_lengths, np.nan),
     )
+
+
+def _to_their_limit(change: Array, before: Array) -> Array:
+    """The sum of all changes to come, if they go on in the ratio of the last two (Aitken).
+
+    A cable that sticks at its exit point comes nearer by a few percent a round, or goes to and fro.
+    """
+    some = np.abs(change) < _RATIO * np.abs(before)
+    ratio = np.divide(change, before, out=np.zeros_like(change), where=some | (change * before < 0))
+    return np.asarray(change / (1.0 - np.clip(ratio, -2.0, _RATIO)))

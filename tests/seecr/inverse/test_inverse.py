@@ -18,7 +18,7 @@ from seecr.description.shipped import model_path
 from seecr.effects import Term, catalogue, layout_of
 from seecr.errors import InputError
 from seecr.holding.unheld import why_not_held
-from seecr.inverse.correction import correct
+from seecr.inverse.correction import _to_their_limit, correct
 from seecr.inverse.told import unplay
 from seecr.pose import pose_add, pose_difference
 from seecr.prediction.experiment import predict
@@ -360,3 +360,24 @@ def test_lengths_of_crept_cables_are_found_from_the_history_they_have() -> None:
     assert found.reached.all()
     plain = correct(robot, commands, lowest=50.0, highest=3000.0, aim="middle")
     assert found.solution.tensions == pytest.approx(plain.solution.tensions, rel=1e-7)
+
+
+def test_lengths_that_come_nearer_by_a_few_percent_a_round_are_found() -> None:
+    """Small moves, at which cables stick at their exit points: two of these rows did not stay."""
+    robot, n = robot_named("ipanema"), 40
+    apart = np.random.default_rng(1).random((n, 3)) - 0.5
+    poses = np.tile(robot.reference_pose, (n, 1))
+    poses[:, :3] += 0.02 * np.ptp(robot.exit_points, axis=0) * apart
+    commands = Commands(poses, time=10.0 * np.arange(n))
+    effects = [typical(robot, catalogue()["exit_friction"])]
+    found = correct(robot, commands, effects=effects, lowest=1.0, highest=10_000.0, aim="middle")
+    assert found.held.all() and found.reached.all()
+
+
+def test_changes_in_a_constant_ratio_end_at_their_limit() -> None:
+    before = np.array([[1.0, 1.0, 1.0, 1.0, 0.0]])
+    ratio = np.array([[0.95, -1.0, 0.0, 1.5, 0.0]])
+    # what grows has no limit, and is left as it is
+    assert _to_their_limit(ratio * before, before) == pytest.approx(
+        np.array([[0.95 / 0.05, -0.5, 0.0, 1.5, 0.0]])
+    )
