@@ -21,6 +21,7 @@ from seecr.holding.hanging import least_of_heavy
 from seecr.holding.inside import balances, counted_balance
 from seecr.holding.lengths import Held, hold, hold_again, holds_firmly
 from seecr.holding.unheld import why_not_held
+from seecr.inverse.aitken import to_their_limit
 from seecr.inverse.nearest import Nearest, Reaching, nearest, poses_in_place
 from seecr.inverse.told import told_lengths
 from seecr.pose import Array, pose_difference
@@ -40,9 +41,8 @@ alone.
 
 # Rounds for history or users' laws, and the error of the pose at which they end [robot's length].
 _ROUNDS, _MISSED = 40, 1e-10
-# From this round on every so-many-th ends at the limit of the last changes, if these are in a ratio
-# that is not nearer to one than this.
-_SLOW, _EVERY, _RATIO = 3, 3, 0.99
+# Every so-many-th round ends at the limit of the last changes.
+_EVERY = 3
 # A pose counts as reached if it is missed by less than this [m, and rad times the length].
 _REACHED = 1e-6
 # Strain of a cable up to which the nearest poses are sought where no highest tension is given:
@@ -432,8 +432,8 @@ class _Search:
             last = held.rest
             held = hold_again(prediction.tables, held, limits.aim, limits.low, limits.high)
             change = held.rest - last
-            if number >= _SLOW and number % _EVERY == 0:
-                held.rest = last + _to_their_limit(change, before)
+            if number and number % _EVERY == 0:
+                held.rest = last + to_their_limit(change, before)
             before = change
         return told, prediction
 
@@ -463,13 +463,3 @@ def _without(solution: Solution, rows: NDArray[np.bool_]) -> Solution:
         tensions=np.where(kept, solution.tensions, np.nan),
         rest_lengths=np.where(kept, solution.rest_lengths, np.nan),
     )
-
-
-def _to_their_limit(change: Array, before: Array) -> Array:
-    """The sum of all changes to come, if they go on in the ratio of the last two (Aitken).
-
-    A cable that sticks at its exit point comes nearer by a few percent a round, or goes to and fro.
-    """
-    some = np.abs(change) < _RATIO * np.abs(before)
-    ratio = np.divide(change, before, out=np.zeros_like(change), where=some | (change * before < 0))
-    return np.asarray(change / (1.0 - np.clip(ratio, -2.0, _RATIO)))

@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from seecr.commands.data import Commands
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect
+from seecr.inverse.aitken import to_their_limit
 from seecr.pose import Array
 from seecr.prediction.experiment import Experiment
 
-# Most iterations; eccentric drums need several, gains and offsets one.
-_ROUNDS = 60
+# Most iterations; eccentric drums need several, gains and offsets one. Every so-many-th ends at the
+# limit of the last changes: where the run-out is nearly a drum's radius, few angles pay out much.
+_ROUNDS, _EVERY = 60, 3
 
 
 def told_lengths(robot: Robot, commands: Commands, effects: Sequence[Effect], paid: Array) -> Array:
@@ -31,8 +33,8 @@ def told_lengths(robot: Robot, commands: Commands, effects: Sequence[Effect], pa
         (n, m) [m] told lengths (``Commands.told``): at the reference pose, those of the plain
         robot.
     """
-    told, last = paid.copy(), np.inf
-    for _ in range(_ROUNDS):
+    told, last, before = paid.copy(), np.inf, np.zeros_like(paid)
+    for number in range(1, _ROUNDS + 1):
         trial = replace(commands, lengths=told, told=True, passed=None)
         setup = Experiment(robot, trial).setup(effects)
         # the length without any turn of the winch, then what its turning adds
@@ -42,9 +44,10 @@ def told_lengths(robot: Robot, commands: Commands, effects: Sequence[Effect], pa
         turned = turned / (1.0 + setup.length_gain)
         if np.any(setup.backlash):
             turned = unplay(turned, commands.starts, 0.5 * setup.backlash)
-        new = robot.rest_lengths + turned
-        change = float(np.max(np.abs(new - told), initial=0.0))
-        told = new
+        step = robot.rest_lengths + turned - told
+        change = float(np.max(np.abs(step), initial=0.0))
+        told = told + (step if number % _EVERY else to_their_limit(step, before))
+        before = step
         if change <= 1e-15 * float(np.max(np.abs(told), initial=0.0)) or change >= last:
             break
         last = change if change < 1e-9 else np.inf
