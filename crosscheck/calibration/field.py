@@ -26,9 +26,13 @@ _STATED = 0.35
 UNKNOWN = 5.0
 
 
-def field_of(problem: Problem, place: Array) -> Array:
-    """(N, k) columns of the field in units of the noise: a cubic for each channel."""
-    return field_columns(problem, place, problem.measured.shape[1])
+def field_of(problem: Problem, place: Array, smooth: float = 1.0) -> Array:
+    """(N, k) columns of the field in units of the noise: a cubic for each channel.
+
+    Args:
+        smooth: each degree is so many times as large as the one before.
+    """
+    return field_columns(problem, place, problem.measured.shape[1], smooth)
 
 
 def log_odds(setting: Setting, joint: JointFit, stated: bool = True) -> float:

@@ -23,6 +23,8 @@ from crosscheck.calibration.linearised import column_groups, linearised
 from crosscheck.calibration.sets import Names, Scores
 from crosscheck.calibration.varying import Varying, varying
 
+# Fields that are worth so much less ln evidence than the best one are left out.
+_NEGLIGIBLE = 20.0
 # A field that is less likely than the members it could replace is told from this probability on.
 _DOUBT = 0.05
 
@@ -97,7 +99,8 @@ class _Sets:
     """Subsets of a set in the model linearised about it, with and without a field.
 
     Attributes:
-        gram: normal equations of its members and of all fields. fields: which fields these are.
+        gram: normal equations of its members and of all fields.
+        fields: what each field varies, by its name in the normal equations.
         scores: priors of sets.
         chosen: prior width of each member.
         averaged: how much averaging over widths changes ln Z, by member. Both stay the same in
@@ -106,7 +109,7 @@ class _Sets:
     """
 
     gram: Gram
-    fields: list[Varying]
+    fields: Mapping[str, Varying]
     scores: Scores
     chosen: Mapping[str, float]
     averaged: Mapping[str, float]
@@ -137,14 +140,18 @@ class _Sets:
 
     def beside(self, names: Names) -> tuple[float, Varying]:
         """The same with a field, averaged over all fields, and the field that explains most."""
-        own, every = self._solved(names), list[float]()
-        for name in self.fields:
-            width = self.gram.groups[name].widths[int(np.argmax(own.gains(name)))]
+        own, every = self._solved(names), dict.fromkeys(self.fields, -np.inf)
+        gains = {name: own.gains(name) for name in self.fields}
+        least = max(float(gain.max()) for gain in gains.values()) - _NEGLIGIBLE
+        for name, gain in gains.items():
+            if gain.max() < least:
+                continue
+            width = self.gram.groups[name].widths[int(np.argmax(gain))]
             # solve with the field: a member that cannot be negative may be so without it
             there = self.gram.solved({**own.chosen, name: float(width)})
-            every.append(there.log_evidence + averaging(there, name))
-        total = float(special.logsumexp(every) - np.log(len(every))) + self._before(names)
-        return total, self.fields[int(np.argmax(every))]
+            every[name] = there.log_evidence + averaging(there, name)
+        total = float(special.logsumexp(list(every.values())) - np.log(len(every)))
+        return total + self._before(names), self.fields[max(every, key=lambda name: every[name])]
 
     def _solved(self, names: Names) -> Solved:
         return self.gram.solved({n: w for n, w in self.chosen.items() if n in names})
@@ -155,18 +162,21 @@ class _Sets:
         return self.scores.log_prior(names) - price + sum(self.averaged.get(n, 0.0) for n in names)
 
 
-def _with_fields(setting: Setting, joint: JointFit) -> tuple[Gram, list[Varying]]:
-    """Normal equations of a fit's own effects and of all fields, and which fields these are."""
+def _with_fields(setting: Setting, joint: JointFit) -> tuple[Gram, dict[str, Varying]]:
+    """Normal equations of a fit's own effects and of all fields; what each field varies."""
     linear, groups = linearised(setting, joint), column_groups(joint, widths_for)
     y = own_readings(linear, joint, groups)
-    fields, first = dict[Varying, ColumnGroup](), linear.x.shape[1]
-    parts = varying(setting, joint)
-    for what, part in parts.items():
+    fields, first = dict[str, ColumnGroup](), linear.x.shape[1]
+    named = {f"field {k}": one for k, one in enumerate(varying(setting, joint))}
+    for name, (_what, part) in named.items():
         own = first + np.arange(part.shape[1])
-        fields[what] = ColumnGroup(own, np.array(FIELD_WIDTHS))
+        fields[name] = ColumnGroup(own, np.array(FIELD_WIDTHS))
         first += part.shape[1]
-    columns = np.concatenate([np.zeros((len(joint.state.white), 0)), *parts.values()], axis=1)
+    parts = (part for _what, part in named.values())
+    columns = np.concatenate([np.zeros((len(joint.state.white), 0)), *parts], axis=1)
     # independent measurements come last, and no field moves them
     known = np.zeros((len(linear.y) - len(columns), columns.shape[1]))
     white = np.concatenate([joint.whitened(setting.chain, columns), known])
-    return gram_of(np.concatenate([linear.x, white], axis=1), y, groups | fields), list(fields)
+    return gram_of(np.concatenate([linear.x, white], axis=1), y, groups | fields), {
+        name: what for name, (what, _part) in named.items()
+    }

@@ -21,6 +21,9 @@ from crosscheck.fit.state import derivatives
 from seecr.effects import Term, Terms, catalogue, layout_of
 from seecr.pose import Array
 
+SMOOTH = 0.3
+"""Prior width of each degree of a smooth field over that of the degree before."""
+
 _MOVE = (
     "move the tracker and measure some poses again; an error that moves with it comes from the "
     "tracker"
@@ -70,27 +73,41 @@ _ALONE = {
 }  # fmt: skip
 
 
-def varying(setting: Setting, joint: JointFit) -> dict[Varying, Array]:
-    """Columns (N, k) of each candidate that moves a reading, in units of the noise."""
-    return {
-        what: columns
-        for part in (_of_readings, _of_tracker, _of_robot)
-        for what, columns in part(setting, joint)
-        if np.any(columns)
-    }
+def varying(setting: Setting, joint: JointFit) -> list[tuple[Varying, Array]]:
+    """Candidates that move a reading: what varies, and columns (N, k) in units of the noise.
+
+    Cubics of one kind of reading, if there are others, are there twice: with degrees that are all
+    as large, and with smaller ones the higher they are. What a lens does is mostly linear and
+    quadratic, and a prior as wide for all coefficients would cost it more than it explains. In all
+    readings together whatever is known is smooth as well, so that this tells nothing there.
+    """
+    parts = (_of_readings, _of_one_kind, _of_tracker, _of_robot)
+    every = (one for part in parts for one in part(setting, joint))
+    return [(what, columns) for what, columns in every if np.any(columns)]
 
 
 def _of_readings(setting: Setting, joint: JointFit) -> Iterator[tuple[Varying, Array]]:
     """A cubic in the position for each channel: by kind of reading, and for all together."""
-    columns = field_of(setting.problem, joint.state.prediction.pose[:, :3])
+    kinds = _by_kind(setting, joint, 1.0)
+    yield from kinds
+    if len(kinds) > 1:
+        yield Varying.READINGS, np.concatenate([columns for _kind, columns in kinds], axis=1)
+
+
+def _of_one_kind(setting: Setting, joint: JointFit) -> Iterator[tuple[Varying, Array]]:
+    """The same of one kind among others, with smaller coefficients of the higher degrees."""
+    kinds = _by_kind(setting, joint, SMOOTH)
+    yield from kinds if len(kinds) > 1 else []
+
+
+def _by_kind(setting: Setting, joint: JointFit, smooth: float) -> list[tuple[Varying, Array]]:
+    """A cubic in the position for each channel, by kind of reading."""
+    columns = field_of(setting.problem, joint.state.prediction.pose[:, :3], smooth)
     if not columns.shape[1]:
-        return
+        return []
     kind_of = setting.chain.kind[np.argmax(columns != 0.0, axis=0)]
     kinds = np.unique(kind_of)
-    for kind in kinds:
-        yield _ALONE[KINDS[kind].name], columns[:, kind_of == kind]
-    if len(kinds) > 1:
-        yield Varying.READINGS, columns
+    return [(_ALONE[KINDS[kind].name], columns[:, kind_of == kind]) for kind in kinds]
 
 
 def _of_tracker(setting: Setting, _joint: JointFit) -> Iterator[tuple[Varying, Array]]:

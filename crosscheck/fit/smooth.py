@@ -22,10 +22,13 @@ _DEGREE = 3
 _OWED = 100.0
 
 
-def monomials(place: Array, degree: int = _DEGREE) -> Array:
+def monomials(place: Array, degree: int = _DEGREE, smooth: float = 1.0) -> Array:
     """(n, k) monomials up to some degree of places (n, d), each axis scaled to [-1, 1].
 
     Axes along which nothing moves are left out.
+
+    Args:
+        smooth: each degree is so many times as large as the one before.
     """
     middle = 0.5 * (place.max(axis=0) + place.min(axis=0))
     half = 0.5 * np.ptp(place, axis=0)
@@ -34,13 +37,15 @@ def monomials(place: Array, degree: int = _DEGREE) -> Array:
     columns = [np.ones(len(place))]
     for power in range(1, degree + 1):
         for axes in combinations_with_replacement(range(unit.shape[1]), power):
-            columns.append(np.prod(unit[:, axes], axis=1))
+            columns.append(smooth**power * np.prod(unit[:, axes], axis=1))
     return np.stack(columns, axis=1)
 
 
-def field_columns(problem: Problem, place: Array, last: int = TENSION.start) -> Array:
+def field_columns(
+    problem: Problem, place: Array, last: int = TENSION.start, smooth: float = 1.0
+) -> Array:
     """(N, k) a cubic in place (n, 3) for each channel below ``last`` that was read; of the pose."""
-    shapes = monomials(place)[problem.row_of]
+    shapes = monomials(place, smooth=smooth)[problem.row_of]
     channels = [c for c in np.unique(problem.column_of) if c < last]
     parts = [shapes * (problem.column_of == c)[:, None] for c in channels]
     return np.concatenate(parts, axis=1) if parts else np.zeros((len(problem.row_of), 0))

@@ -11,6 +11,7 @@ import pytest
 from made_data import COGIRO, SIGMA, measured, term
 from scipy import special, stats
 
+from crosscheck.calibration import varying as what_varies
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN, field_of
 from crosscheck.calibration.gram import ColumnGroup, gram_of
@@ -64,7 +65,7 @@ def test_the_odds_are_those_of_the_covariances() -> None:
     found = field_in_place(setting, joint, {"tracker_scale": 0.3}, scores)
     y = joint.state.white + joint.jacobian @ joint.z
     parts = varying(setting, joint)
-    fields = [averaged_density(y, columns, FIELD_WIDTHS) for columns in parts.values()]
+    fields = [averaged_density(y, columns, FIELD_WIDTHS) for _what, columns in parts]
     without = averaged_density(y, joint.jacobian, WIDTHS)
     prior = scores.log_prior(frozenset()) - scores.log_prior(frozenset({"tracker_scale"}))
     expected = float(special.logsumexp(fields)) - np.log(len(parts)) - without + prior
@@ -184,7 +185,8 @@ def test_a_member_that_only_the_field_leaves_positive_is_weighed_beside_it() -> 
     gram = gram_of(np.concatenate([x, field], axis=1), y, groups)
     alone, both = {"pulley_radius": 1.0}, {"pulley_radius": 1.0, "field": 1.0}
     assert gram.solved(alone).values[0] < -0.5 < 0.5 < gram.solved(both).values[0]
-    sets = _Sets(gram, ["field"], Scores(gram, 26), alone, {"pulley_radius": 0.0})
+    fields = {"field": Varying.POSITION}
+    sets = _Sets(gram, fields, Scores(gram, 26), alone, {"pulley_radius": 0.0})
     names = frozenset(alone)
     expected = gram.solved(both).log_evidence + sets.scores.log_prior(names)
     assert sets.beside(names)[0] == pytest.approx(expected, abs=1e-6)
@@ -198,7 +200,7 @@ def test_members_worth_nothing_are_left_out_first() -> None:
     groups = {n: ColumnGroup(np.array([k]), np.array([1.0])) for k, n in enumerate(names)}
     gram = gram_of(x, 3.0 * x[:, 0] + random.standard_normal(200), groups)
     chosen = dict.fromkeys(names, 1.0)
-    sets = _Sets(gram, [], Scores(gram, 26), chosen, dict.fromkeys(names, 0.0))
+    sets = _Sets(gram, {}, Scores(gram, 26), chosen, dict.fromkeys(names, 0.0))
     assert sets.needed(frozenset(names)) == {"a"}
     kept = replace(sets, scores=Scores(gram, 26, frozenset("b")))
     assert kept.needed(frozenset(names)) == {"a", "b"}
@@ -216,7 +218,8 @@ def toy(worthless: float = 0.0) -> tuple[_Sets, Array, Array]:
     y = 2.0 * x[:, 4] + 0.4 * x[:, 2] + worthless * x[:, 3] + random.standard_normal(60)
     chosen = dict.fromkeys(names[:4], 1.0)
     gram = gram_of(x, y, groups)
-    return _Sets(gram, ["field"], Scores(gram, 26), chosen, dict.fromkeys(chosen, 0.0)), x, y
+    fields = {"field": Varying.FORCE}
+    return _Sets(gram, fields, Scores(gram, 26), chosen, dict.fromkeys(chosen, 0.0)), x, y
 
 
 def asked(sets: _Sets, monkeypatch: pytest.MonkeyPatch, **of: Any) -> Imitated:
@@ -237,7 +240,7 @@ def test_what_it_replaces_and_what_the_others_are_worth_are_those_of_the_covaria
         count = len([k for k in columns if k < 4])
         return averaged_density(y, x[:, list(columns)], (1.0,)) + log_prior(count, 26)
 
-    assert found.replaced == {"a", "b"} and found.seen == "field" and found.chance > 0.9
+    assert found.replaced == {"a", "b"} and found.seen is Varying.FORCE and found.chance > 0.9
     assert found.odds == pytest.approx(total(2, 4) - total(0, 1, 2), abs=1e-6)
     assert found.worth == pytest.approx({"c": total(2, 4) - total(4)}, abs=1e-6)
 
@@ -257,10 +260,44 @@ def test_no_field_moves_what_was_measured_independently() -> None:
     knowledge = replace(Knowledge.nothing(1), value=np.array([1.002]), stderr=np.array([1e-4]))
     setting, joint = fitted(replace(alone, knowledge=knowledge))
     gram, names = _with_fields(setting, joint)
-    own = gram.groups[Varying.READINGS].columns
+    first = next(name for name, what in names.items() if what is Varying.READINGS)
+    own = gram.groups[first].columns
     columns = field_of(setting.problem, joint.state.prediction.pose[:, :3])
-    assert names == list(varying(setting, joint)) and len(own) == columns.shape[1]
+    assert (
+        list(names.values()) == [what for what, _ in varying(setting, joint)]
+        and len(own) == columns.shape[1]
+    )
     assert gram.normal[np.ix_(own, own)] == pytest.approx(columns.T @ columns, abs=1e-9)
     assert gram.normal[own, 0] == pytest.approx(columns.T @ joint.jacobian[:, 0], abs=1e-9)
     # which does count as a reading of the effect itself
     assert gram.normal[0, 0] > 1.01 * joint.jacobian[:, 0] @ joint.jacobian[:, 0]
+
+
+def with_a_lens() -> tuple[Setting, JointFit]:
+    """A tracker's lens seen from above: its picture bends by ten times the noise, mostly evenly."""
+    setting, joint = fitted(term(ROBOT, "tracker_scale", factor=1.0))
+    place = joint.state.prediction.pose[:, :3]
+    off = (place - place.mean(axis=0)) / (0.5 * np.ptp(place, axis=0).max()) - [0.3, 0.2, 4.0]
+    bent = off * np.sum(off**2, axis=1, keepdims=True)
+    problem = setting.problem
+    read = np.zeros(problem.measured.shape)
+    read[:, :3] = bent - bent.mean(axis=0)
+    signal = problem.whiten(setting.factor, read)
+    noise = np.random.default_rng(2).standard_normal(len(signal))
+    white = noise + 10.0 * signal / np.sqrt(np.mean(signal**2))
+    return setting, replace(joint, state=replace(joint.state, white=white))
+
+
+def evidence(setting: Setting, joint: JointFit) -> float:
+    """ln evidence of what is unknown and nothing else."""
+    scores = Scores(gram_of(joint.jacobian, joint.state.white, {}), 26)
+    return _Sets.of(setting, joint, {}, scores).beside(frozenset())[0]
+
+
+def test_a_lens_earns_more_with_smaller_coefficients_of_higher_degrees(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    setting, joint = with_a_lens()
+    found = evidence(setting, joint)
+    monkeypatch.setattr(what_varies, "SMOOTH", 1.0)
+    assert found > evidence(setting, joint) + 10.0

@@ -11,7 +11,7 @@ from made_data import COGIRO, measured, term
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.priors import widths_of
-from crosscheck.calibration.varying import Varying, varying
+from crosscheck.calibration.varying import SMOOTH, Varying, varying
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
 from seecr.commands.loads import Loads
@@ -50,13 +50,18 @@ def unexplained(columns: Array, signal: Array) -> float:
     return float(np.linalg.norm(signal - columns @ solved) / np.linalg.norm(signal))
 
 
+def rough(setting: Setting, joint: JointFit) -> dict[Varying, Array]:
+    """What may change, of each the first: cubics whose degrees are all as large."""
+    return dict(reversed(varying(setting, joint)))
+
+
 def test_a_spring_is_among_what_changes(fit: tuple[Setting, JointFit]) -> None:
     setting, joint = fit
     place = joint.state.prediction.pose[:, :3]
     pull = -LITTLE * ROBOT.weight / ROBOT.length * (place - np.array([0.1, 0.2, 0.3]))
     loads = Loads.of(len(place), wrench=np.hstack([pull, 0.0 * pull]))
     signal = moved(setting, joint, loads=loads)
-    kinds = varying(setting, joint)
+    kinds = rough(setting, joint)
     assert unexplained(kinds[Varying.SPRING], signal) < 1e-3
     assert unexplained(kinds[Varying.FORCE], signal) < 1e-3
     assert unexplained(kinds[Varying.POSITION], signal) > 0.1
@@ -79,7 +84,7 @@ def test_a_tracker_that_moves_shows_over_the_session(fit: tuple[Setting, JointFi
         read[:, 1] = 1e-3 * moved
         timed = replace(problem, data=replace(problem.data, t_s=t_s))
         signal = problem.whiten(setting.factor, read)
-        return varying(replace(setting, problem=timed), joint), signal
+        return rough(replace(setting, problem=timed), joint), signal
 
     rows, signal = told(walk**2, None)
     assert (
@@ -101,7 +106,7 @@ def test_a_tracker_that_moves_shows_over_the_session(fit: tuple[Setting, JointFi
 
 
 def test_all_are_in_units_of_the_noise(fit: tuple[Setting, JointFit]) -> None:
-    kinds = varying(*fit)
+    kinds = rough(*fit)
     assert set(kinds) == set(Varying) - {Varying.TENSION}
     for columns in kinds.values():
         size = np.sqrt(np.mean(np.sum(columns**2, axis=1)))
@@ -113,3 +118,31 @@ def test_all_but_what_is_everywhere_say_what_to_look_at() -> None:
     assert (
         len({what.advice for what in Varying}) == len(Varying) - 2
     )  # hoses; the tracker's picture
+
+
+def test_smooth_fields_have_smaller_columns_the_higher_their_degree(
+    fit: tuple[Setting, JointFit],
+) -> None:
+    kinds = varying(*fit)
+    first, smooth = (
+        np.linalg.norm(columns, axis=0).reshape(3, -1)
+        for what, columns in kinds
+        if what is Varying.POSITION
+    )
+    # constant, three linear, six quadratic and ten cubic monomials of each channel
+    degree = np.repeat([0, 1, 2, 3], [1, 3, 6, 10])
+    assert smooth == pytest.approx(first * SMOOTH**degree)
+    # what changes all readings smoothly may be anything
+    assert [what for what, _ in kinds].count(Varying.READINGS) == 1
+
+
+def test_of_the_only_kind_that_was_read_smoothness_tells_nothing() -> None:
+    robot = load_robot(COGIRO)
+    data = replace(measured(robot, points=4), quat_wxyz=None)
+    problem = prepare(robot, data, Terms()).problem
+    factor = problem.noise(problem.experiment.predict(()))
+    setting = Setting(problem, factor, chain_of(problem))
+    terms = Terms([term(robot, "tracker_scale", factor=1.0)])
+    joint = settle(setting, evaluate(problem, terms, factor), widths_of(terms), WHITE)
+    kinds = [what for what, _ in varying(setting, joint)]
+    assert kinds.count(Varying.POSITION) == 1 and Varying.READINGS not in kinds

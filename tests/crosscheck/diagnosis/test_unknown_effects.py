@@ -36,6 +36,12 @@ def lens(data: Measurements) -> None:
     data.position[:] += 1.5e-3 * place * (place**2).sum(axis=1, keepdims=True)
 
 
+def lens_from_aside(data: Measurements) -> None:
+    """The same seen from above: mostly quadratic, which seven known effects together imitate."""
+    place = _centred(data) - [0.1, 0.1, 3.0]
+    data.position[:] += 4e-4 * place * (place**2).sum(axis=1, keepdims=True)
+
+
 def swaying_floor(data: Measurements) -> None:
     """The tracker stands on a floor that sways."""
     assert data.t_s is not None
@@ -78,7 +84,7 @@ ALONE = [
     *(
         pytest.param(change, name, (), marks=pytest.mark.sweep)
         for name in ("cogiro", "parallel")
-        for change in (bumped_tracker, lens, swaying_floor, rubbing, wavy_target)
+        for change in (bumped_tracker, lens, lens_from_aside, swaying_floor, rubbing, wavy_target)
     ),
 ]
 BESIDE = [
