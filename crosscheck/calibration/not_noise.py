@@ -29,9 +29,11 @@ _HALF, _ERRORS = 2.0, 3.0
 # Estimates from differences of neighbouring rows are too small if noise is autocorrelated, so that
 # larger and more correlated noise is accepted.
 _ESTIMATED, _DRIFT = 5.0, 0.9
-# Outliers are never more than this part of the rows that a sensor reads; p-value below which they
-# lie side by side.
-_MOST, _CHANCE = 0.15, 1e-3
+# Outliers are more than noise has if they are more than this part of the rows that a sensor reads,
+# and more than chance gives where it throws one row in ten far off.
+_MOST, _USUAL = 0.15, 0.1
+# p-value of more than chance, of so many outliers and of those that lie side by side.
+_CHANCE = 1e-3
 
 
 def is_not_noise(setting: Setting, joint: JointFit, stated: Collection[str]) -> bool:
@@ -85,7 +87,7 @@ def outliers_cluster(setting: Setting, joint: JointFit) -> bool:
     out = outliers_by_kind(chain, joint.weight, problem.data.n_rows)
     read = np.zeros(out.shape, dtype=bool)
     read[chain.row, chain.kind] = True
-    if (out.sum(axis=0) / np.maximum(read.sum(axis=0), 1)).max() > _MOST:
+    if any(too_many(*both) for both in zip(out.sum(axis=0), read.sum(axis=0), strict=True)):
         return True
     kinds = np.unique(chain.kind)
     any_kind = [np.asarray(out.any(axis=1))] if len(kinds) > 1 else []
@@ -97,6 +99,13 @@ def outliers_cluster(setting: Setting, joint: JointFit) -> bool:
             if both and special.pdtrc(both - 1, len(pairs) * rate**2) < _CHANCE:
                 return True
     return False
+
+
+def too_many(outliers: int, rows: int) -> bool:
+    """Whether so many outliers among the rows that a sensor reads are no noise."""
+    if outliers <= _MOST * rows:
+        return False
+    return bool(special.bdtrc(outliers - 1, rows, _USUAL) < _CHANCE)
 
 
 def is_correlated(setting: Setting, joint: JointFit) -> bool:

@@ -82,8 +82,10 @@ def check_of(term: Term, robot: Robot, stderr: Array | None = None) -> str:
 
     for name, unit, value in zip(layout.names, layout.units, term.vector, strict=True):
         values[parameter_name(name, unit)] = number(value, errors[layout.names.index(name)], unit)
-    # of several parameters, the one that stands out most
+    # of several parameters that the data determine, the one that stands out most
     size = np.abs(term.vector - layout.null) / layout.scale * ~layout.shape
+    known = np.isfinite(errors)
+    size = np.where(known, size, 0.0) if np.any(size[known] > 0.0) else size
     k = int(np.argmax(size))
     values["which"] = parameter_name(layout.names[k], layout.units[k])
     values["largest"] = number(term.vector[k], errors[k], layout.units[k])

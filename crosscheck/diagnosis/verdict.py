@@ -13,7 +13,7 @@ from crosscheck.calibration.search import search_sets
 from crosscheck.diagnosis.chances import chances_of
 from crosscheck.diagnosis.explained import explained
 from crosscheck.diagnosis.importance import weighed
-from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.settled import settled
 from crosscheck.diagnosis.stepwise import by_steps
 from crosscheck.diagnosis.unexplained import unexplained
@@ -171,8 +171,12 @@ def is_clear(steps: Diagnosis) -> bool:
     """Whether the steps settle it: their effects are sure, few enough and imitate nothing unknown.
 
     Nor may another class be sure, or another effect be hinted at: several effects may hint at the
-    same although none of them is worth its parameters.
+    same although none of them is worth its parameters. And the data have to determine something of
+    each effect: beside misplaced points of all cables, a platform off its start is only a part of
+    these.
     """
+    if any(is_undetermined(effect) for effect in steps.missing):
+        return False
     if too_large(len(one.layout) for one in steps.missing):
         return False
     if steps.chances is not None and steps.chances.imitated is not None:
@@ -182,6 +186,11 @@ def is_clear(steps: Diagnosis) -> bool:
     further = any(p > SURE and listed.isdisjoint(members) for members, p in classes)
     unsure = any(c.why_not is not None and c.why_not.why is Why.NOT_SURE for c in steps.candidates)
     return all(e.probability > SURE for e in steps.missing) and not unsure and not further
+
+
+def is_undetermined(effect: MissingEffect) -> bool:
+    """Whether the data determine none of an effect's values."""
+    return not np.any(np.isfinite(effect.stderr[~effect.layout.shape]))
 
 
 def _part(progress: Progress, first: float, last: float) -> Progress:

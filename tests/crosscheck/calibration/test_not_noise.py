@@ -13,6 +13,7 @@ from crosscheck.calibration.not_noise import (
     most_together,
     outliers_cluster,
     too_loud,
+    too_many,
 )
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
@@ -118,3 +119,21 @@ def test_outliers_of_two_sensors_are_structure_only_if_they_lie_side_by_side(whe
     setting = Setting(problem, factor, chain_of(problem))
     joint = settle(setting, evaluate(problem, Terms(), factor), np.zeros(0), WHITE)
     assert outliers_cluster(setting, joint) is (where != "apart")
+
+
+@pytest.mark.parametrize(
+    ("outliers", "rows", "many"),
+    [
+        (0, 0, False),
+        (19, 126, False),  # 15.1 %: one row in ten gives as many in one case of twenty
+        (24, 126, False),
+        (26, 126, True),
+        (40, 144, True),
+        (299, 2000, False),
+        (301, 2000, True),  # of many rows, chance leaves little room
+        (10, 40, False),
+        (13, 40, True),
+    ],
+)
+def test_few_rows_may_have_more_outliers_by_chance(outliers: int, rows: int, many: bool) -> None:
+    assert too_many(outliers, rows) is many

@@ -152,6 +152,17 @@ def test_checks_have_the_digits_that_errors_leave(
     assert expected in check_of(some, robot, np.full(len(some.vector), error))
 
 
+def test_what_the_data_do_not_determine_is_not_what_to_expect() -> None:
+    robot = soft_cogiro()
+    some = term(robot, "exit_point_error", error_1_x_m=0.002, error_3_y_m=0.027)
+    errors = np.full(len(some.vector), 1e-4)
+    assert "error_3_y" in check_of(some, robot, errors)
+    errors[some.layout.names.index("error_3_y_m")] = np.inf
+    assert "+2 mm (error_1_x" in check_of(some, robot, errors).replace("2.0 mm", "2 mm")
+    # where nothing is determined the largest is as good as any
+    assert "error_3_y" in check_of(some, robot, np.full(len(errors), np.inf))
+
+
 @pytest.mark.parametrize(
     ("effect", "values"),
     [

@@ -19,7 +19,7 @@ from crosscheck.fit.reasons import Reason, Why
 from crosscheck.measurements.data import Measurements
 from seecr.commands.data import Commands
 from seecr.description.mjcf import load_robot
-from seecr.pose import quat_from_rxyz
+from seecr.pose import Array, quat_from_rxyz
 from seecr.prediction.experiment import Experiment
 
 PLANAR = """<mujoco model="tri">
@@ -103,10 +103,21 @@ def test_a_target_may_sit_anywhere() -> None:
     assert not hardly_happens(term(robot, "gravity_tilt", tilt_x_rad=0.49))
 
 
+def found(count: int, stderr: Array) -> Any:
+    """A listed effect of so many parameters, with their standard errors."""
+
+    class Parameters(list[int]):
+        shape = np.zeros(count, bool)
+
+    layout = Parameters(range(count))
+    return SimpleNamespace(effect="external_wrench", probability=1.0, layout=layout, stderr=stderr)
+
+
 def test_what_the_steps_leave_open_is_looked_at_in_sets() -> None:
     """Of five effects none paid for itself, and one of them was sure: sets name it."""
-    listed: Any = SimpleNamespace(effect="external_wrench", probability=1.0, layout=range(6))
-    large: Any = SimpleNamespace(**{**vars(listed), "layout": range(8)})
+    listed = found(6, np.ones(6))
+    large = found(8, np.ones(8))
+    hidden, partly = found(6, np.full(6, np.inf)), found(6, np.where(np.arange(6) > 1, np.inf, 1.0))
     unlikely: Any = SimpleNamespace(**{**vars(listed), "probability": 0.9})
     first, more = (("external_wrench",), 1.0), (("stiffness", "platform_mass"), 0.99)
     unsure: Any = SimpleNamespace(why_not=Reason(Why.NOT_SURE, p=0.6))
@@ -118,6 +129,8 @@ def test_what_the_steps_leave_open_is_looked_at_in_sets() -> None:
         ([listed], (first, more), (), False),
         ([listed], (first, (("creep",), 0.9)), (), True),
         ([unlikely], (first,), (), False),
+        ([hidden], (first,), (), False),
+        ([partly], (first,), (), True),
         ([], (), (unsure,), False),
         ([], (), (SimpleNamespace(why_not=Reason(Why.UNSEEN)),), True),
     ):
