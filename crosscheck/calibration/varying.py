@@ -2,8 +2,7 @@
 
 A hose pulls differently at each place. A few numbers describe such a force, but known effects can
 imitate what it does to all readings. So besides cubics of the readings, the candidates are a force
-and cable lengths that change linearly with the position, a spring, which pulls towards a point, and
-lengths that are a cubic of how far each winch has turned.
+and cable lengths that change linearly with the position, and a spring, which pulls towards a point.
 A tracker that moves shows over the session, wherever the platform is.
 """
 
@@ -58,10 +57,6 @@ class Varying(StrEnum):
     LENGTHS = (
         "cable lengths that change with the position",
         "measure what each winch pays out, at several lengths and with the other winches elsewhere",
-    )
-    WINCHES = (
-        "lengths that change with how far the winches have turned, as with rope in layers",
-        "measure what each winch pays out turn by turn, over all of its travel",
     )
 
     advice: str
@@ -141,22 +136,6 @@ def _of_robot(setting: Setting, joint: JointFit) -> Iterator[tuple[Varying, Arra
     yield Varying.SPRING, _scaled(np.hstack([_scaled(force), _scaled(towards)]))
     lengths = _rates(setting, joint, "cable_length_offset")
     yield Varying.LENGTHS, _scaled(_products(lengths, linear))
-    every = _of_turns(setting, joint, lengths)
-    # alike for all winches, and for each by itself
-    yield Varying.WINCHES, _scaled(every.sum(axis=1))
-    yield Varying.WINCHES, _scaled(every.reshape(len(every), -1))
-
-
-def _of_turns(setting: Setting, joint: JointFit, lengths: Array) -> Array:
-    """(N, m, 3) derivatives by what is linear, quadratic and cubic in each winch's own turning.
-
-    Args:
-        lengths: (N, m) derivatives by each cable's length.
-    """
-    turned = joint.state.prediction.setup.commanded_change
-    turned = turned / max(float(np.abs(turned).max(initial=0.0)), 1e-300)
-    powers = np.stack([turned, turned**2, turned**3], axis=-1)[setting.problem.row_of]
-    return np.asarray(lengths[:, :, None] * powers)
 
 
 def _rates(setting: Setting, joint: JointFit, name: str) -> Array:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.steps import shown_stages
+from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.model.fitted import Fitted
 from seecr.pose import Array
@@ -17,16 +18,28 @@ __all__ = ["found_covariance", "found_effects", "refitted"]
 def found_effects(found: Diagnosis) -> tuple[Fitted, ...]:
     """All effects of the model and those that are listed, fitted together.
 
-    Empty if there is no verdict.
+    Empty if there is no verdict. Where more is missing than is listed, the values are those with
+    which the listed effects explain most by themselves, and not those listed, which are nearer to
+    the truth beside the rest and make no model without it.
     """
     if found.search is None:
         return ()
-    listed = [Fitted(one.term, one.stderr, one.at_bound) for one in found.missing]
-    names = {one.term.name for one in listed}
     best, wider = shown_stages(found)[1].step.fit, _widened(found)
+    listed = [_by_itself(one, best) for one in found.missing]
+    names = {one.term.name for one in listed}
     own = [(term, best.terms.part(term.name)) for term in best.terms if term.name not in names]
     had = [Fitted(term, wider * best.stderr[part], best.at_bound[part]) for term, part in own]
     return (*had, *listed)
+
+
+def _by_itself(listed: MissingEffect, best: Fit) -> Fitted:
+    """A listed effect with its values in the fit of just the listed effects."""
+    if listed.effect not in best.terms:
+        return Fitted(listed.term, listed.stderr, listed.at_bound)
+    part = best.terms.part(listed.effect)
+    # a fit of its own knows nothing of what else is missing
+    stderr = np.maximum(best.stderr[part], listed.stderr)
+    return Fitted(best.terms[listed.effect], stderr, best.at_bound[part])
 
 
 def refitted(found: Diagnosis, own: Model) -> tuple[str, ...]:

@@ -44,11 +44,6 @@ def moved(setting: Setting, joint: JointFit, **changed: object) -> Array:
     return np.asarray(white[1] - white[0])
 
 
-def lengthened(setting: Setting, joint: JointFit, more: Array) -> Array:
-    """(N,) by how much readings change, in units of their noise, with longer cables (n, m) [m]."""
-    return moved(setting, joint, lengths=joint.state.prediction.setup.rest_lengths() + more)
-
-
 def unexplained(columns: Array, signal: Array) -> float:
     """The part of a signal that columns cannot explain."""
     solved = np.linalg.lstsq(columns, signal, rcond=None)[0]
@@ -123,22 +118,6 @@ def test_all_but_what_is_everywhere_say_what_to_look_at() -> None:
     assert (
         len({what.advice for what in Varying}) == len(Varying) - 2
     )  # hoses; the tracker's picture
-
-
-def test_rope_in_layers_shows_over_the_turns_of_the_winches(fit: tuple[Setting, JointFit]) -> None:
-    setting, joint = fit
-    change = joint.state.prediction.setup.commanded_change
-    layers = LITTLE * (change**2 - 2.0 * change**3)
-    alike, each = [c for what, c in varying(setting, joint) if what is Varying.WINCHES]
-    assert alike.shape[1] == 3 and each.shape[1] == 3 * ROBOT.n_cables
-    signal = lengthened(setting, joint, layers)
-    assert unexplained(alike, signal) < 1e-3 and unexplained(each, signal) < 1e-3
-    # of one winch alone
-    signal = lengthened(setting, joint, layers * (np.arange(ROBOT.n_cables) == 2))
-    assert unexplained(each, signal) < 1e-3 < 0.1 < unexplained(alike, signal)
-    # or by how far another one turned
-    signal = lengthened(setting, joint, layers[:, ::-1])
-    assert unexplained(each, signal) > 0.05
 
 
 def test_smooth_fields_have_smaller_columns_the_higher_their_degree(

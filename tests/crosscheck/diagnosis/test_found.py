@@ -61,3 +61,16 @@ def test_beside_many_effects_errors_of_the_model_are_not_widened_by_those_of_one
 def test_without_a_search_there_is_no_model() -> None:
     nothing = replace(pulleys(), search=None)
     assert found_effects(nothing) == () and found_covariance(nothing) is None
+
+
+def test_the_model_has_the_values_that_explain_most_by_themselves() -> None:
+    """What is listed beside many effects is nearer to the truth, and no model without the rest."""
+    found = pulleys()
+    (listed,) = found.missing
+    beside = replace(listed, term=listed.term.with_vector(3.0 * listed.term.vector),
+                     stderr=5.0 * listed.stderr)  # fmt: skip
+    (kept,) = found_effects(replace(
+        found, missing=(beside,), verdict=DiagnosisVerdict.MANY_EFFECTS
+    ))  # fmt: skip
+    assert kept.term.vector == pytest.approx(listed.term.vector)
+    assert kept.stderr == pytest.approx(5.0 * listed.stderr)
