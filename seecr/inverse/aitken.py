@@ -9,7 +9,7 @@ from seecr.pose import Array
 # Changes in a ratio nearer to one than this do not tell where they end; and none is prolonged
 # further than by this ratio.
 _RATIO = 0.99
-# Changes that swing and grow are damped by a third at most.
+# Changes that swing and grow by more than this ratio are cut to a third, and no further.
 _SWING = -2.0
 
 

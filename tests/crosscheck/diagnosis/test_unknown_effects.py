@@ -37,7 +37,7 @@ def lens(data: Measurements) -> None:
 
 
 def lens_from_aside(data: Measurements) -> None:
-    """The same seen from above: mostly quadratic, which seven known effects together imitate."""
+    """The same, its middle far above the workspace, where it is mostly quadratic."""
     place = _centred(data) - [0.1, 0.1, 3.0]
     data.position[:] += 4e-4 * place * (place**2).sum(axis=1, keepdims=True)
 
