@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_data import COGIRO, measured
+from scipy import stats
 
 from crosscheck.calibration.colour import WHITE, Chain, Colour, chain_of, log_det, whitened
 from crosscheck.calibration.restricted import estimate, log_evidence, with_slopes
@@ -161,3 +162,19 @@ def test_each_outlier_has_prior_odds_of_one_to_nineteen() -> None:
     assert log_chance_of_outliers(c, weight) == 0.0
     weight[np.isin(c.row, [2, 5])] = 0.01
     assert log_chance_of_outliers(c, weight) == pytest.approx(-2.0 * np.log(19.0))
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_the_size_of_the_bulk_is_that_of_its_median(channels: int) -> None:
+    """In units of it, a row is as likely an outlier as 10 and 1 times the noise explain it."""
+    c = chain(400, channels)
+    rows = np.unique(c.row)
+    residual = 7.0 * np.random.default_rng(5).standard_normal(len(c.row))
+    weight = row_weights(c, WHITE, residual)
+    power = np.array([np.sum(residual[c.row == row] ** 2) for row in rows])
+    power = power / np.median(power) * stats.chi2.median(channels)
+    odds = 0.05 / 0.95 * 10.0**-channels * np.exp(0.5 * 0.99 * power)
+    off = odds / (1.0 + odds)
+    expected = 1.0 - off + off * np.minimum(0.01, channels / power)
+    first = [weight[np.flatnonzero(c.row == row)[0]] for row in rows]
+    assert first == pytest.approx(expected, rel=1e-9)

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_data import SIGMA, measured, soft_cogiro, term
+from scipy import stats
 
-from crosscheck.comparison.associations import SIGNIFICANT
+from crosscheck.comparison.associations import SIGNIFICANT, _p
 from crosscheck.comparison.cable_space import cable_errors, independent_part
 from crosscheck.comparison.limits import Limits, check, load_limits, parse_limit, with_options
 from crosscheck.comparison.quantities import EVERYWHERE
@@ -321,3 +322,13 @@ def test_a_comparison_shows_itself(off):
     assert [row["line"] for row in rows] == off.problem.data.line.tolist()
     assert [row["z_m"] for row in rows] == off.state.raw[:, 2].tolist()
     assert off.to_frame().num_rows == len(rows) and "<table>" in off._repr_html_()
+
+
+def test_p_values_of_associations_are_those_of_the_f_distribution() -> None:
+    between, within = np.array([3.0, 40.0, 1.0, 1.0]), np.array([50.0, 60.0, 1.0, 0.0])
+    won, lost = np.array([2, 5, 0, 3]), np.array([90, 30, 7, 0])
+    p = _p(between, won, within, lost)
+    expected = stats.f.sf((between[:2] / won[:2]) / (within[:2] / lost[:2]), won[:2], lost[:2])
+    assert p == pytest.approx([*expected, 1.0, 1.0])
+    # rows that are identical vary within no bin
+    assert _p(between[:1], won[:1], 0.0 * within[:1], lost[:1]) == 0.0

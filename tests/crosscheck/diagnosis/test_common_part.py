@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from made_data import measured, term
 
+from crosscheck.diagnosis.common_part import _in_its_place
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.measurements.data import Sigma
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
+from seecr.effects import Terms
 
 pytestmark = pytest.mark.slow
 
@@ -83,3 +88,24 @@ def test_what_data_tell_apart_or_do_not_see_is_not_noted(
     drums = next(one for one in found.missing if one.effect == DRUMS)
     assert drums.common is None and "common_part" not in drums.as_json()
     assert not any("in common" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(("left", "is_rival"), [(4.0, True), (12.0, False)])
+def test_a_rival_that_data_tell_apart_is_none_however_plausible(
+    left: float, is_rival: bool
+) -> None:
+    """Drums of thirty plausible sizes cost more than a scale, but readings say what it is."""
+    robot = load_robot(model_path("planar_two_cable"))
+    drums, scale = term(robot, DRUMS), term(robot, "tracker_scale")
+    drums = drums.with_vector(drums.layout.null + 30.0 * drums.layout.scale)
+    jacobian = np.eye(4)[:, :2]
+    fit: Any = SimpleNamespace(terms=Terms([drums]), jacobian=jacobian)
+    found: Any = SimpleNamespace(
+        problem=SimpleNamespace(robot=robot),
+        last=SimpleNamespace(whiteness=SimpleNamespace(inflation=1.0)),
+    )
+    signal = 30.0 * jacobian.sum(axis=1)
+    column = 0.1 * (signal + left**0.5 * np.eye(4)[3])
+    stays = np.eye(2) - 0.5
+    rivals = list(_in_its_place(found, fit, signal, stays, scale, column))
+    assert [one.name for one in rivals] == ["tracker_scale"] * is_rival

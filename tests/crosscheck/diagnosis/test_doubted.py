@@ -13,7 +13,7 @@ from made_data import COGIRO, measured, term
 import crosscheck
 from crosscheck.calibration.imitated import NOT_ASKED
 from crosscheck.diagnosis.chances import Chances
-from crosscheck.diagnosis.verdict import is_clear
+from crosscheck.diagnosis.verdict import is_clear, is_undetermined
 from crosscheck.fit.possible import hardly_happens
 from crosscheck.fit.reasons import Reason, Why
 from crosscheck.measurements.data import Measurements
@@ -137,3 +137,10 @@ def test_what_the_steps_leave_open_is_looked_at_in_sets() -> None:
         chances = Chances({}, classes, None, None, imitated=next(iter(imitated), None))
         steps: Any = SimpleNamespace(missing=missing, chances=chances, candidates=candidates)
         assert is_clear(steps) is clear
+
+
+def test_of_an_effect_only_a_shape_that_is_determined_says_nothing_about_its_size() -> None:
+    one = found(3, np.array([np.inf, np.inf, 0.1]))
+    assert not is_undetermined(one)
+    one.layout.shape[2] = True
+    assert is_undetermined(one)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from made_diagnoses import pulleys, unknown
 
 from crosscheck.calibration.equals import SMALL
 from crosscheck.diagnosis.importance import weighed
-from crosscheck.diagnosis.listed import left_out, missing_of, not_listed
-from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.listed import _with_equals, left_out, missing_of, not_listed
+from crosscheck.diagnosis.result import Diagnosis, NotListed
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.unexplained import unexplained, where_of
 from crosscheck.fit.problem import rms_by_kind
@@ -96,3 +98,21 @@ def test_a_joint_fit_in_the_form_of_a_fit_keeps_its_errors_and_names_what_is_uns
         fit.covariance[0, 0] ** 0.5
     )
     assert searched(pulleys()).last.node.evidence.parameters == 1
+
+
+def test_what_may_stand_for_a_listed_effect_has_that_reason_and_what_is_in_common_its_own() -> None:
+    common: Any = SimpleNamespace(rivals=[SimpleNamespace(name="tracker_scale")])
+    first: Any = SimpleNamespace(effect="drum_gain", indistinguishable=("creep",), common=common)
+    other: Any = SimpleNamespace(
+        effect="exit_point_error", indistinguishable=("anchor_point_error", "creep"), common=None
+    )
+    mine = Reason(Why.NOT_NEEDED)
+    names = ("creep", "anchor_point_error", "tracker_scale", "stiffness")
+    rows = [NotListed(name, name, 0.0, mine) for name in names]
+    told = {row.effect: row.why_not for row in _with_equals(rows, [first, other])}
+    assert told == {
+        "creep": Reason(Why.ALIKE, by=("drum_gain",)),
+        "anchor_point_error": Reason(Why.ALIKE, by=("exit_point_error",)),
+        "tracker_scale": Reason(Why.IN_COMMON, by=("drum_gain",)),
+        "stiffness": mine,
+    }

@@ -13,7 +13,7 @@ from seecr.description.shipped import model_path
 from seecr.effects.cable import CableWeight
 from seecr.holding.balance import balance_of, with_rest
 from seecr.holding.hanging import bridged_lengths, least_of_heavy, rest_for
-from seecr.holding.lengths import hold
+from seecr.holding.lengths import hold, hold_again
 from seecr.prediction.experiment import Experiment
 from seecr.statics import batch
 from seecr.statics.tables import Tables, assemble
@@ -71,3 +71,22 @@ def test_balance_about_tensions_is_exact_there() -> None:
     most = first.tensions.max(axis=0) * (1.0 + 1e-9)
     again = hold(tables, np.zeros((2, 8)), least, most)
     assert again.fine.all()
+
+
+def test_cables_that_pull_nothing_are_longer_than_their_span() -> None:
+    """A slack cable that is just as long would pull as soon as the platform moves a little."""
+    robot = load_robot(model_path("demobot_parallel"))
+    apart = np.random.default_rng(0).random((40, 3)) - 0.5
+    poses = np.tile(robot.reference_pose, (40, 1))
+    poses[:, :3] += np.ptp(robot.exit_points, axis=0) * [0.6, 0.6, 0.18] * apart
+    tables, m = tables_at(robot, poses, 0.0), robot.n_cables
+    low, high = np.zeros(m), np.full(m, np.inf)
+    held = hold(tables, np.zeros((len(tables), m)), low, high)
+    again = hold_again(tables, held, np.zeros((len(tables), m)), low, high)
+    spans = bridged_lengths(tables)
+    for one in (held, again):
+        slack = (one.tensions < 1e-9) & one.fine[:, None]
+        assert slack.sum() >= 5
+        assert np.all(one.rest[slack] > 1.001 * spans[slack])
+        pulls = ~slack & one.fine[:, None]
+        assert np.all(one.rest[pulls] < spans[pulls])
