@@ -239,3 +239,14 @@ def test_only_one_order_that_fits_far_better_is_named() -> None:
     assert exchanges(three) == {}  # 1 2 3 to 2 3 1 or to 3 1 2
     three[:3, :3] = [[9.0, 1.0, 9.0], [9.0, 9.0, 1.0], [1.0, 9.0, 9.0]]
     assert exchanges(three) == {0: 1, 1: 2, 2: 0}
+
+
+def test_where_every_length_fits_another_cable_an_axis_may_be_reversed_instead() -> None:
+    robot = load_robot("planar_two_cable")
+    data = measured(robot, [], points=4, sigma=SIGMA)
+    assert data.command_pose is not None
+    lengths = robot.commanded_lengths(data.command_pose)
+    mine = replace(data, command_pose=None, command_lengths=lengths[:, ::-1], told=True)
+    apart = misfits(lengths[:, ::-1], robot.nominal_lengths(data.command_pose), 1e-4)
+    assert exchanges(apart) == {0: 1, 1: 0}
+    assert not any("seem exchanged" in note for note in told(mine, robot))

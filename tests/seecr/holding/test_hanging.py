@@ -13,7 +13,7 @@ from seecr.description.shipped import model_path
 from seecr.effects.cable import CableWeight
 from seecr.holding.balance import balance_of, with_rest
 from seecr.holding.hanging import bridged_lengths, least_of_heavy, rest_for
-from seecr.holding.lengths import hold, hold_again
+from seecr.holding.lengths import Held, hold, hold_again
 from seecr.prediction.experiment import Experiment
 from seecr.statics import batch
 from seecr.statics.tables import Tables, assemble
@@ -90,3 +90,16 @@ def test_cables_that_pull_nothing_are_longer_than_their_span() -> None:
         assert np.all(one.rest[slack] > 1.001 * spans[slack])
         pulls = ~slack & one.fine[:, None]
         assert np.all(one.rest[pulls] < spans[pulls])
+
+
+def test_lengths_that_are_lost_are_sought_from_the_start() -> None:
+    """Where lengths held before do not lead to any, as if nothing had been held before."""
+    robot = load_robot(model_path("cogiro_large"))
+    tables, m = tables_at(robot, all_over(robot)), robot.n_cables
+    low, high, aim = np.full(m, 50.0), np.full(m, np.inf), np.full((len(tables), m), 50.0)
+    held = hold(tables, aim, low, high)
+    assert held.fine.any()
+    astray = Held(10.0 * held.rest, held.tensions, held.fine)
+    again = hold_again(tables, astray, aim, low, high)
+    assert again.fine.tolist() == held.fine.tolist()
+    assert again.rest[held.fine] == pytest.approx(held.rest[held.fine], rel=1e-6)
