@@ -25,7 +25,8 @@ from crosscheck.calibration.varying import Varying, varying
 
 # Fields that are worth so much less ln evidence than the best one are left out.
 _NEGLIGIBLE = 20.0
-# A field that is less likely than the members it could replace is told from this probability on.
+# A field that is less likely than the members it could replace is told from this probability on,
+# and so is one that is less likely than another.
 _DOUBT = 0.05
 
 
@@ -37,14 +38,19 @@ class Imitated:
         odds: ln odds of the field with the rest of the set over the whole set, with equal priors
             for an unknown effect and none; -inf if the set has no members of its own.
         replaced: the members that the field replaces.
-        seen: what the field changes; None if no field was tried.
+        seen: what the field changes, the likeliest first; empty if no field was tried.
         worth: ln evidence that each other member is worth beside the field.
     """
 
     odds: float
     replaced: Names
-    seen: Varying | None = None
+    seen: tuple[Varying, ...] = ()
     worth: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def words(self) -> str:
+        """What the field changes; several where these data cannot tell which."""
+        return "; or ".join(self.seen)
 
     @property
     def probability(self) -> float:
@@ -138,8 +144,8 @@ class _Sets:
         """ln evidence plus ln prior of a subset."""
         return self._solved(names).log_evidence + self._before(names)
 
-    def beside(self, names: Names) -> tuple[float, Varying]:
-        """The same with a field, averaged over all fields, and the field that explains most."""
+    def beside(self, names: Names) -> tuple[float, tuple[Varying, ...]]:
+        """The same with a field, averaged over all fields, and what is likely to vary."""
         own, every = self._solved(names), dict.fromkeys(self.fields, -np.inf)
         gains = {name: own.gains(name) for name in self.fields}
         least = max(float(gain.max()) for gain in gains.values()) - _NEGLIGIBLE
@@ -151,7 +157,16 @@ class _Sets:
             there = self.gram.solved({**own.chosen, name: float(width)})
             every[name] = there.log_evidence + averaging(there, name)
         total = float(special.logsumexp(list(every.values())) - np.log(len(every)))
-        return total + self._before(names), self.fields[max(every, key=lambda name: every[name])]
+        return total + self._before(names), self._likely(every)
+
+    def _likely(self, every: Mapping[str, float]) -> tuple[Varying, ...]:
+        """What is likely to vary, the likeliest first, by the ln evidence of each field."""
+        share = dict[Varying, float]()
+        for name, part in zip(every, special.softmax(list(every.values())), strict=True):
+            what = self.fields[name]
+            share[what] = share.get(what, 0.0) + float(part)
+        order = sorted(share, key=lambda what: -share[what])
+        return tuple(what for what in order if what is order[0] or share[what] > _DOUBT)
 
     def _solved(self, names: Names) -> Solved:
         return self.gram.solved({n: w for n, w in self.chosen.items() if n in names})

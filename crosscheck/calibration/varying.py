@@ -2,8 +2,9 @@
 
 A hose pulls differently at each place. A few numbers describe such a force, but known effects can
 imitate what it does to all readings. So besides cubics of the readings, the candidates are a force
-and cable lengths that change linearly with the position, and a spring, which pulls towards a point.
-A tracker that moves shows over the session, wherever the platform is.
+and cable lengths that change linearly with the position, a spring, which pulls towards a point, and
+lengths that are a cubic of how far each winch has turned. Of a lens a few numbers describe all as
+well. A tracker that moves shows over the session, wherever the platform is.
 """
 
 from __future__ import annotations
@@ -58,6 +59,10 @@ class Varying(StrEnum):
         "cable lengths that change with the position",
         "measure what each winch pays out, at several lengths and with the other winches elsewhere",
     )
+    WINCHES = (
+        "lengths that change with how far the winches have turned, as with rope in layers",
+        "measure what each winch pays out turn by turn, over all of its travel",
+    )
 
     advice: str
 
@@ -81,7 +86,7 @@ def varying(setting: Setting, joint: JointFit) -> list[tuple[Varying, Array]]:
     quadratic, and a prior as wide for all coefficients would cost it more than it explains. In all
     readings together whatever is known is smooth as well, so that this tells nothing there.
     """
-    parts = (_of_readings, _of_one_kind, _of_tracker, _of_robot)
+    parts = (_of_readings, _of_one_kind, _of_lens, _of_tracker, _of_robot)
     every = (one for part in parts for one in part(setting, joint))
     return [(what, columns) for what, columns in every if np.any(columns)]
 
@@ -110,6 +115,35 @@ def _by_kind(setting: Setting, joint: JointFit, smooth: float) -> list[tuple[Var
     return [(_ALONE[KINDS[kind].name], columns[:, kind_of == kind]) for kind in kinds]
 
 
+def _of_lens(setting: Setting, joint: JointFit) -> Iterator[tuple[Varying, Array]]:
+    """A picture that widens with the square of the distance from some point.
+
+    It has few coefficients where a cubic of the position has sixty: with the latter alone, what
+    else has few would be likelier than the lens that is there.
+    """
+    problem, state = setting.problem, joint.state
+    place = state.prediction.pose[:, :3]
+    change = np.zeros((*problem.measured.shape, 16))
+    change[:, POSITION] = widening(place)
+    yield Varying.POSITION, _scaled(problem.whiten(state.factor, change))
+
+
+def widening(place: Array) -> Array:
+    """(n, 3, 16) how places (n, 3) move in such a picture, about any point, to first order.
+
+    Moving the point adds what is quadratic, linear and constant in the place; the linear part is
+    left free, as for a tracker whose axes have scales of their own.
+    """
+    off = place - 0.5 * (place.max(axis=0) + place.min(axis=0))
+    off = off / max(float(np.abs(off).max()), 1e-300)
+    axes = np.broadcast_to(np.eye(3), (len(off), 3, 3))
+    square = np.sum(off**2, axis=1)[:, None, None]
+    linear = np.einsum("nj,ik->nikj", off, np.eye(3)).reshape(len(off), 3, 9)
+    quadratic = square * axes + 2.0 * off[:, :, None] * off[:, None, :]
+    cubic = square * off[:, :, None]
+    return np.concatenate([axes, linear, quadratic, cubic], axis=2)
+
+
 def _of_tracker(setting: Setting, _joint: JointFit) -> Iterator[tuple[Varying, Array]]:
     """A cubic in the time for each channel of the position."""
     columns = field_columns(setting.problem, _session(setting)[:, None], POSITION.stop)
@@ -136,6 +170,22 @@ def _of_robot(setting: Setting, joint: JointFit) -> Iterator[tuple[Varying, Arra
     yield Varying.SPRING, _scaled(np.hstack([_scaled(force), _scaled(towards)]))
     lengths = _rates(setting, joint, "cable_length_offset")
     yield Varying.LENGTHS, _scaled(_products(lengths, linear))
+    every = _of_turns(setting, joint, lengths)
+    # alike for all winches, and for each by itself
+    yield Varying.WINCHES, _scaled(every.sum(axis=1))
+    yield Varying.WINCHES, _scaled(every.reshape(len(every), -1))
+
+
+def _of_turns(setting: Setting, joint: JointFit, lengths: Array) -> Array:
+    """(N, m, 3) derivatives by what is linear, quadratic and cubic in each winch's own turning.
+
+    Args:
+        lengths: (N, m) derivatives by each cable's length.
+    """
+    turned = joint.state.prediction.setup.commanded_change
+    turned = turned / max(float(np.abs(turned).max(initial=0.0)), 1e-300)
+    powers = np.stack([turned, turned**2, turned**3], axis=-1)[setting.problem.row_of]
+    return np.asarray(lengths[:, :, None] * powers)
 
 
 def _rates(setting: Setting, joint: JointFit, name: str) -> Array:

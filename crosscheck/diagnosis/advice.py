@@ -131,7 +131,7 @@ def measure_next(
     verdict: DiagnosisVerdict,
     where: Sequence[Association],
     alternatives: Sequence[Names] = (),
-    seen: Varying | None = None,
+    seen: Sequence[Varying] = (),
 ) -> list[str]:
     """What to measure to tell effects apart, confirm or find them, a sentence each.
 
@@ -139,7 +139,7 @@ def measure_next(
         found: the search that leads to what is missing.
         missing, verdict, where: as in the diagnosis.
         alternatives: sets of effects of which one is missing.
-        seen: where something unknown shows, if effects imitate it.
+        seen: what something unknown may change, if effects imitate it.
     """
     out = []
     plan = Planned(found.problem, found.last.fit, found.factor, Reads.of(found.problem.data))
@@ -156,8 +156,7 @@ def measure_next(
     if verdict is DiagnosisVerdict.MANY_EFFECTS:
         out.append(_CALIBRATE)
     if verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
-        if seen is not None and seen.advice:
-            out.append(f"to find {seen}: {seen.advice}")
+        out += [f"to find {what}: {what.advice}" for what in seen if what.advice]
         out += [_to_find(where), _ALL_AT_ONCE]
     if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         out.append("nothing that matters is missing; to find smaller effects, use crosscheck plan")

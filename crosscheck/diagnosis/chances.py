@@ -78,13 +78,13 @@ class Chances:
         unknown: dict[str, object] = {"log_odds": self.field, "shown_from": self.shown}
         if self.imitated is not None:
             unknown |= {
-                "instead_of": sorted(self.imitated.replaced), "seen_in": self.imitated.seen,
+                "instead_of": sorted(self.imitated.replaced), **_seen(self.imitated),
             }  # fmt: skip
         if self.doubt is not None:
             unknown["not_excluded"] = {
                 "probability": self.doubt.probability,
                 "instead_of": sorted(self.doubt.replaced),
-                "seen_in": self.doubt.seen,
+                **_seen(self.doubt),
             }
         place = {n: k for k, (members, _p) in enumerate(self.classes) for n in members}
         return {
@@ -96,6 +96,12 @@ class Chances:
             "unknown": unknown,
             **({} if self.together is None else {"calibrated": self.together.as_json()}),
         }
+
+
+def _seen(field: Imitated) -> dict[str, object]:
+    """What a field changes, the likeliest by itself."""
+    likeliest, *others = field.seen
+    return {"seen_in": likeliest, **({"or_in": others} if others else {})}
 
 
 def chances_of(sought: SetSearch) -> Chances:

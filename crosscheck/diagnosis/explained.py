@@ -167,7 +167,7 @@ def _sentence(
         known = " + ".join(sorted(said.imitated.replaced))
         left = (
             f"an unknown effect is more probable than {known}, which can imitate it: "
-            f"{said.imitated.seen}"
+            f"{said.imitated.words}"
         )
         return and_what_is_left(words_of(missing), left, tried)
     if said.verdict is DiagnosisVerdict.EFFECTS_FOUND:

@@ -79,13 +79,13 @@ def doubts_about(missing: Iterable[MissingEffect], chances: Chances | None) -> l
     """A note about something unknown that may be there in place of listed effects, if any."""
     doubt = None if chances is None else chances.doubt
     listed = {name for one in missing for name in (one.effect, *one.indistinguishable)}
-    if doubt is None or doubt.seen is None or listed.isdisjoint(doubt.replaced):
+    if doubt is None or listed.isdisjoint(doubt.replaced):
         return []
-    advice = f"; {doubt.seen.advice}" if doubt.seen.advice else ""
+    advice = "".join(f"; {what.advice}" for what in doubt.seen if what.advice)
     likely = probability_words(doubt.probability)
     return [
         f"there may be something else in place of {' + '.join(sorted(doubt.replaced))} "
-        f"(probability {likely}): {doubt.seen}{advice}"
+        f"(probability {likely}): {doubt.words}{advice}"
     ]
 
 

@@ -70,7 +70,7 @@ def test_the_odds_are_those_of_the_covariances() -> None:
     prior = scores.log_prior(frozenset()) - scores.log_prior(frozenset({"tracker_scale"}))
     expected = float(special.logsumexp(fields)) - np.log(len(parts)) - without + prior
     assert found.odds == pytest.approx(expected, abs=1e-3)
-    assert found.replaced == {"tracker_scale"} and found.seen is Varying.POSITION
+    assert found.replaced == {"tracker_scale"} and found.seen[0] is Varying.POSITION
     assert found.odds < UNKNOWN and found.chance == 0.0 and not found.worth
 
 
@@ -87,7 +87,7 @@ def test_the_odds_are_those_of_the_covariances() -> None:
 def test_a_field_that_is_less_likely_is_a_doubt_from_one_in_twenty_on(
     odds: float, doubt: bool, chance: float
 ) -> None:
-    found = Imitated(odds, frozenset("a"), Varying.POSITION)
+    found = Imitated(odds, frozenset("a"), (Varying.POSITION,))
     assert found.is_doubt is doubt and found.chance == pytest.approx(chance, abs=1e-3)
 
 
@@ -240,9 +240,24 @@ def test_what_it_replaces_and_what_the_others_are_worth_are_those_of_the_covaria
         count = len([k for k in columns if k < 4])
         return averaged_density(y, x[:, list(columns)], (1.0,)) + log_prior(count, 26)
 
-    assert found.replaced == {"a", "b"} and found.seen is Varying.FORCE and found.chance > 0.9
+    assert found.replaced == {"a", "b"} and found.seen == (Varying.FORCE,) and found.chance > 0.9
     assert found.odds == pytest.approx(total(2, 4) - total(0, 1, 2), abs=1e-6)
     assert found.worth == pytest.approx({"c": total(2, 4) - total(4)}, abs=1e-6)
+
+
+def test_what_explains_about_as_well_is_told_as_well() -> None:
+    sets, _x, _y = toy()
+    fields = {"a": Varying.POSITION, "b": Varying.WINCHES, "c": Varying.POSITION}
+    every = replace(sets, fields=fields)
+    with_all = np.log([0.5, 0.45, 0.05])
+    assert every._likely(dict(zip("abc", with_all, strict=True))) == (
+        Varying.POSITION, Varying.WINCHES,
+    )  # fmt: skip
+    assert every._likely({"a": -50.0, "b": -46.0, "c": -np.inf}) == (Varying.WINCHES,)
+    # each by what all of its fields have together
+    assert every._likely({"a": 0.0, "b": 0.5, "c": 0.0})[0] is Varying.POSITION
+    two = Imitated(6.0, frozenset("a"), (Varying.POSITION, Varying.WINCHES))
+    assert two.words == f"{Varying.POSITION}; or {Varying.WINCHES}"
 
 
 def test_what_is_worth_nothing_is_not_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -298,6 +313,10 @@ def test_a_lens_earns_more_with_smaller_coefficients_of_higher_degrees(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     setting, joint = with_a_lens()
+    round_too = evidence(setting, joint)
+    monkeypatch.setattr(what_varies, "_of_lens", lambda *_: iter(()))
     found = evidence(setting, joint)
+    # what is known to be round has fewer still
+    assert round_too > found + 5.0
     monkeypatch.setattr(what_varies, "SMOOTH", 1.0)
     assert found > evidence(setting, joint) + 10.0

@@ -44,6 +44,11 @@ def moved(setting: Setting, joint: JointFit, **changed: object) -> Array:
     return np.asarray(white[1] - white[0])
 
 
+def lengthened(setting: Setting, joint: JointFit, more: Array) -> Array:
+    """(N,) by how much readings change, in units of their noise, with longer cables (n, m) [m]."""
+    return moved(setting, joint, lengths=joint.state.prediction.setup.rest_lengths() + more)
+
+
 def unexplained(columns: Array, signal: Array) -> float:
     """The part of a signal that columns cannot explain."""
     solved = np.linalg.lstsq(columns, signal, rcond=None)[0]
@@ -120,6 +125,39 @@ def test_all_but_what_is_everywhere_say_what_to_look_at() -> None:
     )  # hoses; the tracker's picture
 
 
+def test_rope_in_layers_shows_over_the_turns_of_the_winches(fit: tuple[Setting, JointFit]) -> None:
+    setting, joint = fit
+    change = joint.state.prediction.setup.commanded_change
+    layers = LITTLE * (change**2 - 2.0 * change**3)
+    alike, each = [c for what, c in varying(setting, joint) if what is Varying.WINCHES]
+    assert alike.shape[1] == 3 and each.shape[1] == 3 * ROBOT.n_cables
+    signal = lengthened(setting, joint, layers)
+    assert unexplained(alike, signal) < 1e-3 and unexplained(each, signal) < 1e-3
+    # of one winch alone
+    signal = lengthened(setting, joint, layers * (np.arange(ROBOT.n_cables) == 2))
+    assert unexplained(each, signal) < 1e-3 < 0.1 < unexplained(alike, signal)
+    # or by how far another one turned
+    signal = lengthened(setting, joint, layers[:, ::-1])
+    assert unexplained(each, signal) > 0.05
+
+
+def test_a_lens_is_said_with_few_numbers(fit: tuple[Setting, JointFit]) -> None:
+    """Wherever its middle is, if the picture widens little from there to here."""
+    setting, joint = fit
+    place = joint.state.prediction.pose[:, :3]
+    ((what, few),) = (one for one in varying(setting, joint) if one[1].shape[1] == 16)
+    assert what is Varying.POSITION
+    problem = setting.problem
+    for aside in ([0.0, 0.0, 0.0], [0.7, -0.2, 1.5]):
+        off = place - place.mean(axis=0) - aside
+        bent = np.zeros(problem.measured.shape)
+        bent[:, :3] = off * np.sum(off**2, axis=1, keepdims=True)
+        assert unexplained(few, problem.whiten(setting.factor, bent)) < 1e-9
+    # but no picture that is bent otherwise
+    bent[:, :3] = off * off[:, :1] ** 2
+    assert unexplained(few, problem.whiten(setting.factor, bent)) > 0.01
+
+
 def test_smooth_fields_have_smaller_columns_the_higher_their_degree(
     fit: tuple[Setting, JointFit],
 ) -> None:
@@ -127,7 +165,7 @@ def test_smooth_fields_have_smaller_columns_the_higher_their_degree(
     first, smooth = (
         np.linalg.norm(columns, axis=0).reshape(3, -1)
         for what, columns in kinds
-        if what is Varying.POSITION
+        if what is Varying.POSITION and columns.shape[1] == 60
     )
     # constant, three linear, six quadratic and ten cubic monomials of each channel
     degree = np.repeat([0, 1, 2, 3], [1, 3, 6, 10])
@@ -145,4 +183,5 @@ def test_of_the_only_kind_that_was_read_smoothness_tells_nothing() -> None:
     terms = Terms([term(robot, "tracker_scale", factor=1.0)])
     joint = settle(setting, evaluate(problem, terms, factor), widths_of(terms), WHITE)
     kinds = [what for what, _ in varying(setting, joint)]
-    assert kinds.count(Varying.POSITION) == 1 and Varying.READINGS not in kinds
+    # one cubic, and a lens
+    assert kinds.count(Varying.POSITION) == 2 and Varying.READINGS not in kinds

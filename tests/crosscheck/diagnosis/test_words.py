@@ -58,7 +58,7 @@ def test_what_is_left_beside_what_was_found_may_hide_something() -> None:
 
 
 def test_what_imitates_something_unknown_is_told_with_where_that_shows() -> None:
-    imitated = Imitated(9.0, frozenset({"length_scale", "creep"}), Varying.POSITION)
+    imitated = Imitated(9.0, frozenset({"length_scale", "creep"}), (Varying.POSITION,))
     said = Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), 0.0, imitated=imitated)
     assert _sentence(said, [], 26, Chances({}, (), None, None)) == (
         "An unknown effect is more probable than creep + length_scale, which can imitate it: "
@@ -69,7 +69,7 @@ def test_what_imitates_something_unknown_is_told_with_where_that_shows() -> None
 
 def test_what_a_field_could_replace_is_told_if_that_is_not_excluded() -> None:
     """Expansion was listed above 95 % where a field of the position is as likely."""
-    doubt = Imitated(4.98, frozenset({"thermal_expansion"}), Varying.POSITION)
+    doubt = Imitated(4.98, frozenset({"thermal_expansion"}), (Varying.POSITION,))
     chances = Chances({}, (), None, None, doubt=doubt)
     listed = cast(MissingEffect, SimpleNamespace(effect="creep", indistinguishable=[]))
     alike = cast(
@@ -87,3 +87,15 @@ def test_what_a_field_could_replace_is_told_if_that_is_not_excluded() -> None:
         "probability": doubt.probability, "instead_of": ["thermal_expansion"],
         "seen_in": Varying.POSITION,
     }  # fmt: skip
+
+
+def test_what_data_do_not_tell_apart_is_told_with_what_to_do_about_each() -> None:
+    seen = (Varying.POSITION, Varying.WINCHES)
+    doubt = Imitated(4.98, frozenset({"creep"}), seen)
+    chances = Chances({}, (), None, None, doubt=doubt)
+    listed = cast(MissingEffect, SimpleNamespace(effect="creep", indistinguishable=[]))
+    (note,) = doubts_about([listed], chances)
+    assert f": {Varying.POSITION}; or {Varying.WINCHES}; move the tracker" in note
+    assert note.endswith("; measure what each winch pays out turn by turn, over all of its travel")
+    unknown = chances.as_json()["unknown"]["not_excluded"]
+    assert unknown["seen_in"] is Varying.POSITION and unknown["or_in"] == [Varying.WINCHES]
