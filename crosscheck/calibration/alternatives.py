@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from crosscheck.calibration.equals import EQUAL
 from crosscheck.calibration.exact import FEW
 from crosscheck.calibration.probability import Classes
@@ -10,6 +12,16 @@ from crosscheck.calibration.sets import Names
 
 # More alternatives than these are too many to read.
 _MOST = 3
+
+
+def shared(some: Sequence[Names], classes: Classes) -> Names:
+    """Members of the first of several sets that each of them has, or an equivalent."""
+    if not some:
+        return frozenset()
+    same = {e: frozenset(members) for members in classes.members for e in members}
+    return frozenset(
+        name for name in some[0] if all(same.get(name, {name}) & other for other in some)
+    )
 
 
 def alternatives(found: Found, classes: Classes) -> list[Names]:

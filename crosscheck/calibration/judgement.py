@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from crosscheck.calibration.alternatives import alternatives, shared
 from crosscheck.calibration.equals import SMALL
 from crosscheck.calibration.field import UNKNOWN
 from crosscheck.calibration.imitated import NOT_ASKED, Imitated
@@ -101,6 +102,8 @@ def judge(
     few = few and not doubted and not more and not large
     sure = adequate(found, sure) if few and sure else sure_effects(found, classes, False)
     sure = tuple(name for name in sure if name not in doubted)
+    if not sure and len(best) <= _FEW and not doubted and not large:
+        sure = in_each(found, classes)
     if more:
         worth = worths(found)
         sure = tuple(name for name in carrying_most(found, worth, _MOST) if name in sure)
@@ -116,6 +119,19 @@ def judge(
         return Judgement(DiagnosisVerdict.NO_EFFECT_MISSING, (), undecided)
     verdict = DiagnosisVerdict.EFFECTS_FOUND if few and sure else DiagnosisVerdict.MANY_EFFECTS
     return Judgement(verdict, sure, undecided, doubted, more)
+
+
+def in_each(found: Found, classes: Classes) -> tuple[str, ...]:
+    """Members that are sure in each of several sets of few effects that explain as well.
+
+    What these do in different ways may be most of what is there, so that no part of it counts.
+    """
+    some = alternatives(found, classes)
+    if len(some) < 2:
+        return ()
+    every, worth = shared(some, classes), worths(found)
+    sure = [e for e in every if classes.of(e) > SURE and worth.get(e, 0.0) > _WORTH]
+    return tuple(sorted(sure, key=lambda e: -worth[e]))
 
 
 def too_large(sizes: Iterable[int]) -> bool:

@@ -27,7 +27,8 @@ _UNDERSTATED, _TOGETHER, _ALIKE = 3.0, 2.3, 0.3
 # twice the stated size.
 _HALF, _ERRORS = 2.0, 3.0
 # Estimates from differences of neighbouring rows are too small if noise is autocorrelated, so that
-# larger and more correlated noise is accepted.
+# larger noise is accepted. What is more correlated than _DRIFT is a drift: its size is hardly known
+# from a few runs, so that most_together() would let anything pass.
 _ESTIMATED, _DRIFT = 5.0, 0.9
 # Outliers are more than noise has if they are more than this part of the rows that a sensor reads,
 # and more than chance gives where it throws one row in ten far off.
@@ -62,9 +63,21 @@ def too_loud(colour: Colour, readings: NDArray[np.int64], stated: Collection[str
         if KINDS[k].name not in stated:
             if scale > _ESTIMATED or rho > _DRIFT:
                 return True
-        elif scale > _UNDERSTATED or (rho > _ALIKE and scale > most_together(rho, readings[k])):
+        elif scale > most_stated(rho, readings[k]):
             return True
     return False
+
+
+def most_stated(rho: float, readings: int) -> float:
+    """How many times the stated size noise may have, with correlation rho."""
+    if drifts(rho, readings):
+        return _HALF
+    return min(_UNDERSTATED, most_together(rho, readings)) if rho > _ALIKE else _UNDERSTATED
+
+
+def drifts(rho: float, readings: int) -> bool:
+    """Whether N readings are more correlated than noise is, by two standard errors."""
+    return bool(rho - 2.0 * np.sqrt(max(1.0 - rho**2, 0.0) / readings) > _DRIFT)
 
 
 def most_together(rho: float, readings: int) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -11,13 +11,12 @@ from crosscheck.calibration.varying import Varying
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.diagnosis.result import MissingEffect
-from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.planning.adding import Extension
 from crosscheck.planning.extensions import extensions
 from crosscheck.planning.planned import Planned, Reads
-from crosscheck.planning.proposer import Suggestion, telling_apart
+from crosscheck.planning.proposer import Gain, Suggestion, telling_apart
 from crosscheck.planning.words import signal_words
 from crosscheck.units import in_unit, parameter_name
 from seecr.description.robot import Robot
@@ -145,8 +144,7 @@ def measure_next(
     plan = Planned(found.problem, found.last.fit, found.factor, Reads.of(found.problem.data))
     options = list(extensions(plan)) if any(effect.rivals for effect in missing) else []
     for effect in missing:
-        for rival in effect.rivals:
-            out += _to_separate(plan, options, effect, rival)
+        out += _to_separate(plan, options, effect)
         if not effect.rivals:
             out.append(f"to confirm {effect.effect}: {effect.check}")
         if effect.common is not None:
@@ -177,28 +175,57 @@ def measured_directly(effect: str) -> str:
     return catalogue()[effect].by_hand()
 
 
-def _to_separate(
-    plan: Planned, options: Sequence[Extension], effect: MissingEffect, rival: Rival
-) -> list[str]:
-    start = f"to tell {effect.effect} from {rival.name}:"
-    direct = list(dict.fromkeys(measured_directly(n) for n in (effect.effect, rival.name)))
-    ways = telling_apart(plan, options, effect.effect, rival.layout)[:_MOST_WAYS]
-    if not ways:
+def _to_separate(plan: Planned, options: Sequence[Extension], effect: MissingEffect) -> list[str]:
+    """What tells an effect from each of its rivals; what tells it from several is said once."""
+    ways = {
+        rival.name: telling_apart(plan, options, effect.effect, rival.layout)[:_MOST_WAYS]
+        for rival in effect.rivals
+    }
+    by_words: dict[str, dict[str, Gain]] = {}
+    for name, some in ways.items():
+        for way in some:
+            by_words.setdefault(_words_of(way), {})[name] = way.gains[0]
+    alone = {words: gains for words, gains in by_words.items() if len(gains) == 1}
+    out = list[str]()
+    for name, some in ways.items():
+        own = [f"{w} {_signal(alone[w])}" for w in map(_words_of, some) if w in alone]
+        out += _from_one(effect.effect, name, own, bool(some))
+    for words, gains in by_words.items():
+        if words not in alone:
+            every = ", ".join(gains)
+            out.append(f"to tell {effect.effect} from {every}: {words} {_signal(gains)}")
+    return out
+
+
+def _from_one(effect: str, rival: str, ways: Sequence[str], can_be: bool) -> list[str]:
+    """What tells two effects apart: by hand, and by ways that tell no others apart.
+
+    Args:
+        can_be: whether there is any such way, also among those for several.
+    """
+    start = f"to tell {effect} from {rival}:"
+    direct = list(dict.fromkeys(measured_directly(n) for n in (effect, rival)))
+    if not can_be:
         return [
             f"{start} {' or '.join(direct)}; none of the further poses, payloads and tensions "
             "tried here separates them"
         ]
-    first, *others = (_words_of(way) for way in ways)
-    return [f"{start} {direct[-1]}, or {first}", *(f"{start} {way}" for way in others)]
+    first = f"{start} {', or '.join([direct[-1], *ways[:1]])}"
+    return [first, *(f"{start} {way}" for way in ways[1:])]
+
+
+def _signal(gains: Mapping[str, Gain]) -> str:
+    """How well a measurement tells an effect from others; from the closest, if from several."""
+    least = min(gains.values(), key=lambda gain: gain.then)
+    them = "them" if len(gains) == 1 else "the closest of them"
+    return f"(signal that separates {them}: {signal_words(least)})"
 
 
 def _words_of(way: Suggestion) -> str:
-    gain = way.gains[0]
-    words = way.words
-    if way.poses is not None:
-        places = ", ".join(_place(pose) for pose in way.poses)
-        words = f"add poses at {places}"
-    return f"{words} (signal that separates them: {signal_words(gain)})"
+    if way.poses is None:
+        return way.words
+    places = ", ".join(_place(pose) for pose in way.poses)
+    return f"add poses at {places}"
 
 
 def _place(pose: Array) -> str:

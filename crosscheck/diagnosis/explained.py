@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from crosscheck.calibration.alternatives import alternatives
+from crosscheck.calibration.alternatives import alternatives, shared
 from crosscheck.calibration.equals import EQUAL
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.judgement import Judgement
@@ -56,7 +56,11 @@ def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
     search = steps_of_set(sought, frozenset(sought.judgement.sure))
     chances = chances_of(sought)
     more = sought.judgement.more
-    some = [] if search.found or more or imitated else alternatives(sought.found, sought.classes)
+    some = [] if more or imitated else alternatives(sought.found, sought.classes)
+    if search.found and (
+        len(some) < 2 or not shared(some, sought.classes).issuperset(search.found)
+    ):
+        some = []
     missing = [_missing(sought, search, chances, name) for name in search.found]
     return diagnosis_of(
         verdict,
@@ -65,7 +69,7 @@ def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
         search,
         before=sought.calibration.before,
         floor=_floor(sought),
-        candidates=_not_listed(search, chances),
+        candidates=_not_listed(search, chances, verdict, frozenset().union(*some)),
         notes=(*notes, *_noise_notes(sought), *_size_notes(sought), *([MORE] * more)),
         chances=chances,
         where=where_of(search) if imitated else (),
@@ -179,18 +183,20 @@ def _sentence(
         f"On held-out runs it is {rms_words(together.before)} as the model stands and "
         f"{rms_words(together.held_out)} with all {tried} effects together."
     )
+    sure = ", ".join(m.effect for m in missing)
     if len(alternatives) > 1:
         return (
             "No few effects explain the error with certainty: these data leave open whether it is "
-            f"{either(alternatives)}. {all_of_them}"
+            f"{either(alternatives)}. "
+            + (f"Certain in each of them: {sure}. " if sure else "")
+            + all_of_them
         )
-    if alternatives:
+    if alternatives and not sure:
         some = probable_words(hints_of(chances, (), alternatives[0]))
         return (
             "No few effects explain the error with certainty; most probably it is "
             f"{some}. {all_of_them}"
         )
-    sure = ", ".join(m.effect for m in missing)
     return (
         f"No few effects explain the error, but all {tried} together do: they reduce it from "
         f"{rms_words(together.before)} to {rms_words(together.held_out)} on held-out runs. "
@@ -198,21 +204,39 @@ def _sentence(
     )
 
 
-def _not_listed(search: Search, chances: Chances) -> list[NotListed]:
-    """All effects that are not listed, the most probable first."""
-    rows = left_out(search, search.found, lambda c: _why_not(search, chances, c))
+def _not_listed(
+    search: Search, chances: Chances, verdict: DiagnosisVerdict, undecided: Names
+) -> list[NotListed]:
+    """All effects that are not listed, the most probable first.
+
+    Args:
+        undecided: members of sets of which the data leave open which it is.
+    """
+    listed = search.found
+
+    def why_not(c: Candidate) -> Reason:
+        p = chances.effect.get(c.name, 0.0)
+        alike = _alike(search, chances, c)
+        if alike is not None:
+            return alike
+        if listed and verdict is not DiagnosisVerdict.MANY_EFFECTS:
+            why = Why.CARRIES_LITTLE if p > PROBABLE else Why.NOT_NEEDED_BESIDE
+            return Reason(why, p=p, by=listed)
+        if p <= PROBABLE:
+            return Reason(Why.IMPROBABLE, p=p)
+        is_small = listed and c.name not in undecided
+        return Reason(Why.DOES_LITTLE if is_small else Why.NOT_SURE, p=p)
+
+    rows = left_out(search, listed, why_not)
     return sorted(rows, key=lambda row: (-chances.effect.get(row.effect, 0.0), -row.score))
 
 
-def _why_not(search: Search, chances: Chances, c: Candidate) -> Reason:
-    p = chances.effect.get(c.name, 0.0)
+def _alike(search: Search, chances: Chances, c: Candidate) -> Reason | None:
+    """That an effect imitates something unknown, or is a listed one's equivalent."""
     if chances.imitated is not None and c.name in chances.imitated.replaced:
         return Reason(Why.MAY_IMITATE)
     for members, _p in chances.classes:
         first = next((m for m in members if m in search.found), None)
         if c.name in members and first is not None:
             return Reason(Why.ALIKE, by=(first,))
-    if search.found:
-        why = Why.CARRIES_LITTLE if p > PROBABLE else Why.NOT_NEEDED_BESIDE
-        return Reason(why, p=p, by=search.found)
-    return Reason(Why.NOT_SURE if p > PROBABLE else Why.IMPROBABLE, p=p)
+    return None

@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from crosscheck.calibration.judgement import SURE, too_large
 from crosscheck.calibration.search import search_sets
-from crosscheck.diagnosis.chances import chances_of
+from crosscheck.diagnosis.chances import PROBABLE, chances_of
 from crosscheck.diagnosis.explained import explained
 from crosscheck.diagnosis.importance import weighed
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
@@ -170,8 +170,9 @@ def _searched(
 def is_clear(steps: Diagnosis) -> bool:
     """Whether the steps settle it: their effects are sure, few enough and imitate nothing unknown.
 
-    Nor may another class be sure, or another effect be hinted at: several effects may hint at the
-    same although none of them is worth its parameters. And the data have to determine something of
+    Nor may another class be probable, or another effect be hinted at: several effects may hint at
+    the same although none of them is worth its parameters, and what the steps took first may stand
+    for two others. And the data have to determine something of
     each effect: beside misplaced points of all cables, a platform off its start is only a part of
     these.
     """
@@ -183,7 +184,7 @@ def is_clear(steps: Diagnosis) -> bool:
         return False
     listed = {effect.effect for effect in steps.missing}
     classes = () if steps.chances is None else steps.chances.classes
-    further = any(p > SURE and listed.isdisjoint(members) for members, p in classes)
+    further = any(p > PROBABLE and listed.isdisjoint(members) for members, p in classes)
     unsure = any(c.why_not is not None and c.why_not.why is Why.NOT_SURE for c in steps.candidates)
     return all(e.probability > SURE for e in steps.missing) and not unsure and not further
 

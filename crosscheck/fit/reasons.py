@@ -47,6 +47,9 @@ class Why(Enum):
     CARRIES_LITTLE = (
         "probable ({chance}) but not certain: it explains little once {by} {are} in the model"
     )
+    DOES_LITTLE = (
+        "probable ({chance}) but not certain: it does little beside the others that are probable"
+    )
     NOT_SURE = "probable ({chance}) but not certain"
     IMPROBABLE = "explains too little (probability {chance})"
     IMITATES = "not certain: its {parameters} can imitate much of the unexplained error"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from crosscheck.calibration import search
-from crosscheck.calibration.alternatives import alternatives
+from crosscheck.calibration.alternatives import alternatives, shared
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.gram import ColumnGroup, gram_of
 from crosscheck.calibration.imitated import Imitated
@@ -211,6 +211,25 @@ def test_a_large_set_is_many_effects_and_names_what_carries_it() -> None:
     without = {"abcdef".replace(x, ""): -40.0 for x in "bcdef"}
     said = judged({"": -90000.0, "abcdef": 0.0, "bcdef": -50000.0, **without})
     assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ("a",))
+
+
+def test_what_each_of_several_sets_has_is_sure_though_what_is_open_is_worth_more() -> None:
+    either = {"": -9000.0, "ab": 0.0, "acd": -0.1, "a": -5000.0, "b": -300.0, "cd": -301.0}
+    said = judged(either)
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ("a",))
+    # unless what it is worth is little, or there is one set only
+    said = judged({**either, "b": -20.0, "cd": -21.0})
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ())
+    # or a set has something else in its place
+    assert judged({**either, "ec": -0.2}).sure == ()
+
+
+def test_an_equivalent_counts_as_the_same_member() -> None:
+    found = found_of({"": -900.0, "ab": 0.0, "cb": -0.5})
+    classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
+    assert shared([frozenset("ab"), frozenset("cbd")], classes) == {"a", "b"}
+    assert shared([frozenset("ab"), frozenset("d")], classes) == frozenset()
+    assert shared([], classes) == frozenset()
 
 
 def open_sets(scores: dict[str, float]) -> list[set[str]]:

@@ -39,6 +39,9 @@ def noise(scale: float, rho: float) -> Colour:
         (2.4, 0.4, False),
         (2.6, 0.8, False),
         (4.0, 0.0, False),
+        (1.9, 0.97, True),
+        (2.1, 0.97, False),  # a drift, whose size a few runs hardly tell
+        (2.1, 0.92, True),  # which 0.88 may look like
     ],
 )
 def test_stated_noise_may_be_coloured_and_wrong_by_two_but_no_more(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from linear_toy import toy
@@ -10,9 +13,12 @@ from made_data import soft_cogiro, term
 from crosscheck.calibration.varying import Varying
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.quantities import EVERYWHERE, QuantityKind
+from crosscheck.diagnosis import advice as what_next
 from crosscheck.diagnosis.advice import check_of, measure_next, measured_directly
 from crosscheck.diagnosis.search import Search, search
 from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.planning.adding import Adding
+from crosscheck.planning.proposer import Gain, Suggestion
 from seecr.effects import Term, catalogue, layout_of
 
 
@@ -63,15 +69,52 @@ def test_beside_a_constant_offset_it_is_looked_for_where_the_rest_goes(found: Se
     )
 
 
+def test_what_tells_an_effect_from_several_others_is_said_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    signals = {
+        "platform_mass": {"record the cable tensions": 90.0, "add a payload": 40.0},
+        "cable_stiffness": {"record the cable tensions": 50.0, "add poses": 20.0},
+        "external_wrench": {},
+    }
+
+    def ways(_plan: object, _options: object, name: str, rival: Any) -> list[Suggestion]:
+        return [
+            Suggestion(Adding.TENSIONS, words, (Gain(name, rival, 3.0, then, 15.0),))
+            for words, then in signals[rival].items()
+        ]
+
+    monkeypatch.setattr(what_next, "telling_apart", ways)
+    rivals = [SimpleNamespace(name=name, layout=name) for name in signals]
+    effect: Any = SimpleNamespace(effect="stiffness", rivals=rivals)
+    nothing: Any = None
+    mass, cables, wrench, each = what_next._to_separate(nothing, [], effect)
+    assert mass == (
+        "to tell stiffness from platform_mass: weigh the platform, or add a payload "
+        "(signal that separates them: 3 now, 40 then, 15 needed)"
+    )
+    assert cables.endswith(
+        "each cable, or add poses (signal that separates them: 3 now, 20 then, 15 needed)"
+    )
+    assert wrench.startswith("to tell stiffness from external_wrench: hang a known weight on a ")
+    assert wrench.endswith(
+        "none of the further poses, payloads and tensions tried here separates them"
+    )
+    assert each == (
+        "to tell stiffness from platform_mass, cable_stiffness: record the cable tensions "
+        "(signal that separates the closest of them: 3 now, 50 then, 15 needed)"
+    )
+
+
 def test_what_shows_as_a_hose_is_taken_off_first(found: Search) -> None:
     unknown = DiagnosisVerdict.UNKNOWN_EFFECT
-    first, *others = measure_next(found, [], unknown, (), seen=Varying.SPRING)
+    first, *others = measure_next(found, [], unknown, (), seen=[Varying.SPRING])
     assert first == (
         "to find something that pulls the platform like a spring: take hoses and leads off the "
         "platform, or hang them elsewhere, and measure some poses again; an error that changes "
         "comes from their pull"
     )
-    assert others == measure_next(found, [], unknown, (), seen=Varying.READINGS)
+    assert others == measure_next(found, [], unknown, (), seen=[Varying.READINGS])
 
 
 def test_without_a_lead_the_same_poses_are_repeated(found: Search) -> None:
