@@ -95,8 +95,9 @@ class LeftOver:
         return f"{rms_words(self.size)} (tolerance: {matters})"
 
     def as_json(self) -> dict[str, Any]:
-        """``left_over`` of ``diagnosis.json``, SI."""
-        return {"size": self.size, "tolerance": self.limit, "important": self.important}
+        """``left_over`` of ``diagnosis.json``, SI; ``important`` is null where nothing says so."""
+        important = None if self.undecided and not self.important else self.important
+        return {"size": self.size, "tolerance": self.limit, "important": important}
 
 
 def remainder_of(

@@ -52,12 +52,18 @@ class Sight:
         seen = len(self.effects) - len(self.hidden)
         effects = f"{seen} of {counted(total, 'effect')}"
         out = [f"In these data {effects} would be visible at a plausible size."]
-        lacking = _by_reason(self.missing)
+        large = [n for n, why in self.missing.items() if why.why is Why.TOO_MANY_PARAMETERS]
+        lacking = _by_reason({n: why for n, why in self.missing.items() if n not in large})
         if lacking or self.hidden:
             small = [(f"{', '.join(self.hidden)} (too small compared with the noise)")] * bool(
                 self.hidden
             )
             out.append(f"Not visible: {'; '.join([*lacking, *small])}.")
+        if large:
+            out.append(
+                "Some have more parameters than these data have rows, and rest on plausible sizes: "
+                f"{some(large, _MOST)}."
+            )
         pairs = [f"{name} from {' or '.join(others[:3])}" for name, others in self.alike.items()]
         if pairs:
             out.append(f"The data could not distinguish {some(pairs, _MOST, '; ')}.")

@@ -17,10 +17,14 @@ def alike(found: Visible) -> str:
 
 
 def signal_words(gain: Gain) -> str:
-    """The signal now, after the measurement, and that which is needed, to two digits."""
+    """The signal now, after the measurement, and that which is needed, to two digits.
+
+    The last is left out where the signal is as large now: prior sizes outweigh it.
+    """
     # :g writes 2000, where :.2g alone writes 2e+03
     now, then = (f"{float(f'{value:.2g}'):g}" for value in (gain.now, gain.then))
-    return f"{now} now, {then} then, {gain.needed:.2g} needed"
+    needed = f", {gain.needed:.2g} needed" if gain.now < gain.needed else ""
+    return f"{now} now, {then} then{needed}"
 
 
 def gain_words(gain: Gain) -> str:

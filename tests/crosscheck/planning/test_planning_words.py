@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from crosscheck.fit.reasons import Reason, Why
 from crosscheck.planning.proposer import Gain
 from crosscheck.planning.result import Visible
+from crosscheck.planning.sight import Sight
 from crosscheck.planning.visibility import Signal
-from crosscheck.planning.words import alike, gain_words
+from crosscheck.planning.words import alike, gain_words, signal_words
 from seecr.effects import layout_of
 
 DRUMS = layout_of("drum_eccentricity", "demobot_cogiro")
@@ -72,3 +74,19 @@ def test_signals_have_two_digits_and_no_powers_of_ten(other: str, then: float, w
 
 def test_enough_is_what_a_test_finds() -> None:
     assert [Gain("a", "", 0.0, then, 15.0).enough for then in (14.9, 15.0)] == [False, True]
+
+
+def test_what_is_needed_is_not_told_where_the_signal_is_as_large_now() -> None:
+    """An equivalent by evidence "separates: 36 now, 15 needed" contradicted itself."""
+    assert signal_words(Gain("a", "b", 3.0, 2000.0, 15.0)) == "3 now, 2000 then, 15 needed"
+    assert signal_words(Gain("a", "b", 36.0, 90.0, 15.0)) == "36 now, 90 then"
+
+
+def test_what_has_more_parameters_than_rows_is_not_called_invisible() -> None:
+    """It was listed by the same diagnosis: sets weigh it with plausible sizes."""
+    large = Reason(Why.TOO_MANY_PARAMETERS, parameters=36, rows=28)
+    lacking = {"anchor_point_error": large, "tension_scale": Reason(Why.NEEDS_TENSIONS)}
+    said, unseen, rest = Sight((CLEAR,), lacking).lines()
+    assert said.startswith("In these data 1 of 3 effects")
+    assert unseen == "Not visible: tension_scale (needs measured tensions)."
+    assert rest.endswith("rest on plausible sizes: anchor_point_error.")
