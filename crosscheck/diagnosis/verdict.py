@@ -170,11 +170,10 @@ def _searched(
 def is_clear(steps: Diagnosis) -> bool:
     """Whether the steps settle it: their effects are sure, few enough and imitate nothing unknown.
 
-    Nor may another class be probable, or another effect be hinted at: several effects may hint at
-    the same although none of them is worth its parameters, and what the steps took first may stand
-    for two others. And the data have to determine something of
-    each effect: beside misplaced points of all cables, a platform off its start is only a part of
-    these.
+    Nor may another effect be probable, or another class be sure, of which several hint at the same
+    although none of them is worth its parameters. What the steps took first may stand for others.
+    And the data have to determine something of each effect: beside misplaced points of all cables,
+    a platform off its start is only a part of these.
     """
     if any(is_undetermined(effect) for effect in steps.missing):
         return False
@@ -184,7 +183,10 @@ def is_clear(steps: Diagnosis) -> bool:
         return False
     listed = {effect.effect for effect in steps.missing}
     classes = () if steps.chances is None else steps.chances.classes
-    further = any(p > PROBABLE and listed.isdisjoint(members) for members, p in classes)
+    further = any(
+        p > (PROBABLE if len(members) == 1 else SURE) and listed.isdisjoint(members)
+        for members, p in classes
+    )
     unsure = any(c.why_not is not None and c.why_not.why is Why.NOT_SURE for c in steps.candidates)
     return all(e.probability > SURE for e in steps.missing) and not unsure and not further
 

@@ -16,7 +16,7 @@ from crosscheck.diagnosis.listed import diagnosis_of
 from crosscheck.diagnosis.nearby import _with_equals
 from crosscheck.fit.reasons import DiagnosisVerdict
 
-DOUBT = Imitated(4.0, frozenset({"pulley_radius"}), Varying.POSITION)
+DOUBT = Imitated(4.0, frozenset({"pulley_radius"}), (Varying.POSITION,))
 
 
 def by_sets(in_place: Imitated) -> Chances:

@@ -129,6 +129,7 @@ def test_what_the_steps_leave_open_is_looked_at_in_sets() -> None:
         ([listed], (first, more), (), False),
         ([listed], (first, (("creep",), 0.6)), (), False),
         ([listed], (first, (("creep",), 0.4)), (), True),
+        ([listed], (first, (("creep", "stiffness"), 0.9)), (), True),
         ([unlikely], (first,), (), False),
         ([hidden], (first,), (), False),
         ([partly], (first,), (), True),
