@@ -23,10 +23,10 @@ from crosscheck.calibration.linearised import column_groups, linearised
 from crosscheck.calibration.sets import Names, Scores
 from crosscheck.calibration.varying import Varying, varying
 
-# Fields that are worth so much less ln evidence than the best one are left out.
-_NEGLIGIBLE = 20.0
-# A field that is less likely than the members it could replace is told from this probability on,
-# and so is one that is less likely than another.
+# Fields that are worth so much less ln evidence than the best one are left out. It is large, and so
+# many are told: what is really there follows none of them exactly, and then odds tell little.
+_NEGLIGIBLE, _MOST_SEEN = 20.0, 3
+# A field that is less likely than the members it could replace is told from this probability on.
 _DOUBT = 0.05
 
 
@@ -161,12 +161,12 @@ class _Sets:
 
     def _likely(self, every: Mapping[str, float]) -> tuple[Varying, ...]:
         """What is likely to vary, the likeliest first, by the ln evidence of each field."""
-        share = dict[Varying, float]()
-        for name, part in zip(every, special.softmax(list(every.values())), strict=True):
-            what = self.fields[name]
-            share[what] = share.get(what, 0.0) + float(part)
-        order = sorted(share, key=lambda what: -share[what])
-        return tuple(what for what in order if what is order[0] or share[what] > _DOUBT)
+        by = dict[Varying, list[float]]()
+        for name, part in every.items():
+            by.setdefault(self.fields[name], []).append(part)
+        total = {what: float(special.logsumexp(parts)) for what, parts in by.items()}
+        order = sorted(total, key=lambda what: -total[what])[:_MOST_SEEN]
+        return tuple(what for what in order if total[what] > total[order[0]] - _NEGLIGIBLE)
 
     def _solved(self, names: Names) -> Solved:
         return self.gram.solved({n: w for n, w in self.chosen.items() if n in names})

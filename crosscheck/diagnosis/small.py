@@ -20,6 +20,9 @@ from crosscheck.fit.held_out import significantly_improves
 from crosscheck.fit.possible import is_plausible
 from crosscheck.fit.smooth import beyond_smooth
 
+# What is there takes no kind of reading farther off on held-out runs than so many times.
+_FARTHER = 1.1
+
 
 def small_effects_alone(
     found: Search, parameters: int, shares: tuple[float, float]
@@ -62,6 +65,7 @@ def _small_step(search: Search, parameters: int, share: float) -> Step | None:
     step = step_of(search.trials, best.name, node_of(search.trials, full))
     significant = significantly_improves(search.last.held_out, step.held_out)
     listed = significant and not np.any(full.at_bound) and share_of(search.last, step) > share
+    listed = listed and not spoils(search.last, step)
     if not listed or not beyond_smooth(search.problem, search.last.fit.state, full.state, share):
         return None
     return step
@@ -95,6 +99,17 @@ def _small_candidates(search: Search, parameters: int) -> list[Candidate]:
         for c in trials.candidates(trials.problem)
         if c.name not in held and c.why_not is None and len(c.layout) <= parameters
     ]
+
+
+def spoils(before: Step, step: Step) -> bool:
+    """Whether a step takes one kind of reading farther off on held-out runs.
+
+    An effect may explain most of the position error and be paid for by the orientation: a tracker
+    that lags behind looks like backlash to it.
+    """
+    was, now = before.held_out.rms, step.held_out.rms
+    pairs = ((old, now.get(key)) for key, old in was.items())
+    return any(new > _FARTHER * old for old, new in pairs if old is not None and new is not None)
 
 
 def share_of(before: Step, step: Step) -> float:

@@ -13,12 +13,14 @@ from itertools import takewhile
 import numpy as np
 
 from crosscheck.calibration.equals import SMALL
+from crosscheck.calibration.judgement import SURE
+from crosscheck.calibration.search import SetSearch
 from crosscheck.comparison.associations import Association, associations
-from crosscheck.diagnosis.chances import Chances
+from crosscheck.diagnosis.chances import Chances, chances_of
 from crosscheck.diagnosis.listed import diagnosis_of, missing_of, not_listed
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.search import Search
-from crosscheck.diagnosis.small import share_of, small_effects_alone
+from crosscheck.diagnosis.small import share_of, small_effects_alone, spoils
 from crosscheck.diagnosis.words import and_what_is_left, none_of, words_of
 from crosscheck.fit.possible import is_plausible
 from crosscheck.fit.prepare import noise_floor
@@ -52,6 +54,20 @@ def unexplained(found: Search, chances: Chances, notes: Sequence[str]) -> Diagno
     )
 
 
+def beside_imitated(found: Search, sought: SetSearch) -> SetSearch:
+    """Compared sets with the small effects of the steps that are there beside something unknown.
+
+    They may be listed though structure remains, and nothing unknown may stand in their place.
+    """
+    said, chances = sought.judgement, chances_of(sought)
+    if said.imitated is None or said.sure:
+        return sought
+    own = sought.found.best.names - said.imitated.replaced - said.doubted
+    missing, _search = _warranted(found, chances)
+    sure = tuple(m.effect for m in missing if m.effect in own and m.probability > SURE)
+    return replace(sought, judgement=replace(said, sure=sure))
+
+
 def _warranted(found: Search, chances: Chances) -> tuple[list[MissingEffect], Search]:
     """The effects that may be listed though structure remains, and the search up to these."""
     # an effect that was found beside one that may not be listed may not be listed either
@@ -71,7 +87,7 @@ def _is_warranted(found: Search, name: str) -> bool:
     best, part = found.last.fit, found.last.fit.terms.part(name)
     few = len(best.terms[name].layout) <= SMALL and is_plausible(best.terms[name])
     stopped = bool(np.any(best.at_bound[part]))
-    if not few or stopped or share_of(before, step) <= _LEAST_SHARE:
+    if not few or stopped or share_of(before, step) <= _LEAST_SHARE or spoils(before, step):
         return False
     # with a share of 0: all that the field leaves may be something unknown
     return beyond_smooth(found.problem, before.fit.state, step.fit.state, 0.0)

@@ -16,7 +16,7 @@ from crosscheck.diagnosis.importance import weighed
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.settled import settled
 from crosscheck.diagnosis.stepwise import by_steps
-from crosscheck.diagnosis.unexplained import unexplained
+from crosscheck.diagnosis.unexplained import beside_imitated, unexplained
 from crosscheck.diagnosis.words import size_notes
 from crosscheck.fit.candidates import candidates_for, null_fit
 from crosscheck.fit.gauss_newton import Fit
@@ -163,7 +163,7 @@ def _searched(
     sought = search_sets(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0), given)
     said = sought.judgement
     if said.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT or said.imitated is not None:
-        return explained(sought, notes)
+        return explained(beside_imitated(found, sought), notes)
     return unexplained(found, chances_of(sought), (*notes, *more))
 
 

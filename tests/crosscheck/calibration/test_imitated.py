@@ -249,11 +249,11 @@ def test_what_explains_about_as_well_is_told_as_well() -> None:
     sets, _x, _y = toy()
     fields = {"a": Varying.POSITION, "b": Varying.WINCHES, "c": Varying.POSITION}
     every = replace(sets, fields=fields)
-    with_all = np.log([0.5, 0.45, 0.05])
-    assert every._likely(dict(zip("abc", with_all, strict=True))) == (
-        Varying.POSITION, Varying.WINCHES,
-    )  # fmt: skip
-    assert every._likely({"a": -50.0, "b": -46.0, "c": -np.inf}) == (Varying.WINCHES,)
+    both = (Varying.POSITION, Varying.WINCHES)
+    assert every._likely({"a": 0.0, "b": -19.0, "c": -np.inf}) == both
+    assert every._likely({"a": -70.0, "b": -46.0, "c": -80.0}) == (Varying.WINCHES,)
+    many = replace(sets, fields=dict(zip("abcd", Varying, strict=False)))
+    assert len(many._likely(dict.fromkeys("abcd", 0.0))) == 3
     # each by what all of its fields have together
     assert every._likely({"a": 0.0, "b": 0.5, "c": 0.0})[0] is Varying.POSITION
     two = Imitated(6.0, frozenset("a"), (Varying.POSITION, Varying.WINCHES))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,11 +12,17 @@ import pytest
 from made_data import COGIRO, measured, term
 
 import crosscheck
-from crosscheck.calibration.imitated import NOT_ASKED
+from crosscheck.calibration.imitated import NOT_ASKED, Imitated
+from crosscheck.calibration.judgement import Judgement
+from crosscheck.calibration.search import SetSearch
+from crosscheck.calibration.varying import Varying
+from crosscheck.diagnosis import unexplained
 from crosscheck.diagnosis.chances import Chances
+from crosscheck.diagnosis.small import spoils
+from crosscheck.diagnosis.unexplained import beside_imitated
 from crosscheck.diagnosis.verdict import is_clear, is_undetermined
 from crosscheck.fit.possible import hardly_happens
-from crosscheck.fit.reasons import Reason, Why
+from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.measurements.data import Measurements
 from seecr.commands.data import Commands
 from seecr.description.mjcf import load_robot
@@ -146,3 +153,37 @@ def test_of_an_effect_only_a_shape_that_is_determined_says_nothing_about_its_siz
     assert not is_undetermined(one)
     one.layout.shape[2] = True
     assert is_undetermined(one)
+
+
+def test_small_effects_of_the_steps_are_listed_beside_what_others_imitate(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Pulleys were not, beside a platform that flexes, which drums out of round imitate."""
+    imitated = Imitated(9.0, frozenset({"creep"}), (Varying.WINCHES,))
+    said = Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), 0.0, imitated=imitated)
+    best = SimpleNamespace(names=frozenset({"creep", "pulley_radius", "stiffness"}))
+    nothing: Any = None
+    sets: Any = SimpleNamespace(best=best)
+    sought = SetSearch(nothing, sets, nothing, nothing, 0.0, None, said, imitated)
+    warranted = {"pulley_radius": 1.0, "creep": 1.0, "stiffness": 0.9, "backlash": 1.0}
+    listed = [SimpleNamespace(effect=n, probability=p) for n, p in warranted.items()]
+    monkeypatch.setattr(unexplained, "chances_of", lambda _sought: None)
+    monkeypatch.setattr(unexplained, "_warranted", lambda _found, _chances: (listed, None))
+    now = beside_imitated(nothing, sought).judgement
+    assert now.sure == ("pulley_radius",) and now.imitated is imitated
+    # what sets say for themselves goes first, and without something unknown nothing changes
+    for other in (replace(said, sure=("stiffness",)), replace(said, imitated=None)):
+        asked = replace(sought, judgement=other)
+        assert beside_imitated(nothing, asked) is asked
+
+
+def test_what_takes_a_kind_of_reading_farther_off_is_not_there() -> None:
+    """A tracker that lags behind was called backlash, with angles twice as far off."""
+
+    def step(position: float, orientation: float | None) -> Any:
+        rms = {"position_rms_m": position, "orientation_rms_rad": orientation}
+        return SimpleNamespace(held_out=SimpleNamespace(rms=rms))
+
+    before = step(3e-4, 1.0)
+    assert spoils(before, step(1e-4, 1.2)) and spoils(before, step(3.4e-4, 0.1))
+    assert not spoils(before, step(1e-4, 1.05)) and not spoils(step(3e-4, None), step(1e-4, None))
