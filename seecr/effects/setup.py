@@ -233,7 +233,8 @@ class Setup:
     def shared(self) -> Setup:
         """One whose quantities can be put anew; their arrays are those of this one."""
         out = Setup.__new__(Setup)
-        vars(out).update(vars(self), laws=list(self.laws))
+        out.__dict__.update(self.__dict__)
+        out.laws = list(self.laws)
         return out
 
     def own(self) -> None:
