@@ -25,6 +25,8 @@ Widths = Mapping[str, float]
 
 # Most rounds through the members when their widths are chosen.
 _ROUNDS = 3
+# How many of the sets solved last are kept: searches come back to them.
+_KEPT = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +56,9 @@ class Gram:
     gradient: Array
     power: float
     groups: dict[str, ColumnGroup]
+    _last: dict[tuple[tuple[str, float], ...], Solved] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -61,7 +66,15 @@ class Gram:
         return tuple(self.groups)
 
     def solved(self, chosen: Widths) -> Solved:
-        """Solve the normal equations of one set."""
+        """Solve the normal equations of one set, unless it is among the last ones."""
+        key = tuple(chosen.items())  # with the order, which is that of the columns
+        found = self._last.pop(key, None) or self._solve(chosen)
+        self._last[key] = found
+        if len(self._last) > _KEPT:
+            del self._last[next(iter(self._last))]
+        return found
+
+    def _solve(self, chosen: Widths) -> Solved:
         empty = np.zeros(0, dtype=np.intp)
         columns = np.concatenate([empty, *(self.groups[n].columns for n in chosen)])
         width = np.concatenate([np.zeros(0), *(
@@ -91,6 +104,7 @@ class Solved:
     columns: NDArray[np.intp]
     width: Array
     inverse: Array
+    _worth: dict[str, Array] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def values(self) -> Array:
@@ -143,6 +157,11 @@ class Solved:
 
         A narrow member may be replaced by others, in the linear model also by negative ones.
         """
+        if name not in self._worth:
+            self._worth[name] = self._gains_of_member(name)
+        return self._worth[name]
+
+    def _gains_of_member(self, name: str) -> Array:
         member, own = self.gram.groups[name], self._place(name)
         precise = inverse_of(self.inverse[np.ix_(own, own)])
         group = ByWidth.of(*self._beside_others(name, own, precise), member.widths)

@@ -128,7 +128,7 @@ class Problem:
             fixed[k] &= len(some) >= _ROWS and np.ptp(some) <= _ROUNDING
         return fixed
 
-    @property
+    @cached_property
     def counted(self) -> NDArray[np.bool_]:
         """(n, 6 + m) which readings exist and count."""
         return self.measured & self.use[:, None]

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.collections import LineCollection
 from matplotlib.ticker import MaxNLocator
 
 from crosscheck.comparison.cable_space import cable_errors, cable_lengths
@@ -22,13 +24,14 @@ from crosscheck.fit.problem import KINDS, TENSION, Problem
 from crosscheck.report.drawing import (
     AFTER,
     BEFORE,
+    FAINT,
+    GREY,
     INK,
     MANY,
     NOISE,
     TINT,
     blank,
     dots,
-    grid,
     image,
     styled,
 )
@@ -45,6 +48,8 @@ _LINE, _MOST_LINES = 13, 3
 # No number stands so near to the end of a panel, in parts of all of them: it would touch the next
 # panel's.
 _END = 0.0175
+# Length of a tick [pt], as Matplotlib has it.
+_TICK = 3.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,6 +169,7 @@ def draw_wall(wall: Wall, alone: str = BEFORE) -> str:
             },
         )  # fmt: skip
         _share(panels, wall, rows)
+        marks = _ticks(panels, numbered_inside=not wall.unit)
         for place, k in enumerate(rows):
             for axes, (_name, values) in zip(panels[place], wall.abscissae, strict=True):
                 _panel(axes, _of_row(values, k), wall, k, alone)
@@ -174,6 +180,7 @@ def draw_wall(wall: Wall, alone: str = BEFORE) -> str:
             axes.set_xlabel(name)
         unit = f" [{wall.unit}]" if wall.unit else ""
         panels[0, 0].set_title(f"{wall.title}{unit}", loc="left", fontsize=8.5)
+        figure.add_artist(marks)
         return image(figure, f"{wall.title} against what they may follow")
 
 
@@ -231,9 +238,56 @@ def _share(panels: Any, wall: Wall, rows: list[int]) -> None:
         heights = [wall.measured[:, alike], wall.predicted[:, alike], 2.0 * wall.noise[alike]]
         for axes in panels[place]:
             axes.set_ylim(_limits([*heights, -2.0 * wall.noise[alike]], 0.05))
-            axes.tick_params(labelbottom=place == len(rows) - 1)
-    for axes in panels[:, 1:].flat:
-        axes.tick_params(labelleft=not wall.unit)
+
+
+def _ticks(panels: Any, *, numbered_inside: bool) -> LineCollection:
+    """Ticks of all panels, and lines behind their marks.
+
+    Matplotlib makes five artists of each tick, even where it has no number: most of the time of a
+    wall. Only axes with numbers are Matplotlib's own; the ticks of the others are the collection.
+
+    Args:
+        panels: with their limits.
+        numbered_inside: whether the vertical axes of all panels have numbers, not the first alone.
+    """
+    marks: list[list[tuple[float, float]]] = []
+    for axes in panels[-1]:
+        axes.xaxis.set_major_locator(_Inner(panels.shape[1]))
+    for axes in panels.flat if numbered_inside else panels[:, 0]:
+        axes.locator_params(axis="y", nbins=3)
+    for place, column in np.ndindex(panels.shape):
+        axes = panels[place, column]
+        box, places = axes.get_position(), _shown(panels[-1, column].xaxis)
+        lines = [[(x, 0.0), (x, 1.0)] for x in places]
+        axes.add_collection(
+            LineCollection(
+                lines, colors=FAINT, linewidths=0.7, zorder=0.5,
+                transform=axes.get_xaxis_transform(),
+            ),
+            autolim=False,
+        )  # fmt: skip
+        across, up = (_TICK / 72.0 / size for size in axes.figure.get_size_inches())
+        if place < len(panels) - 1:
+            axes.xaxis.set_visible(False)
+            ends = box.x0 + box.width * _parts(places, axes.get_xlim())
+            marks += [[(x, box.y0), (x, box.y0 - up)] for x in ends]
+        if column > 0 and not numbered_inside:
+            axes.yaxis.set_visible(False)
+            ends = box.y0 + box.height * _parts(_shown(panels[place, 0].yaxis), axes.get_ylim())
+            marks += [[(box.x0, y), (box.x0 - across, y)] for y in ends]
+    return LineCollection(marks, colors=GREY, linewidths=0.6)
+
+
+def _shown(axis: Axis) -> Array:
+    """Places of an axis' ticks between its limits."""
+    low, high = sorted(axis.get_view_interval())
+    places = np.asarray(axis.get_majorticklocs())
+    return places[(places >= low) & (places <= high)]
+
+
+def _parts(places: Array, limits: tuple[float, float]) -> Array:
+    """Places as parts of the way between two limits."""
+    return (places - limits[0]) / (limits[1] - limits[0])
 
 
 def _limits(values: list[Array], margin: float) -> tuple[float, float]:
@@ -259,6 +313,3 @@ def _panel(axes: Axes, x: Array, wall: Wall, k: int, alone: str) -> None:
     axes.axhline(0.0, color=INK, linewidth=0.5, zorder=1)
     if many:
         axes.set_rasterization_zorder(0.8)  # both kinds of dots as one image per panel
-    grid(axes, "x")
-    axes.locator_params(axis="y", nbins=3)
-    axes.xaxis.set_major_locator(_Inner(len(wall.abscissae)))

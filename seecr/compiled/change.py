@@ -21,7 +21,7 @@ from seecr.compiled.columns import (
     TENSION,
     UP,
 )
-from seecr.compiled.jit import jit_allocating, jit_inner
+from seecr.compiled.jit import jit_allocating, jit_inner, jit_merged
 from seecr.compiled.joints import N_CURRENT, joint_columns, onto_joints_gradient, place_joints
 from seecr.compiled.platform import N_WORK
 from seecr.compiled.rotation import rotated_less
@@ -77,7 +77,7 @@ def take_force(ax, ay, az, fx, fy, fz, per, gradient):
     gradient[5] -= (ax * fy - ay * fx) * per
 
 
-@jit_inner
+@jit_merged
 def add_pull(sign, row, pose, up, per, guess, space):
     """Add a cable's part times ``sign`` to the gradient (6,); returns that of its tension."""
     place, start, move, keep = space[0], space[3], space[4], space[5]

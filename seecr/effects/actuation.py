@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
 
+from seecr.commands.data import Commands
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect, mean_length, of_length, parameter
 from seecr.effects.setup import Setup
@@ -141,13 +143,13 @@ class DrumEccentricity(Effect):
     )
 
     def edit_setup(self, setup: Setup) -> None:
-        angle = setup.commanded_change / self.drum_radius
-        zero = 0.0 if setup.commands.absolute else 1.0
-        # many radii are tried, and waves of thousands of rows take as long as what follows them
+        if not (np.any(self.sine) or np.any(self.cosine)):
+            return
+        sine, cosine = _waves(setup.commands, setup.robot, self.drum_radius)
         if np.any(self.sine):
-            setup.extra_length = setup.extra_length + self.sine * np.sin(angle)
+            setup.extra_length = setup.extra_length + self.sine * sine
         if np.any(self.cosine):
-            setup.extra_length = setup.extra_length + self.cosine * (np.cos(angle) - zero)
+            setup.extra_length = setup.extra_length + self.cosine * cosine
 
     @classmethod
     def shapes(cls, setup: Setup) -> list[dict[str, float]]:
@@ -160,6 +162,16 @@ class DrumEccentricity(Effect):
         largest = _LARGEST * mean_length(setup.robot)
         radii = travel / (2 * np.pi * turns)
         return [{"drum_radius": float(r)} for r in radii[radii < largest]]
+
+
+@lru_cache(maxsize=4)
+def _waves(commands: Commands, robot: Robot, radius: float) -> tuple[Array, Array]:
+    """Sine and cosine (n, m) of the drums' angles, the cosine less that at the winches' zero.
+
+    They take as long as what follows them, and many parameters are shifted with the same radius.
+    """
+    angle = commands.change(robot) / radius
+    return np.sin(angle), np.cos(angle) - (0.0 if commands.absolute else 1.0)
 
 
 @dataclass(frozen=True, eq=False)

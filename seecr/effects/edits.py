@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import is_
 from threading import Lock
 
 from seecr.commands.data import Commands
@@ -43,7 +44,7 @@ class Edits:
     def by(self, effects: Sequence[Effect]) -> Setup:
         """The setup as the effects leave it, in their order."""
         with self._lock:
-            return self._by(effects)
+            return self._by([effect for effect in effects if _edits(type(effect))])
 
     def _by(self, effects: Sequence[Effect]) -> Setup:
         same = 0
@@ -51,10 +52,26 @@ class Edits:
             if one is not effect:
                 break
             same += 1
+        setup = self._left_by(same)
+        if same < len(effects) == len(self._kept):
+            later = [effect for effect, _left in self._kept[same + 1 :]]
+            if all(map(is_, later, effects[same + 1 :])):
+                # one effect is shifted: what all leave as they are will be asked for again
+                for effect in effects[same:]:
+                    edit_setup(effect, setup)
+                return setup
         del self._kept[same:]
-        setup = self._kept[-1][1] if self._kept else self._plain
         for effect in effects[same:]:
-            setup = setup.shared()
             edit_setup(effect, setup)
             self._kept.append((effect, setup))
-        return setup.shared()
+            setup = setup.shared()
+        return setup
+
+    def _left_by(self, count: int) -> Setup:
+        """What the first of the effects left, to be edited."""
+        return (self._kept[count - 1][1] if count else self._plain).shared()
+
+
+def _edits(effect: type[Effect]) -> bool:
+    """Whether an effect edits setups; those of the sensors do not."""
+    return effect.edit_setup is not Effect.edit_setup

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -108,5 +109,12 @@ class GravityTilt(Effect):
 
     def edit_setup(self, setup: Setup) -> None:
         if self.tilt_x or self.tilt_y:
-            turn = quat_from_rotvec(np.array([self.tilt_x, self.tilt_y, 0.0]))
-            setup.gravity = quat_rotate(turn, setup.gravity)
+            setup.gravity = _tilted(self.tilt_x, self.tilt_y, tuple(setup.gravity.tolist()))
+
+
+@lru_cache(maxsize=16)
+def _tilted(tilt_x: float, tilt_y: float, gravity: tuple[float, float, float]) -> Array:
+    """Gravity in a frame that is tilted; a fit asks for the same again with each parameter."""
+    turned = quat_rotate(quat_from_rotvec(np.array([tilt_x, tilt_y, 0.0])), np.array(gravity))
+    turned.flags.writeable = False
+    return turned

@@ -221,19 +221,14 @@ class Setup:
 
     def geometric_lengths(self, poses: Array) -> Array:
         """Lengths (k, m) [m] of straight cables over their pulleys at poses (k, 7)."""
-        from seecr.compiled.pulley import lengths_at  # takes a while to import
-
-        out = np.empty((len(poses), self.robot.n_cables))
-        lengths_at(
-            np.array(poses, dtype=float, order="C"), self.anchor_points, self.exit_points,
-            self.pulley_radius, self.robot.up, out,
-        )  # fmt: skip
-        return out
+        given = (poses, self.anchor_points, self.exit_points, self.pulley_radius)
+        return _straight_lengths(self.robot, *(np.asarray(a, float).tobytes() for a in given))
 
     def shared(self) -> Setup:
         """One whose quantities can be put anew; their arrays are those of this one."""
         out = Setup.__new__(Setup)
-        vars(out).update(vars(self), laws=list(self.laws))
+        out.__dict__.update(self.__dict__)
+        out.laws = list(self.laws)
         return out
 
     def own(self) -> None:
@@ -255,6 +250,23 @@ class Setup:
             for name, item in QUANTITIES.items()
             if item.history is History.GIVES
         )
+
+
+@lru_cache(maxsize=32)
+def _straight_lengths(
+    robot: Robot, poses: bytes, anchors: bytes, exits: bytes, radii: bytes
+) -> Array:
+    """See :meth:`Setup.geometric_lengths`; most parameters that a fit shifts leave them alone."""
+    from seecr.compiled.pulley import lengths_at  # takes a while to import
+
+    def array(given: bytes, *shape: int) -> Array:
+        return np.frombuffer(given).reshape(shape).copy()  # writable: see seecr.compiled.jit
+
+    at = array(poses, -1, 7)
+    out = np.empty((len(at), robot.n_cables))
+    lengths_at(at, array(anchors, -1, 3), array(exits, -1, 3), array(radii, -1), robot.up, out)
+    out.flags.writeable = False
+    return out
 
 
 def _same(one: Any, other: Any) -> bool:

@@ -83,6 +83,16 @@ def test_effects_before_the_one_that_differs_edit_once() -> None:
     assert calls == ["a", "b", "c", "c", "b"]
 
 
+def test_effects_before_and_beside_one_that_is_shifted_stay_as_they_were() -> None:
+    calls: list[str] = []
+    a, b, c, x, y = (Counted(calls, name) for name in "abcxy")
+    edits = Edits(plain())
+    for effects in ([a, b, c], [a, x, c], [a, b, y], [a, b, c], [a, x, c, b]):
+        expected = plain().mass + len(effects)
+        assert edits.by(effects).mass == expected
+    assert calls == ["a", "b", "c", "x", "c", "y", "x", "c", "b"]
+
+
 @dataclass(frozen=True, eq=False)
 class Adding(Effect):
     """One that makes the platform heavier."""
