@@ -20,6 +20,10 @@ from seecr.pose import Array, pose_add
 _LARGEST = 0.12
 
 
+# Of so many rows at most, the waves of drums are kept: four times as many fill 50 MB.
+_FEW_ROWS = 100_000
+
+
 @dataclass(frozen=True, eq=False)
 class CableLengthOffset(Effect):
     """Each cable is longer than commanded by a constant: l0_i += offset_i.
@@ -145,7 +149,8 @@ class DrumEccentricity(Effect):
     def edit_setup(self, setup: Setup) -> None:
         if not (np.any(self.sine) or np.any(self.cosine)):
             return
-        sine, cosine = _waves(setup.commands, setup.robot, self.drum_radius)
+        waves = _kept_waves if len(setup.commands) <= _FEW_ROWS else _waves
+        sine, cosine = waves(setup.commands, setup.robot, self.drum_radius)
         if np.any(self.sine):
             setup.extra_length = setup.extra_length + self.sine * sine
         if np.any(self.cosine):
@@ -164,7 +169,6 @@ class DrumEccentricity(Effect):
         return [{"drum_radius": float(r)} for r in radii[radii < largest]]
 
 
-@lru_cache(maxsize=4)
 def _waves(commands: Commands, robot: Robot, radius: float) -> tuple[Array, Array]:
     """Sine and cosine (n, m) of the drums' angles, the cosine less that at the winches' zero.
 
@@ -172,6 +176,9 @@ def _waves(commands: Commands, robot: Robot, radius: float) -> tuple[Array, Arra
     """
     angle = commands.change(robot) / radius
     return np.sin(angle), np.cos(angle) - (0.0 if commands.absolute else 1.0)
+
+
+_kept_waves = lru_cache(maxsize=4)(_waves)
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,6 +26,9 @@ from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.pose import Array
 
+# Of so many poses at most, straight lengths are kept: 30 times as many fill 20 MB.
+_FEW_POSES = 5_000
+
 
 class History(Enum):
     """Whether rows depend on the rows before them through a quantity."""
@@ -222,7 +225,9 @@ class Setup:
     def geometric_lengths(self, poses: Array) -> Array:
         """Lengths (k, m) [m] of straight cables over their pulleys at poses (k, 7)."""
         given = (poses, self.anchor_points, self.exit_points, self.pulley_radius)
-        return _straight_lengths(self.robot, *(np.asarray(a, float).tobytes() for a in given))
+        if len(poses) > _FEW_POSES:
+            return _straight_lengths(self.robot, *(np.array(a, float, order="C") for a in given))
+        return _kept_lengths(self.robot, *(np.asarray(a, float).tobytes() for a in given))
 
     def shared(self) -> Setup:
         """One whose quantities can be put anew; their arrays are those of this one."""
@@ -252,19 +257,25 @@ class Setup:
         )
 
 
-@lru_cache(maxsize=32)
 def _straight_lengths(
-    robot: Robot, poses: bytes, anchors: bytes, exits: bytes, radii: bytes
+    robot: Robot, poses: Array, anchors: Array, exits: Array, radii: Array
 ) -> Array:
-    """See :meth:`Setup.geometric_lengths`; most parameters that a fit shifts leave them alone."""
     from seecr.compiled.pulley import lengths_at  # takes a while to import
+
+    out = np.empty((len(poses), robot.n_cables))
+    lengths_at(poses, anchors, exits, radii, robot.up, out)
+    return out
+
+
+@lru_cache(maxsize=32)
+def _kept_lengths(robot: Robot, poses: bytes, anchors: bytes, exits: bytes, radii: bytes) -> Array:
+    """See :meth:`Setup.geometric_lengths`; most parameters that a fit shifts leave them alone."""
 
     def array(given: bytes, *shape: int) -> Array:
         return np.frombuffer(given).reshape(shape).copy()  # writable: see seecr.compiled.jit
 
-    at = array(poses, -1, 7)
-    out = np.empty((len(at), robot.n_cables))
-    lengths_at(at, array(anchors, -1, 3), array(exits, -1, 3), array(radii, -1), robot.up, out)
+    places = (array(anchors, -1, 3), array(exits, -1, 3), array(radii, -1))
+    out = _straight_lengths(robot, array(poses, -1, 7), *places)
     out.flags.writeable = False
     return out
 
