@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
+import numpy as np
+
 from crosscheck.add.result import Addition
 from crosscheck.add.weigh import base_of, weigh, whiteness_of
 from crosscheck.errors import CrosscheckError, UnsolvedError
@@ -25,6 +27,9 @@ from seecr.prediction.model import no_effects
 
 # Steps of a fit, and how often it may be continued after that many.
 _STEPS, _TIMES = 40, 2
+# Most times that outliers are looked for. A tracker that throws one row in ten far off has more
+# than that now and then; the diagnosis allows as many.
+_PASSES, _MOST_OUTLIERS = 3, 0.15
 
 Fitter: TypeAlias = Callable[[Problem, Terms, Array], Fit]
 """Fits effects to a problem, given the effects of the model and the noise."""
@@ -124,12 +129,9 @@ def _added(
     factor = problem.noise(problem.experiment.predict(terms.effects))
     best = fitter(problem, terms, factor)
     progress("looking for outliers", 0.4)
-    outliers = outlying_rows(problem, best.state)
-    if outliers.any():
-        words = f"{data.lines_of(outliers)} left out as outliers"
-        notes.append(words)
-        problem = problem.without(outliers, words)
-        best = fitter(problem, terms, factor)
+    cleaned, best = _without_outliers(problem, best, lambda some: fitter(some, terms, factor))
+    notes += cleaned.left_out[len(problem.left_out) :]
+    problem = cleaned
     firmness = _firmness(problem, best)
     if firmness > 1.0:
         terms = firmer(terms, firmness)
@@ -138,6 +140,25 @@ def _added(
     # effects that are free in the data were fitted in advance: they are not in the model before
     before = terms.only(name for name in terms.names if name in had or name not in names)
     return weigh(problem, before, names, factor, best, notes, basis_of(model, robot), firmness)
+
+
+def _without_outliers(
+    problem: Problem, best: Fit, again: Callable[[Problem], Fit]
+) -> tuple[Problem, Fit]:
+    """The problem without isolated outliers, and the fit to the rest of its rows.
+
+    One of two neighbours that are both far off is only seen without the other.
+    """
+    out = np.zeros(problem.data.n_rows, dtype=bool)
+    cleaned = problem
+    for _ in range(_PASSES):
+        more = outlying_rows(cleaned, best.state, _MOST_OUTLIERS)
+        if not more.any():
+            break
+        out |= more
+        cleaned = problem.without(out, f"{problem.data.lines_of(out)} left out as outliers")
+        best = again(cleaned)
+    return cleaned, best
 
 
 def _firmness(problem: Problem, best: Fit) -> float:

@@ -102,8 +102,8 @@ def judge(
     few = few and not doubted and not more and not large
     sure = adequate(found, sure) if few and sure else sure_effects(found, classes, False)
     sure = tuple(name for name in sure if name not in doubted)
-    if not sure and len(best) <= _FEW and not doubted and not large:
-        sure = in_each(found, classes)
+    if len(best) <= _FEW and not doubted and not large:
+        sure = tuple(dict.fromkeys([*sure, *in_each(found, classes)]))
     if more:
         worth = worths(found)
         sure = tuple(name for name in carrying_most(found, worth, _MOST) if name in sure)

@@ -39,6 +39,9 @@ from seecr.pose import Array
 _FEW_READINGS, _MOST_OF_IT = 360, 3.0
 # Data that would not even show effects of so many plausible sizes show nothing.
 _BLIND = 10.0
+# Statements from this probability on were nearly all true, see docs/diagnosis.md on how often
+# probabilities are right; those between SURE and it not quite.
+_VERY_SURE = 0.97
 
 
 def diagnose(
@@ -170,8 +173,9 @@ def _searched(
 def is_clear(steps: Diagnosis) -> bool:
     """Whether the steps settle it: their effects are sure, few enough and imitate nothing unknown.
 
-    Nor may another effect be probable, or another class be sure, of which several hint at the same
-    although none of them is worth its parameters. What the steps took first may stand for others.
+    Nor may another effect be probable: what the steps took first may stand for others. Of several
+    that hint at the same none may be worth its parameters; where all that is listed is very sure,
+    they count if it is sure that one of them is there.
     And the data have to determine something of each effect: beside misplaced points of all cables,
     a platform off its start is only a part of these.
     """
@@ -183,8 +187,9 @@ def is_clear(steps: Diagnosis) -> bool:
         return False
     listed = {effect.effect for effect in steps.missing}
     classes = () if steps.chances is None else steps.chances.classes
+    sure = all(effect.probability > _VERY_SURE for effect in steps.missing)
     further = any(
-        p > (PROBABLE if len(members) == 1 else SURE) and listed.isdisjoint(members)
+        p > (SURE if sure and len(members) > 1 else PROBABLE) and listed.isdisjoint(members)
         for members, p in classes
     )
     unsure = any(c.why_not is not None and c.why_not.why is Why.NOT_SURE for c in steps.candidates)

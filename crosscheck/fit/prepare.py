@@ -27,7 +27,7 @@ Progress = Callable[[str, float], None]
 """Called with what is being done and the fraction that is done, 0 to 1."""
 
 # A single row is an outlier if it is so many robust standard deviations above the median; if more
-# than this part of the rows are, none counts as one.
+# than this part of the rows are, none counts as one, unless more are asked for.
 _OUTLIER = 6.0
 _MOST_OUTLIERS = 0.05
 # What a pose consists of, in words.
@@ -142,8 +142,12 @@ def noise_floor(problem: Problem, state: State | None = None) -> Rms:
     return rms_by_kind(problem, raw)
 
 
-def outlying_rows(problem: Problem, state: State) -> np.ndarray:
-    """(n,) isolated outliers: rows whose whitened residuals far exceed all others; none if many."""
+def outlying_rows(problem: Problem, state: State, most: float = _MOST_OUTLIERS) -> np.ndarray:
+    """(n,) isolated outliers: rows whose whitened residuals far exceed all others.
+
+    Args:
+        most: if more than this part of the rows are outliers, none counts as one.
+    """
     power = np.zeros(problem.data.n_rows)
     count = np.zeros(problem.data.n_rows)
     np.add.at(power, problem.row_of, state.white**2)
@@ -154,7 +158,7 @@ def outlying_rows(problem: Problem, state: State) -> np.ndarray:
     spread = 1.4826 * float(np.median(np.abs(size[used] - middle)))
     limit = middle + _OUTLIER * max(spread, 0.2 * middle, 1e-12)
     rows = used & (size > max(limit, 4.0))
-    if rows.sum() > max(_MOST_OUTLIERS * used.sum(), 1):
+    if rows.sum() > max(most * used.sum(), 1):
         return np.zeros_like(rows)
     # if a neighbour sticks out as well, it is structure and not an outlier
     for k in np.flatnonzero(rows):

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from made_data import SIGMA, measured, term
 
+from crosscheck.add import add_effect
 from crosscheck.add.result import Addition
 from crosscheck.fit.noise import Whiteness
 from crosscheck.model.fitted import Fitted
@@ -51,3 +54,21 @@ def test_the_added_effect_is_found_by_its_name_and_the_model_has_all() -> None:
     assert found.terms.names == ("pulley_radius", "stiffness")
     assert found.lines()[-2:] == ["warning: odd", "note: said"]
     assert found.as_json()["added"] == ["stiffness", "creep"]
+
+
+def test_what_a_tracker_throws_far_off_is_left_out_neighbours_as_well() -> None:
+    """From one row in twenty on all were kept: the model was "3.8 times the noise" off."""
+    data = measured(ROBOT, [term(ROBOT, "stiffness", factor=1.3)])
+    rng, off = np.random.default_rng(1), np.zeros(data.n_rows, dtype=bool)
+    off[rng.choice(data.n_rows, data.n_rows // 10, replace=False)] = True
+    off[20:22] = True
+    assert data.position is not None and SIGMA.position_m is not None
+    far = 15.0 * SIGMA.position_m * rng.standard_normal((data.n_rows, 3))
+    far += np.sign(far) * 8.0 * SIGMA.position_m
+    thrown = replace(data, position=data.position + off[:, None] * far)
+    found = add_effect(ROBOT, thrown, "stiffness")
+    clean = add_effect(ROBOT, data, "stiffness")
+    assert any("left out as outliers" in note for note in found.notes)
+    own, other = found.own, clean.own
+    assert own.term.vector == pytest.approx(other.term.vector, abs=2.0 * float(other.stderr[0]))
+    assert own.stderr[0] < 2.0 * other.stderr[0] and found.whiteness.is_noise

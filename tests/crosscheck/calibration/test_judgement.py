@@ -217,6 +217,9 @@ def test_what_each_of_several_sets_has_is_sure_though_what_is_open_is_worth_more
     either = {"": -9000.0, "ab": 0.0, "acd": -0.1, "a": -5000.0, "b": -300.0, "cd": -301.0}
     said = judged(either)
     assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ("a",))
+    # beside one that is worth more than a tenth of all, too
+    large = {k + "e" * bool(k): s for k, s in either.items()} | {"ab": -2000.0, "acd": -2001.0}
+    assert set(judged(large).sure) == {"a", "e"}
     # unless what it is worth is little, or there is one set only
     said = judged({**either, "b": -20.0, "cd": -21.0})
     assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ())

@@ -126,6 +126,7 @@ def test_what_the_steps_leave_open_is_looked_at_in_sets() -> None:
     large = found(8, np.ones(8))
     hidden, partly = found(6, np.full(6, np.inf)), found(6, np.where(np.arange(6) > 1, np.inf, 1.0))
     unlikely: Any = SimpleNamespace(**{**vars(listed), "probability": 0.9})
+    nearly: Any = SimpleNamespace(**{**vars(listed), "probability": 0.96})
     first, more = (("external_wrench",), 1.0), (("stiffness", "platform_mass"), 0.99)
     unsure: Any = SimpleNamespace(why_not=Reason(Why.NOT_SURE, p=0.6))
     for missing, classes, candidates, clear, *imitated in (
@@ -137,6 +138,8 @@ def test_what_the_steps_leave_open_is_looked_at_in_sets() -> None:
         ([listed], (first, (("creep",), 0.6)), (), False),
         ([listed], (first, (("creep",), 0.4)), (), True),
         ([listed], (first, (("creep", "stiffness"), 0.9)), (), True),
+        ([nearly], (first, (("creep", "stiffness"), 0.6)), (), False),
+        ([nearly], (first, (("creep", "stiffness"), 0.4)), (), True),
         ([unlikely], (first,), (), False),
         ([hidden], (first,), (), False),
         ([partly], (first,), (), True),
