@@ -147,12 +147,13 @@ def _without_outliers(
 ) -> tuple[Problem, Fit]:
     """The problem without isolated outliers, and the fit to the rest of its rows.
 
-    One of two neighbours that are both far off is only seen without the other.
+    One in ten rows may be far off, so that two neighbours now and then both are; one that is much
+    less so is seen without the other.
     """
     out = np.zeros(problem.data.n_rows, dtype=bool)
     cleaned = problem
     for _ in range(_PASSES):
-        more = outlying_rows(cleaned, best.state, _MOST_OUTLIERS)
+        more = outlying_rows(cleaned, best.state, _MOST_OUTLIERS, together=2)
         if not more.any():
             break
         out |= more

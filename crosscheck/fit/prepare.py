@@ -142,11 +142,21 @@ def noise_floor(problem: Problem, state: State | None = None) -> Rms:
     return rms_by_kind(problem, raw)
 
 
-def outlying_rows(problem: Problem, state: State, most: float = _MOST_OUTLIERS) -> np.ndarray:
+def _stretch(some: np.ndarray, row: int) -> int:
+    """How many neighbours in a row, with this one, are among some rows (n,)."""
+    others = np.flatnonzero(~some)
+    before = others[others < row].max(initial=-1)
+    return int(others[others > row].min(initial=len(some)) - before - 1)
+
+
+def outlying_rows(
+    problem: Problem, state: State, most: float = _MOST_OUTLIERS, together: int = 1
+) -> np.ndarray:
     """(n,) isolated outliers: rows whose whitened residuals far exceed all others.
 
     Args:
         most: if more than this part of the rows are outliers, none counts as one.
+        together: if more neighbours than this stick out, they are structure and no outliers.
     """
     power = np.zeros(problem.data.n_rows)
     count = np.zeros(problem.data.n_rows)
@@ -160,9 +170,7 @@ def outlying_rows(problem: Problem, state: State, most: float = _MOST_OUTLIERS) 
     rows = used & (size > max(limit, 4.0))
     if rows.sum() > max(most * used.sum(), 1):
         return np.zeros_like(rows)
-    # if a neighbour sticks out as well, it is structure and not an outlier
     for k in np.flatnonzero(rows):
-        near = [j for j in (k - 1, k + 1) if 0 <= j < len(rows) and used[j]]
-        if any(size[j] > middle + 0.5 * (size[k] - middle) for j in near):
-            rows[k] = False
+        sticks_out = used & (size > middle + 0.5 * (size[k] - middle))
+        rows[k] = _stretch(sticks_out, int(k)) <= together
     return np.asarray(rows)
