@@ -19,6 +19,8 @@ Numbers = TypeVar("Numbers", float, Array)
 
 # Larger numbers are written with an exponent.
 _MOST_DIGITS = 6
+# Numbers in units of people that are no larger are what rounding leaves.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -102,11 +104,15 @@ def joules(energy: float, form: str = ".3g") -> str:
 
 
 def with_error(value: float, error: float, digits: int = 2) -> tuple[str, str]:
-    """A value and its standard error, to so many digits of the error."""
+    """A value and its standard error, to so many digits of the error.
+
+    Without an error, what only rounding leaves of a value is 0.
+    """
+    known = value if abs(value) > _ROUNDING else 0.0
     if not np.isfinite(error):
-        return short(value), "undetermined"
+        return short(known), "undetermined"
     if error <= 0.0:
-        return short(value, 6), "0"
+        return short(known, 6), "0"
     decimals = digits - 1 - int(np.floor(np.log10(error)))
     if decimals > 9 or abs(value) >= 10.0**_MOST_DIGITS:
         return short(value, 6), short(error, 2)

@@ -13,6 +13,8 @@ from seecr.effects import Term
 
 # How many effects of a class are named.
 _FIRST = 2
+# A smaller share of the unexplained error is none.
+_NO_SHARE = 1e-3
 # Classes that are not listed are told from this probability on.
 _WORTH_SAYING = 0.05
 
@@ -142,10 +144,18 @@ def none_of(tried: int) -> str:
 def _words_of(effect: MissingEffect) -> str:
     names = ", ".join(effect.indistinguishable)
     alike = f" (or {names}, indistinguishable on these data)" if names else ""
-    return (
-        f"adding {effect.effect}{alike} removes {percent(effect.share)} of the unexplained error "
-        "on held-out runs"
-    )
+    return f"adding {effect.effect}{alike} {removed(effect.share)}"
+
+
+def removed(share: float) -> str:
+    """What an effect does to the error on held-out runs.
+
+    Noise may have been stated too large, or be small by chance. Then all error is below it, and
+    what an effect explains of that is no share of the unexplained.
+    """
+    if share < _NO_SHARE:
+        return "explains error on held-out runs that is not larger than the noise"
+    return f"removes {percent(share)} of the unexplained error on held-out runs"
 
 
 def probability_name(found: Diagnosis) -> str:

@@ -51,12 +51,12 @@ def value_lines(
 
 def measured(value: float, error: float, unit: str) -> str:
     """A value with its standard error, to the digits that are known: 8.369 ± 0.013 mm."""
-    if not np.isfinite(error):
-        return f"{shown(value, unit)} (not determined by these data)"
-    if error == 0.0:
-        return f"{shown(value, unit)} (fixed)"
     factor, word = in_unit(unit)
     number, spread = with_error(factor * value, factor * error)
+    if not np.isfinite(error):
+        return f"{f'{number} {word}'.strip()} (not determined by these data)"
+    if error == 0.0:
+        return f"{shown(value, unit)} (fixed)"
     return f"{number} ± {spread} {word}".strip()
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.steps import Stage, floor_of
-from crosscheck.diagnosis.words import percent
+from crosscheck.diagnosis.words import removed
 from crosscheck.fit.problem import rms_by_kind
 from crosscheck.recording import misfit, words
 from crosscheck.recording.misfit import Misfit
@@ -86,8 +86,7 @@ def _finding(finding: MissingEffect) -> str:
         spread = f"± {spread}" if np.isfinite(error) else spread
         rows.append((plain(parameter_name(name, unit)), f"{shown} {spread} {word}".strip()))
     lines = [
-        f"\nRemoves **{percent(finding.share)}** of the unexplained error on held-out runs: "
-        f"{plain(finding.title)}.\n",
+        f"\nIt {removed(finding.share)}: {plain(finding.title)}.\n",
         words.table(rows[:_MOST_PARAMETERS], ("parameter", "value")),
     ]
     if len(rows) > _MOST_PARAMETERS:

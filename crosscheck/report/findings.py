@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
-from crosscheck.diagnosis.words import percent
+from crosscheck.diagnosis.words import removed
 from crosscheck.fit.reasons import probability_words
 from crosscheck.fit.words import rms_words
 from crosscheck.units import in_unit, parameter_name, short, with_error
@@ -48,7 +48,7 @@ class FindingCard:
     effect: str
     title: str
     place: str
-    share: str
+    removes: str
     rivals: list[RivalWords]
     check: str
     parameters: list[ParameterRow]
@@ -81,7 +81,7 @@ def finding_card(found: Diagnosis, finding: MissingEffect) -> FindingCard:
         effect=finding.effect,
         title=finding.title,
         place=finding.layout.effect.place,
-        share=percent(finding.share),
+        removes=removed(finding.share),
         rivals=[RivalWords(r.name, short(max(r.loss, 0.0), 2)) for r in finding.rivals],
         check=finding.check,
         parameters=rows,

@@ -101,6 +101,12 @@ def test_values_show_two_digits_of_their_error(
     assert with_error(value, error) == texts
 
 
+def test_what_rounding_leaves_of_a_value_without_an_error_is_nothing() -> None:
+    assert with_error(5.31e-14, np.inf) == ("0", "undetermined")
+    assert with_error(-1.5e-13, 0.0) == ("0", "0")
+    assert with_error(2e-9, np.inf)[0] == "2.00e-9" and with_error(0.0, np.inf)[0] == "0"
+
+
 def test_names_and_chances() -> None:
     assert parameter_name("radius_m", "m") == "radius" and parameter_name("gain", "") == "gain"
     assert chance(1e-20) == "< 1e-12" and chance(0.25) == "0.25"

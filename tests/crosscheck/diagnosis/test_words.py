@@ -13,7 +13,7 @@ from crosscheck.calibration.varying import Varying
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.explained import _sentence
 from crosscheck.diagnosis.result import MissingEffect
-from crosscheck.diagnosis.words import doubts_about, hints_of, noise_left, one_of
+from crosscheck.diagnosis.words import doubts_about, hints_of, noise_left, one_of, removed
 from crosscheck.fit.reasons import DiagnosisVerdict
 
 
@@ -87,6 +87,13 @@ def test_what_a_field_could_replace_is_told_if_that_is_not_excluded() -> None:
         "probability": doubt.probability, "instead_of": ["thermal_expansion"],
         "seen_in": Varying.POSITION,
     }  # fmt: skip
+
+
+def test_where_all_error_is_below_the_noise_no_share_of_it_is_told() -> None:
+    """Points that moved were "removes 0 %", beside errors that fell."""
+    assert removed(0.0) == "explains error on held-out runs that is not larger than the noise"
+    assert removed(0.526) == "removes 52.6 % of the unexplained error on held-out runs"
+    assert "removes 0.1 %" in removed(0.001)
 
 
 def test_what_data_do_not_tell_apart_is_told_with_what_to_do_about_each() -> None:
