@@ -106,7 +106,7 @@ class Reason:
 
     def __str__(self) -> str:
         text = f"not a candidate: {self.words}" if self.lacking else self.words
-        return f"{text}, with {', '.join(self.beside)} in the model" if self.beside else text
+        return f"{text}, tried with {', '.join(self.beside)} in the model" if self.beside else text
 
 
 class Unfit(Enum):

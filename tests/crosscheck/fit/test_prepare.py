@@ -73,7 +73,8 @@ def test_every_reason_is_a_sentence_with_its_numbers() -> None:
     assert str(two) == "not needed once creep, stiffness are in the model (probability 10 %)"
     late = Reason(Why.NOT_PREDICTIVE, beside=("pulley_radius", "creep"))
     assert str(late) == (
-        "does not improve the prediction of held-out runs, with pulley_radius, creep in the model"
+        "does not improve the prediction of held-out runs, tried with pulley_radius, creep in the "
+        "model"
     )
     for unfit in Unfit:
         assert "{" not in str(Refusal(unfit, 10, 3, 5))
