@@ -24,7 +24,7 @@ from seecr.compiled.columns import (
     WEIGHT,
     WINCH_TENSION,
 )
-from seecr.compiled.jit import jit, jit_inner
+from seecr.compiled.jit import jit, jit_inner, jit_merged
 from seecr.compiled.law import straight_law, strain_of_tension, winch_tension
 from seecr.compiled.pulley import length_in_plane, pulley_geometry
 from seecr.compiled.yielding import along, lift_slope, lowered, soften
@@ -54,14 +54,14 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
     Returns:
         False if the cable's own equations could not be solved.
     """
-    if row[LIFT] == 0.0:
-        return _fixed_pull(row, start, move, up, guess, work, force, stiffness, gradient, state)
     seen, more = work[32], row[LIFT]
     lift, hanging = 0.0, row[WEIGHT] * row[REST]
     for _ in range(_LIFTINGS):
         lowered(move, lift, up, seen)
         if not _fixed_pull(row, start, seen, up, guess, work, force, stiffness, gradient, state):
             return False
+        if more == 0.0:
+            return True
         pull = -along(up, force) - hanging
         error = lift - more * pull
         if abs(error) <= 1e-15 * row[REST]:
@@ -73,7 +73,7 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
     return True
 
 
-@jit_inner
+@jit_merged
 def _fixed_pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
     """See cable_pull; for a cable whose exit point is not lifted."""
     if row[WEIGHT] > 0.0:

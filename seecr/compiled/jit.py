@@ -42,8 +42,8 @@ fifth of the compile time.
 jit_merged = njit(  # type: ignore[call-overload]
     **_UNCOUNTED, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True
 )
-"""The same for functions that are merged into their callers: to pass a scratch space of a dozen
-arrays took as long as what is computed with it. Each call adds to the compile time.
+"""The same for functions that are merged into their callers: to pass a dozen arrays took as long as
+what is computed with them. Each call adds to the compile time.
 """
 
 jit_allocating = njit(**_COMMON, _nrt=True)  # type: ignore[call-overload]
