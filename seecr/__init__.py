@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from seecr.prediction.sensitivity import sensitivities
     from seecr.prediction.uncertainty import Spread, spread_of
     from seecr.statics.solution import Solution, Status
-    from seecr.workspace.bars import BarBalance, bar_balances
+    from seecr.workspace.bars import BarBalance, BarManifold, bar_balances, bar_manifold
     from seecr.workspace.chances import held_chance, kept_chance
     from seecr.workspace.edges import boundary
     from seecr.workspace.grid import Workspace
@@ -98,7 +98,7 @@ _MODULES = {
     "statics.solution": ("Solution", "Status"),
     "description.shipped": ("model_names", "model_path"),
     "prediction.uncertainty": ("Spread", "spread_of"),
-    "workspace.bars": ("BarBalance", "bar_balances"),
+    "workspace.bars": ("BarBalance", "BarManifold", "bar_balances", "bar_manifold"),
     "workspace.midlines": ("Midlines", "midline_points"),
     "workspace.spans": ("SlackSpan", "slack_spans"),
     "workspace.zones": ("Zone", "feasible", "slack_zones", "tension_margin"),
@@ -107,6 +107,7 @@ _WHERE = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
     "BarBalance",
+    "BarManifold",
     "BarRest",
     "Barrier",
     "Commands",
@@ -140,6 +141,7 @@ __all__ = [
     "Zone",
     "bar_balances",
     "bar_equilibria",
+    "bar_manifold",
     "bar_tilt",
     "barriers",
     "boundary",

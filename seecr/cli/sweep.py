@@ -31,12 +31,15 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from seecr import Commands, Model, Robot, SlackSpan, Solution
+    from seecr import BarManifold, Commands, Model, Robot, SlackSpan, Solution
 
 
 _WANTED = "Lengths are commanded; deviations are from the wanted poses, columns want_*."
 # Poses of --line.
 _COUNT = 24
+# A bar's tilts are compared with the manifold in sweeps of at most so many poses: it takes half a
+# millisecond for each.
+_MOST_TILTS = 10_000
 # Zones of slack cables are computed for sweeps with at most so many changes of them.
 _MOST_CHANGES = 1000
 _COUNTED = "Poses are counted from 0, as the rows of sweep.json are."
@@ -109,7 +112,8 @@ def command(
 
     Zones are the stretches of the commanded way with the same slack cables; between poses their
     edges are searched for, to a micrometre; with history they are half way between poses.
-    On two pairs of parallel cables in a plane, the paper's point V or H is given, too.
+    On two pairs of parallel cables in a plane, the paper's point V or H is given, too; of a bar on
+    two cables its tilt beside those at which it is in balance, the paper's manifold.
 
     Writes sweep.json, sweep.csv, a figure and sweep.rrd. Also writes sweep.toml if lengths are told
     lengths or runs begin at their first row, so that every command reads sweep.csv as these
@@ -138,12 +142,13 @@ def command(
             spread = None if own is None else spread_of(machine, commands, own)
             tell(len(commands), "solved")
         commanded = commands.lengths is None or wanted
-        rows = SweepRows(solution, commands.lengths, more, spread, wanted, commands.loads)
+        bar, too_many = _bar(solution, commands, own)
+        rows = SweepRows(solution, commands.lengths, more, spread, wanted, commands.loads, bar)
         status = 0 if at_rest(solution) else 3
         runs = _runs(machine, given, more)
         spans, why_not = _spans(solution, commands, own, runs)
         met = midline_points(solution)
-        notes = [*notes_of(own, solution), *said, *why_not]
+        notes = [*notes_of(own, solution), *said, *why_not, *too_many]
         document = {
             "made": made_by(machine.source, poses, model),
             "exit_status": status,
@@ -162,7 +167,10 @@ def command(
         if beside := toml_beside(commands.told, commands):
             write_text(folder / "sweep.toml", beside)
         if figure != "none":
-            sweep_figure(folder / f"sweep.{figure}", solution, commanded, wanted, runs, spread)
+            sweep_figure(
+                folder / f"sweep.{figure}", solution, commanded, wanted, runs, spread,
+                zones=spans or (), bar=bar,
+            )  # fmt: skip
         if not no_recording:
             # takes a second or two to import
             from seecr.recording.sweep import write_sweep_recording
@@ -173,7 +181,7 @@ def command(
         return status
     lines = [
         *sweep_lines(solution, commanded, spread), *span_lines(spans or ()), *jump_lines(solution),
-        *(() if met is None else met.lines()),
+        *(() if met is None else met.lines()), *(() if bar is None else bar.lines()),
     ]  # fmt: skip
     if search is not None:
         lines.append(search.words)
@@ -316,6 +324,19 @@ def _spans(
     if commands.run is None and runs is not None:
         commands = replace(commands, run=np.unique(runs, return_inverse=True)[1])
     return slack_spans(solution, commands, effects=model or ()), ()
+
+
+def _bar(
+    solution: Solution, commands: Commands, model: Model | None
+) -> tuple[BarManifold | None, tuple[str, ...]]:
+    """Of a bar as it is described, the tilts beside the manifold; and why they are not computed."""
+    from seecr import bar_manifold
+
+    if model is not None or commands.loads is not None or solution.robot.n_cables != 2:
+        return None, ()
+    if len(solution) > _MOST_TILTS:
+        return None, (f"Tilts of the manifold are not computed: more than {_MOST_TILTS} poses.",)
+    return bar_manifold(solution), ()
 
 
 def _runs(robot: Robot, given: _Commanded, more: _Columns) -> Sequence[int] | None:

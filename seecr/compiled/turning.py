@@ -3,8 +3,9 @@
 With fewer cables than degrees of freedom, W(R) tau = -w is solved for the orientation R and the
 tensions together (Carricato and Merlet 2013), by the method of Levenberg and Marquardt with limits
 on the tensions: it also goes on where the linearised equations have no solution within the limits.
-A straight cable's direction does not depend on its tension, so no cable law is needed here, except
-for the stability. Derivatives are by finite differences along the few rotations.
+The balance is that of straight cables, :mod:`seecr.compiled.straight`; a cable law is needed only
+for the stability. Derivatives are exact for free platforms, else by finite differences along the
+few rotations.
 """
 
 from __future__ import annotations
@@ -18,22 +19,20 @@ from seecr.compiled.algebra import (
     copy_rows,
     copy_vector,
     largest_diagonal,
-    norm,
     solve_factored,
 )
 from seecr.compiled.columns import (
-    ANCHOR,
-    CENTRE_OF_MASS,
     EA,
-    EXIT,
-    EXTERNAL_FORCE,
-    EXTERNAL_MOMENT,
-    FORCE_OF_WEIGHT,
 )
 from seecr.compiled.jit import jit_allocating, jit_inner
-from seecr.compiled.joints import N_CURRENT, joint_columns, onto_joints_gradient, place_joints
-from seecr.compiled.rotation import rotated_less
+from seecr.compiled.joints import place_joints
 from seecr.compiled.steps import advance
+from seecr.compiled.straight import (
+    balance_straight,
+    left_of,
+    make_turning_space,
+    rates_of_rotations,
+)
 
 # Most steps, the residual that ends them, and the one that suffices if it gets no smaller [load].
 _STEPS, _EXACT, _ENOUGH = 60, 1e-14, 1e-12
@@ -51,69 +50,6 @@ _RAISE, _FINEST, _RAISES = 0.25, 2e-3, 24
 
 
 @jit_inner
-def _onto(own, columns, out):
-    """From the platform's own (6,) to its coordinates (d,)."""
-    if columns.shape[0] == 0:
-        copy_vector(own, out)
-    else:
-        onto_joints_gradient(own, columns, out)
-
-
-@jit_inner
-def _moment(ax, ay, az, per, own):
-    """Complete a force in ``own`` (6,) by its moment about the platform's origin."""
-    own[3] = (ay * own[2] - az * own[1]) * per
-    own[4] = (az * own[0] - ax * own[2]) * per
-    own[5] = (ax * own[1] - ay * own[0]) * per
-
-
-@jit_inner
-def _balance(cables, load, pose, place, length, space):
-    """Fill the pulls (m, d), weight (d,) and spans (m,) of the balance pulls^T tau = weight."""
-    current, columns, own, pulls, weight, spans = space[0:6]
-    per, m = 1.0 / length, cables.shape[0]
-    px, py, pz = pose[0] + place[0], pose[1] + place[1], pose[2] + place[2]
-    if current.shape[0] > 0:
-        joint_columns(current, px, py, pz, per, columns)
-    for i in range(m + 1):
-        if i < m:
-            a, b, c = cables[i, ANCHOR], cables[i, ANCHOR + 1], cables[i, ANCHOR + 2]
-        else:
-            a, b, c = load[CENTRE_OF_MASS], load[CENTRE_OF_MASS + 1], load[CENTRE_OF_MASS + 2]
-        dx, dy, dz = rotated_less(pose[3], pose[4], pose[5], pose[6], a, b, c)
-        a, b, c = a + dx, b + dy, c + dz
-        dx, dy, dz = rotated_less(place[3], place[4], place[5], place[6], a, b, c)
-        a, b, c = a + dx, b + dy, c + dz
-        if i < m:
-            own[0], own[1] = px + a - cables[i, EXIT], py + b - cables[i, EXIT + 1]
-            own[2] = pz + c - cables[i, EXIT + 2]
-            spans[i] = max(math.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2), 1e-12 * length)
-            for k in range(3):
-                own[k] /= spans[i]
-            _moment(a, b, c, per, own)
-            _onto(own, columns, pulls[i])
-        else:
-            for k in range(3):
-                own[k] = load[FORCE_OF_WEIGHT + k]
-            _moment(a, b, c, per, own)
-            for k in range(3):
-                own[k] += load[EXTERNAL_FORCE + k]
-                own[3 + k] += load[EXTERNAL_MOMENT + k] * per
-            _onto(own, columns, weight)
-
-
-@jit_inner
-def _left(space, tension, left):
-    """Residual (d,) [N] of the balance; returns its norm."""
-    pulls, weight = space[3], space[4]
-    for k in range(left.shape[0]):
-        left[k] = -weight[k]
-        for i in range(tension.shape[0]):
-            left[k] += pulls[i, k] * tension[i]
-    return norm(left)
-
-
-@jit_inner
 def _beside(number, by, row, state, length, space, tension, left):
     """Residual (d,) after a step ``by`` [m] along one coordinate."""
     (cables, load, pose, screws, _), (place, values) = row, state
@@ -121,8 +57,8 @@ def _beside(number, by, row, state, length, space, tension, left):
     step[:] = 0.0
     step[number] = by
     advance(place, values, step, length, screws, pose, trial, trial_values, space[0])
-    _balance(cables, load, pose, trial, length, space)
-    _left(space, tension, left)
+    balance_straight(cables, load, pose, trial, length, space)
+    left_of(space, tension, left)
 
 
 @jit_inner
@@ -138,7 +74,7 @@ def _is_firm(row, state, length, space, tension):
             hessian[k, j] = (left[j] - other[j]) / (2.0 * by)
     space[6][:] = 0.0
     advance(place, values, space[6], length, screws, pose, space[7], space[8], space[0])
-    _balance(cables, load, pose, place, length, space)
+    balance_straight(cables, load, pose, place, length, space)
     pulls, spans = space[3], space[5]
     for k in range(d):
         for j in range(k + 1):
@@ -151,9 +87,9 @@ def _is_firm(row, state, length, space, tension):
 
 
 @jit_inner
-def _step(turns, damping, scale, low, high, tension, left, space):
-    """A damped step of the rotations and tensions within limits: fills ``move``, space[17]."""
-    rates, normal, factor, right, move = space[13:18]
+def _normal_equations(turns, scale, low, high, tension, left, space):
+    """Fill those of rotations and tensions; tensions that would leave their limits do not move."""
+    rates, normal, _factor, right = space[13:17]
     n, d = right.shape[0], left.shape[0]
     for a in range(n):
         right[a] = 0.0
@@ -173,6 +109,12 @@ def _step(turns, damping, scale, low, high, tension, left, space):
             for b in range(n):
                 normal[a, b] = normal[b, a] = 0.0
             normal[a, a] = 1.0
+
+
+@jit_inner
+def _step(turns, damping, space):
+    """A damped step of the rotations and tensions: fills ``move``, space[17]."""
+    normal, factor, right, move = space[14:18]
     while not cholesky(normal, damping, factor):
         damping *= 10.0
     solve_factored(factor, right, move)
@@ -180,7 +122,7 @@ def _step(turns, damping, scale, low, high, tension, left, space):
     for a in range(turns):
         far += move[a] ** 2
     part = min(1.0, _LONGEST / max(math.sqrt(far), 1e-300))
-    for a in range(n):
+    for a in range(move.shape[0]):
         move[a] *= part
 
 
@@ -201,6 +143,9 @@ def _rotate_all(row, state, length, scale, tension, space):
     hinges, left, other, rates = row[4], space[9], space[10], space[13]
     number, by = 0, _DIFFERENCE * length
     copy_rows(space[3], rates[rates.shape[0] - tension.shape[0] :])
+    if row[3].shape[0] == 0:  # not on joints
+        rates_of_rotations(row[1], length, scale, tension, space)
+        return
     for k in range(left.shape[0]):
         if hinges[k]:
             _beside(k, by, row, state, length, space, tension, other)
@@ -220,21 +165,22 @@ def _solve(row, state, length, scale, low, high, tension, space):
     step, trial, trial_values = space[6:9]
     step[:] = 0.0
     advance(place, values, step, length, screws, pose, trial, trial_values, space[0])
-    _balance(cables, load, pose, place, length, space)
-    size = _left(space, tension, left) / scale
+    balance_straight(cables, load, pose, place, length, space)
+    size = left_of(space, tension, left) / scale
     for _ in range(_STEPS):
         if size <= _EXACT:
             return True
         _rotate_all(row, state, length, scale, tension, space)
+        _normal_equations(turns, scale, low, high, tension, left, space)
         better = False
         while not better and damping <= _MOST:
-            _step(turns, damping, scale, low, high, tension, left, space)
+            _step(turns, damping, space)
             _onto_hinges(move, hinges, length, step)
             for i in range(m):
                 tried[i] = min(max(tension[i] + move[turns + i] * scale, low[i]), high[i])
             advance(place, values, step, length, screws, pose, trial, trial_values, space[0])
-            _balance(cables, load, pose, trial, length, space)
-            new = _left(space, tried, other) / scale
+            balance_straight(cables, load, pose, trial, length, space)
+            new = left_of(space, tried, other) / scale
             better = new < size
             damping = max(damping * _BETTER, _LEAST) if better else max(damping, 1e-6) * _WORSE
             if not better and size <= _ENOUGH:
@@ -294,18 +240,6 @@ def _raise(row, state, other, length, scale, low, high, space):
 
 
 @jit_allocating
-def make_turning_space(m, d, joints, turns):
-    """Scratch arrays, made once per batch."""
-    n = turns + m
-    return (
-        np.zeros((joints, N_CURRENT)), np.zeros((joints, 6)), np.empty(6), np.empty((m, d)),
-        np.empty(d), np.empty(m), np.empty(d), np.empty(7), np.empty(d), np.empty(d), np.empty(d),
-        np.empty((d, d)), np.empty((d, d)), np.empty((n, d)), np.empty((n, n)), np.empty((n, n)),
-        np.empty(n), np.empty(n), np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m),
-    )  # fmt: skip
-
-
-@jit_allocating
 def turn_batch(
     cables, load, poses, screws, hinges, length, scale, low, high, starts, start_values, farther,
     best, best_values, margins,
@@ -349,32 +283,3 @@ def turn_batch(
                 copy_vector(state[1], best_values[r])
             if not farther:
                 break
-
-
-@jit_allocating
-def straight_balance_batch(
-    cables, load, poses, screws, rows, away, length, matrices, loads
-):  # fmt: skip
-    """The balance of platforms on straight cables at k displaced poses; fills the last two.
-
-    Args:
-        cables: (n, m, N_COLUMNS). load: (n, N_LOAD). poses: (n, 7). screws: (n, d or 0, 7).
-        rows: (k,) which of these each displacement is for.
-        away: (k, d) [m] displacements of a step's kind, rotations times the length.
-        length: [m].
-        matrices: (k, d, m), loads: (k, d) [N], torques over the length: matrix tau = load.
-    """
-    m, d = cables.shape[1], loads.shape[1]
-    space, still, values = make_turning_space(m, d, screws.shape[1], 3), np.zeros(7), np.zeros(d)
-    place, trial_values = space[7], space[8]
-    still[3] = 1.0
-    for r in range(rows.shape[0]):
-        row = rows[r]
-        advance(
-            still, values, away[r], length, screws[row], poses[row], place, trial_values, space[0]
-        )
-        _balance(cables[row], load[row], poses[row], place, length, space)
-        for k in range(d):
-            loads[r, k] = space[4][k]
-            for i in range(m):
-                matrices[r, k, i] = space[3][i, k]

@@ -309,6 +309,10 @@ class _Limits:
     low: Array
     high: Array
 
+    def rows(self, some: NDArray[np.intp]) -> _Limits:
+        """Those of some rows."""
+        return replace(self, aim=self.aim[some])
+
     def strained(self, robot: Robot) -> _Limits:
         """The same, and strains within theirs where no highest tension is given."""
         most = _STRAIN * robot.ea
@@ -353,13 +357,18 @@ class _Search:
         """(n,) [N] margins of positions; minus infinity if they are not held or not stable."""
         tables, rows = self._tables(self.given), np.arange(len(self.given))
         problem = self._reaching(rows, tables.scale, fix_position=True)
-        aimed = poses_in_place(problem, tables)
-        commands = replace(self.given, pose=aimed)
-        there = self._held(commands)[0]
-        solution = self._lengths(commands, there)[1].solution()
+        aimed, found = poses_in_place(problem, tables)
+        margins, rows = np.full(len(rows), -np.inf), np.flatnonzero(found)
+        if len(rows) == 0:
+            return margins
+        own = replace(self, limits=self.limits.rows(rows))
+        commands = replace(self.given.rows(rows), pose=aimed[rows])
+        there = own._held(commands)[0]
+        solution = own._lengths(commands, there)[1].solution()
         inside = np.minimum(there.tensions - self.limits.low, self.limits.high - there.tensions)
-        fine = there.fine & _rests_at(aimed, solution)
-        return np.where(fine, np.maximum(inside.min(axis=1), 0.0), -np.inf)
+        fine = there.fine & _rests_at(aimed[rows], solution)
+        margins[rows[fine]] = np.maximum(inside[fine].min(axis=1), 0.0)
+        return margins
 
     def _why_not(self, lost: NDArray[np.intp], tables: Tables) -> tuple[str, ...]:
         """(n,) sentences; "" for rows that can be held."""

@@ -16,6 +16,7 @@ from seecr.prediction.uncertainty import Spread
 from seecr.report.commanded import load_columns
 from seecr.result import COORDINATES, Record
 from seecr.statics.solution import Solution
+from seecr.workspace.bars import BarManifold
 from seecr.workspace.midlines import midline_points
 
 __all__ = ["SweepRows"]
@@ -32,6 +33,7 @@ class SweepRows:
         more: further values of each row, by name.
         spread: standard deviations of poses and tensions, if the model has a covariance.
         loads: known loads, if any.
+        bar: tilts beside the paper's manifold, if the robot is a bar on two cables.
     """
 
     solution: Solution
@@ -40,6 +42,7 @@ class SweepRows:
     spread: Spread | None = None
     wanted: bool = False
     loads: Loads | None = None
+    bar: BarManifold | None = None
 
     def as_json(self) -> list[Record]:
         """``rows`` in ``sweep.json``."""
@@ -66,6 +69,7 @@ class SweepRows:
         }
         if (met := midline_points(found)) is not None:
             columns |= {"midlines_meet_m": met.points, "beside_weight_m": met.beside}
+        columns |= self._tilts()
         if spread is not None:
             columns |= {
                 "position_stderr_m": spread.position,
@@ -108,11 +112,17 @@ class SweepRows:
         if (met := midline_points(found)) is not None:
             columns |= _named("midlines_{}_m", "xyz", met.points)
             columns["beside_weight_m"] = met.beside.tolist()
+        columns |= self._tilts()
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows(map(_cell, row) for row in zip(*columns.values(), strict=True))
         return out.getvalue()
+
+    def _tilts(self) -> dict[str, list[float]]:
+        """Of a bar on two cables, beside those of the manifold."""
+        rows = [] if self.bar is None else self.bar.records()
+        return {name: [row[name] for row in rows] for name in rows[0]} if rows else {}
 
     def _slack(self) -> list[list[str]]:
         """Names of the slack cables of each row."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,9 @@ from seecr.pose import Array
 from seecr.prediction.uncertainty import Spread
 from seecr.report.drawing import COLOURS, figure
 from seecr.statics.solution import Solution
+from seecr.workspace.bars import BarManifold
+from seecr.workspace.midlines import Midlines, midline_points
+from seecr.workspace.spans import SlackSpan
 
 __all__ = ["sweep_figure"]
 
@@ -24,6 +28,8 @@ _NUMBERS = ("line of the file", "pose, counted from 0")
 _DASHES = ("-", "--", ":", "-.")
 # With more cables than this a legend is useless.
 _MOST_NAMED = 24
+# Zones are yellow with the fewest slack cables and red with more, as in the paper's Figs 7 and 11.
+_FEW, _MANY = (COLOURS[1], 0.18), (COLOURS[4], 0.22)
 _BAND: dict[str, Any] = {"alpha": 0.2, "linewidth": 0.8}
 
 
@@ -34,8 +40,13 @@ def sweep_figure(
     wanted: bool = False,
     runs: ArrayLike | None = None,
     spread: Spread | None = None,
+    zones: Sequence[SlackSpan] = (),
+    bar: BarManifold | None = None,
 ) -> None:
     """Deviation, rotation if it can turn, tensions and slack cables along a sweep.
+
+    If it can turn and hangs on two pairs of parallel cables in a plane, also how far the paper's
+    point V or H is beside the line of the weight.
 
     Args:
         path: the file.
@@ -44,17 +55,23 @@ def sweep_figure(
         wanted: whether these poses are wanted ones that lengths were commanded for.
         runs: (n,) run of each pose; lines are interrupted between runs. Default: one run.
         spread: standard deviations of poses and tensions, drawn as bands.
+        zones: of slack cables, shaded; without them slack cables change half way between poses.
+        bar: tilts beside the manifold, if the robot is a bar on two cables.
     """
     at, label = _along(solution, commanded, "wanted" if wanted else "commanded")
     mark: dict[str, Any] = {"marker": "o", "markersize": 2.5, "linewidth": 1.1}
     if label in _NUMBERS:
         mark["linewidth"] = 0.5
     number = np.zeros(len(solution)) if runs is None else np.asarray(runs)
-    whole = _Sweep(solution, spread, at, np.flatnonzero(number[1:] != number[:-1]) + 1, mark)
-    panels = [_tensions, _slack]
+    whole = _Sweep(solution, spread, at, np.flatnonzero(number[1:] != number[:-1]) + 1, mark, zones)
+    panels: list[Callable[[Any, _Sweep], None]] = [_tensions, _slack]
     if commanded:
         turned = [_rotations] if solution.robot.turns else []
         panels = [_deviations, *turned, *panels]
+    if solution.robot.turns and (met := midline_points(solution)) is not None:
+        panels.append(partial(_beside, met=met))
+    if bar is not None:
+        panels.append(partial(_tilts, bar=bar))
     with figure(path, len(panels), 1, sharex=True, figsize=(7.4, 2.1 * len(panels))) as axes:
         for panel, ax in zip(panels, axes[:, 0], strict=True):
             panel(ax, whole)
@@ -87,6 +104,7 @@ class _Sweep:
         at: (n,) horizontal positions.
         starts: (k,) rows at which another run begins.
         mark: style of lines and points.
+        zones: of slack cables.
     """
 
     solution: Solution
@@ -94,6 +112,19 @@ class _Sweep:
     at: Array
     starts: NDArray[np.intp]
     mark: dict[str, Any]
+    zones: Sequence[SlackSpan] = ()
+
+    def ends(self, zone: SlackSpan) -> Array:
+        """Horizontal positions (2,) of a zone's ends."""
+        return np.interp(zone.rows, np.arange(len(self.at)), self.at)
+
+    def shade(self, ax: Any) -> None:
+        """Shade the zones in which cables are slack."""
+        counts = sorted({len(zone.slack) for zone in self.zones if zone.slack})
+        for zone in self.zones:
+            if zone.slack:
+                colour, alpha = _FEW if len(zone.slack) == counts[0] else _MANY
+                ax.axvspan(*self.ends(zone), color=colour, alpha=alpha, linewidth=0.0, zorder=0)
 
     def line(self, ax: Any, values: Array, *how: str, **more: Any) -> None:
         """Draw points (n,), with lines within each run."""
@@ -134,6 +165,7 @@ def _tensions(ax: Any, whole: _Sweep) -> None:
     stderr = None if whole.spread is None else whole.spread.tensions
     # cables do not push
     _curves(ax, whole, whole.solution.tensions, stderr, robot.cable_names, least=0.0)
+    whole.shade(ax)
     ax.set_ylabel("tension [N]")
     ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]))
     if robot.n_cables <= _MOST_NAMED:
@@ -176,7 +208,12 @@ def _name_band(ax: Any) -> None:
 def _slack(ax: Any, whole: _Sweep) -> None:
     solution = whole.solution
     count = np.where(solution.converged, solution.slack.sum(axis=1), np.nan)
-    whole.line(ax, count, color="black", drawstyle="steps-mid")
+    if whole.zones:
+        whole.shade(ax)
+        ax.plot(*_steps(whole), color="black", linewidth=whole.mark["linewidth"])
+        ax.plot(whole.at, count, "o", color="black", markersize=whole.mark["markersize"])
+    else:
+        whole.line(ax, count, color="black", drawstyle="steps-mid")
     lost = ~solution.converged
     if np.any(lost):
         at = whole.at[lost]
@@ -185,3 +222,31 @@ def _slack(ax: Any, whole: _Sweep) -> None:
     ax.set_ylabel("slack cables")
     ax.set_ylim(-0.3, solution.robot.n_cables + 0.3)
     ax.yaxis.get_major_locator().set_params(integer=True)
+
+
+def _steps(whole: _Sweep) -> tuple[Array, Array]:
+    """Corners of the line of slack cables by zone, interrupted between runs and without rest."""
+    at, count, run = [], [], None
+    for zone in whole.zones:
+        if run not in (None, zone.run):
+            at.append(np.nan)
+            count.append(np.nan)
+        run = zone.run
+        at += whole.ends(zone).tolist()
+        count += 2 * [np.nan if zone.slack is None else float(len(zone.slack))]
+    return np.array(at), np.array(count)
+
+
+def _beside(ax: Any, whole: _Sweep, met: Midlines) -> None:
+    whole.line(ax, 1e3 * np.where(np.isfinite(met.beside), met.beside, np.nan), color=COLOURS[0])
+    ax.axhline(0.0, color="0.5", linewidth=0.8, zorder=0)
+    whole.shade(ax)
+    of = f"point {met.name}" if met.name else "midlines meet"
+    ax.set_ylabel(f"{of} beside the\nline of the weight [mm]")
+
+
+def _tilts(ax: Any, whole: _Sweep, bar: BarManifold) -> None:
+    tilts = np.degrees(np.stack([bar.tilt, bar.there, bar.at_command], axis=1))
+    _curves(ax, whole, tilts, None, ["at rest", "manifold there", "manifold at\nthe command"])
+    ax.set_ylabel("tilt, second end up [°]")
+    _legend(ax)

@@ -263,6 +263,7 @@ class Solution(Result):
         """The largest position error and the largest rotation of some rows, with their poses."""
         away = 1e3 * np.linalg.norm(self.deviation[known, :3], axis=1)
         turned = np.degrees(np.linalg.norm(self.deviation[known, 3:], axis=1))
+        away, turned = (np.where(one < _ALIKE, 0.0, one) for one in (away, turned))
         # rounding must not say which of two is further
         first = np.flatnonzero(away >= away.max() * (1.0 - _ALIKE) - _ALIKE)
         k = int(first[np.argmax(turned[first])])

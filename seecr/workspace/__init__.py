@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from seecr.lazy import lazily
 
 if TYPE_CHECKING:
-    from seecr.workspace.bars import BarBalance, bar_balances
+    from seecr.workspace.bars import BarBalance, BarManifold, bar_balances, bar_manifold
     from seecr.workspace.chances import held_chance, kept_chance
     from seecr.workspace.edges import boundary
     from seecr.workspace.grid import Workspace
@@ -18,11 +18,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BarBalance",
+    "BarManifold",
     "Midlines",
     "SlackSpan",
     "Workspace",
     "Zone",
     "bar_balances",
+    "bar_manifold",
     "boundary",
     "default_axes",
     "feasible",
@@ -36,7 +38,7 @@ __all__ = [
 ]
 
 _MODULES = {
-    "bars": ("BarBalance", "bar_balances"),
+    "bars": ("BarBalance", "BarManifold", "bar_balances", "bar_manifold"),
     "chances": ("held_chance", "kept_chance"),
     "edges": ("boundary",),
     "grid": ("Workspace",),

@@ -1,4 +1,7 @@
-"""All equilibria of a robot that is a bar on two cables, in closed form (paper, Figs 2 to 4)."""
+"""All equilibria of a robot that is a bar on two cables, in closed form (paper, Figs 2 to 4).
+
+They are one tilt, or a few, for each place of the bar's middle: the paper's solution manifold.
+"""
 
 from __future__ import annotations
 
@@ -11,17 +14,21 @@ from numpy.typing import ArrayLike
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.errors import InputError
-from seecr.planar import BarRest, bar_equilibria
+from seecr.planar import BarRest, bar_equilibria, bar_tilt
 from seecr.pose import Array, quat_from_rotvec, quat_multiply, quat_rotate, transform_points
 from seecr.result import COORDINATES, Record, Result, named
+from seecr.statics.solution import Solution
 from seecr.statics.starts import commanded_poses
 
-__all__ = ["BarBalance", "bar_balances"]
+__all__ = ["BarBalance", "BarManifold", "bar_balances", "bar_manifold"]
 
 # Points are in a plane, and the weight in the bar's middle, to this part of the robot's length.
 _OFF = 1e-9
 # A pose is one of the equilibria if its tilt is within this of it [rad].
 _ALIKE = 1e-7
+_POSITIVE = "positive: the second cable's end is up"
+# Tilts that differ by less than this are alike but for rounding [deg].
+_ROUNDED = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -100,13 +107,109 @@ def bar_balances(robot: GivenRobot, pose: ArrayLike) -> tuple[BarBalance, ...] |
     across = _across(robot)
     if across is None:
         return None
-    plane = np.stack([across, robot.up])
+    exits, (middle,), half, (now,) = _in_plane(robot, places, across)
     ends = transform_points(places, robot.anchor_points)[0]
-    middle, bar = 0.5 * (ends[0] + ends[1]), ends[1] - ends[0]
-    half = 0.5 * float(np.linalg.norm(bar))
-    now = float(np.arctan2(bar @ robot.up, bar @ across))
-    rests = bar_equilibria(robot.exit_points @ plane.T, plane @ middle, half)
-    return tuple(_balance(robot, rest, places[0], middle, now, across) for rest in rests)
+    rests = bar_equilibria(exits, middle, half)
+    return tuple(_balance(robot, r, places[0], ends.mean(axis=0), now, across) for r in rests)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BarManifold(Result):
+    """A bar on two cables beside the paper's manifold, at n poses (Figs 3 and 4).
+
+    Tilts are from the horizontal, upwards towards the end of the second cable [rad], and NaN where
+    the bar does not rest, or where no tilt is stable.
+
+    Attributes:
+        tilt: (n,) with which the bar rests.
+        there: (n,) of the manifold where its middle rests: of the stable tilts the nearest.
+        at_command: (n,) of the manifold where its middle was commanded to: the most level one.
+    """
+
+    tilt: Array
+    there: Array
+    at_command: Array
+
+    def lines(self) -> list[str]:
+        """The tilts and how far they are off the manifold; and those of it at the commands."""
+        out, known = [], np.isfinite(self.tilt)
+        if known.any():
+            out.append(f"the bar is tilted by {_range(self.tilt[known])} deg ({_POSITIVE})")
+            off = np.abs(self.tilt - self.there)[known]
+            if np.isfinite(off).any():
+                most = float(np.degrees(np.nanmax(off)))
+                near = "to rounding" if most < _ROUNDED else f"to within {most:.2g} deg"
+                out[0] += f", on the manifold of its equilibria {near}"
+        asked = self.at_command[np.isfinite(self.at_command)]
+        if len(asked):
+            out.append(f"to rest where it was commanded to it would tilt by {_range(asked)} deg")
+        return out
+
+    def records(self) -> Sequence[Record]:
+        """One row per pose."""
+        columns = self.tilt.tolist(), self.there.tolist(), self.at_command.tolist()
+        return [
+            {"tilt_rad": tilt, "manifold_there_rad": there, "manifold_at_command_rad": asked}
+            for tilt, there, asked in zip(*columns, strict=True)
+        ]
+
+
+def bar_manifold(solution: Solution) -> BarManifold | None:
+    """How a bar on two cables rests beside the tilts at which it is in balance (Figs 3 and 4).
+
+    The manifold is that of the robot as described, see :func:`bar_balances`.
+
+    Args:
+        solution: n poses.
+
+    Returns:
+        the tilts, or None for a robot that is no such bar.
+
+    Raises:
+        InputError: not a solution.
+    """
+    if not isinstance(solution, Solution):
+        raise InputError(f"expected a seecr.Solution, got {type(solution).__name__}")
+    robot = solution.robot
+    across = _across(robot)
+    if across is None:
+        return None
+    poses = np.where(solution.converged[:, None], solution.pose, np.nan)
+    exits, middles, half, tilt = _in_plane(robot, poses, across)
+    there = np.full(len(tilt), np.nan)
+    for k in np.flatnonzero(np.isfinite(tilt)):
+        rests = bar_equilibria(exits, middles[k], half)
+        stable = np.array([rest.theta for rest in rests if rest.stable])
+        if len(stable):
+            there[k] = stable[np.argmin(np.abs(stable - tilt[k]))]
+    asked = np.full(len(tilt), np.nan)
+    commanded = np.isfinite(solution.command).all(axis=1)
+    places = _in_plane(robot, solution.command[commanded], across)[1]
+    asked[commanded] = bar_tilt(exits, places, half)
+    return BarManifold(tilt, there, asked)
+
+
+def _in_plane(robot: Robot, poses: Array, across: Array) -> tuple[Array, Array, float, Array]:
+    """Exit points (2, 2), the bar's middles (n, 2), half its length, and its tilts (n,) at poses.
+
+    The plane's axes are ``across`` and up.
+    """
+    plane = np.stack([across, robot.up])
+    ends = transform_points(poses, robot.anchor_points) @ plane.T
+    half = 0.5 * float(np.linalg.norm(np.diff(robot.anchor_points, axis=0)))
+    along = ends[:, 1] - ends[:, 0]
+    return (
+        robot.exit_points @ plane.T,
+        ends.mean(axis=1),
+        half,
+        np.arctan2(along[:, 1], along[:, 0]),
+    )
+
+
+def _range(angles: Array) -> str:
+    """The smallest and largest of angles [rad] in degrees, or the one that they all are."""
+    low, high = (round(float(end), 2) + 0.0 for end in np.degrees([angles.min(), angles.max()]))
+    return f"{low:+.2f} to {high:+.2f}" if high > low else f"{high:+.2f}"
 
 
 def _balance(

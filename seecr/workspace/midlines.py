@@ -41,14 +41,21 @@ class Midlines(Result):
     beside: Array
 
     def lines(self) -> list[str]:
-        """One line: how far the point is beside the line of the weight."""
-        known = 1e3 * self.beside[np.isfinite(self.beside)]
+        """One line: where the point is, and how far beside the line of the weight."""
+        known = np.isfinite(self.beside)
         of = f"point {self.name}" if self.name else "the point where midlines meet"
-        if len(known) == 0:
+        if not known.any():
             return [f"{of} is nowhere: the midlines of both pairs of cables do not meet"]
-        low, high = (round(float(end), 6) + 0.0 for end in (known.min(), known.max()))
+        first, *_, last = (self._place(k) for k in np.flatnonzero(known)[[0, 0, -1]])
+        where = f"is at {first}" if first == last else f"goes from {first} to {last}"
+        beside = 1e3 * self.beside[known]
+        low, high = (round(float(end), 6) + 0.0 for end in (beside.min(), beside.max()))
         far = f"{low:+.2f} to {high:+.2f}" if high - low > 0.01 else f"{high:+.2f}"
-        return [f"{of} is {far} mm beside the line of the weight"]
+        return [f"{of} {where} mm, {far} mm beside the line of the weight"]
+
+    def _place(self, row: int) -> str:
+        point = [self.points[row]["xyz".index(axis)] for axis in self.axes]
+        return f"{' '.join(self.axes)} {' '.join(f'{1e3 * part + 0.0:.2f}' for part in point)}"
 
     def records(self) -> Sequence[Record]:
         """One row per pose."""

@@ -9,6 +9,7 @@ and the others start from their results; any orientation will do.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seecr.compiled.columns import LIFT, RADIUS, WEIGHT
 from seecr.inverse.nearest.firm import part_of
@@ -23,15 +24,15 @@ from seecr.statics.tables import Tables
 _NEIGHBOURS, _AT_ONCE = 3, 8
 
 
-def poses_in_place(problem: Reaching, tables: Tables) -> Array:
-    """Stable poses (n, 7) at the wanted positions, if any are found.
+def poses_in_place(problem: Reaching, tables: Tables) -> tuple[Array, NDArray[np.bool_]]:
+    """Stable poses (n, 7) at the wanted positions, and (n,) whether one was found.
 
     Args:
         problem: one in which positions may not change. tables: of its wanted poses.
     """
     turned = turned_in_place(problem.robot, tables, problem.least, problem.most)
     if not np.any(tables.cables[..., [RADIUS, WEIGHT, LIFT]]):
-        return turned.poses
+        return turned.poses, turned.found
     best, rows = Best.none(problem), np.arange(len(problem.wanted))
     _try_all(best, np.zeros((len(rows), len(problem.free))), rows)
     # those of straight cables without pulleys are near
@@ -46,7 +47,7 @@ def poses_in_place(problem: Reaching, tables: Tables) -> Array:
             best.take(some, any_that_stays(part_of(problem, some)))
             left[some], fresh = False, some[best.firm[some]]
         left &= ~best.firm
-    return problem.placed(best.away, rows)
+    return problem.placed(best.away, rows), best.firm
 
 
 def _try_all(best: Best, away: Array, rows: Rows) -> None:

@@ -56,7 +56,10 @@ def test_a_sweep_tells_the_zones_of_slack_cables_and_the_papers_points(tmp_path:
     assert lines[at + 1] == "  x 170.000 to 285.143 mm, 115.143 mm wide: 2 slack: cable2 cable3"
     assert lines[at + 2] == "  x 285.143 to 296.235 mm, 11.093 mm wide: 1 slack: cable3"
     assert [x.split(": ")[1] for x in lines[at + 3 : at + 6]] == ["0 slack", "1 slack", "2 slack"]
-    assert lines[at + 6].startswith("point V is -17.80 to +17.80 mm beside the line of the weight")
+    assert lines[at + 6].startswith(
+        "point V goes from x z 175.64 138.04 to x z 624.36 138.04 mm, -17.80 to +17.80 mm beside "
+        "the line of the weight"
+    )
     document = json.loads((tmp_path / "v" / "sweep.json").read_text())
     zones = document["zones"]
     assert [zone["slack_cables"] for zone in zones] == [2, 1, 0, 1, 2]
@@ -72,7 +75,9 @@ def test_a_sweep_tells_the_zones_of_slack_cables_and_the_papers_points(tmp_path:
     assert float(cell["beside_weight_m"]) == document["rows"][0]["beside_weight_m"]
 
     level = run("sweep", "planar_horizontal", *way).output
-    assert "on the whole way 0 slack\npoint H is +0.00 mm beside the line of the weight" in level
+    assert "on the whole way 0 slack\npoint H goes from x z 169.97 217.82 to " in level
+    assert " mm, +0.00 mm beside the line of the weight" in level
+    assert "pose 11, 0.3101 mm and 0 deg" in level  # and no rotation of 9.5e-18 deg
     followed = run("sweep", "planar_vertical", "--follow", *way).output
     assert lines[at : at + 6] == [
         x for x in followed.splitlines() if x.startswith("zones") or " mm wide: " in x
@@ -82,6 +87,24 @@ def test_a_sweep_tells_the_zones_of_slack_cables_and_the_papers_points(tmp_path:
     assert [zone["slack_cables"] for zone in document["zones"]] == [4, 2, 0, 2, 4]
     assert [round(1e3 * zone["width_m"], 1) for zone in document["zones"][:2]] == [141.3, 15.5]
     assert document["midline_point"] is None and "beside_weight_m" not in document["rows"][0]
+
+
+def test_a_sweep_of_a_bar_is_compared_with_the_manifold(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Figs 3 and 4 of the paper."""
+    line = ("--line", "0.2", "0", "0.5", "0.5", "0", "0.5", "--count", "3", "--out", tmp_path / "v")
+    bar = run("sweep", "planar_two_cable", *line).output
+    assert "the bar is tilted by -34.86 to +0.00 deg" in bar
+    assert "to rest where it was commanded to it would tilt by -49.61 to +0.00 deg" in bar
+    assert "manifold_at_command_rad" in (tmp_path / "v" / "sweep.csv").read_text()
+    first = json.loads((tmp_path / "v" / "sweep.json").read_text())["rows"][0]
+    assert first["tilt_rad"] == pytest.approx(-first["rotation_rad"][1], abs=1e-12)
+    assert first["manifold_there_rad"] == pytest.approx(first["tilt_rad"], abs=1e-9)
+    monkeypatch.setattr("seecr.cli.sweep._MOST_TILTS", 2)
+    many = run("sweep", "planar_two_cable", *line).output
+    assert "Tilts of the manifold are not computed: more than 2 poses." in many
+    assert "the bar is tilted" not in many
 
 
 def test_columns_of_a_grid_are_ways_of_their_own_and_many_zones_are_counted(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,15 @@ from matplotlib.figure import Figure
 from slab import slides
 
 from seecr.cli import main
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.equilibrium.solving import solve
 from seecr.prediction.uncertainty import Spread, spread_of
 from seecr.report.sweep_panels import sweep_figure
 from seecr.statics.solution import Solution
+from seecr.workspace.bars import bar_manifold
+from seecr.workspace.midlines import midline_points
+from seecr.workspace.spans import slack_spans
 
 pytestmark = pytest.mark.slow
 Drawn = Callable[..., list[Any]]
@@ -137,3 +143,52 @@ def test_rotations_are_drawn_where_the_platform_turns(drawn: Drawn, sweep: Solut
     still = slides()
     labels = [ax.get_ylabel() for ax in drawn(solve(still, still.reference_pose))]
     assert "rotation [°]" not in labels and len(labels) == 3
+
+
+def test_zones_are_shaded_to_their_edges_and_slack_cables_change_there(drawn: Drawn) -> None:
+    """Also a zone between two poses, in which no pose is."""
+    robot = load_robot(model_path("planar_vertical"))
+    poses = np.tile(robot.reference_pose, (4, 1))
+    poses[:, 0], poses[:, 2] = [0.18, 0.28, 0.30, 0.40], 0.2
+    solution = solve(robot, poses)
+    zones = slack_spans(solution)
+    assert [len(zone.slack or ()) for zone in zones] == [2, 1, 0]
+    *_, tensions, slack, beside = drawn(solution, zones=zones)
+    edges = [1e3 * zone.first[0] for zone in zones]
+    for ax in (tensions, slack, beside):
+        shades = [(p.get_x(), p.get_x() + p.get_width()) for p in ax.patches]
+        assert shades == [pytest.approx(pair, abs=1e-9) for pair in pairwise(edges)]
+    line = slack.lines[0]
+    assert line.get_xdata() == pytest.approx(np.repeat([*edges, 400.0], 2)[1:-1], abs=1e-9)
+    assert line.get_ydata().tolist() == [2, 2, 1, 1, 0, 0]
+    met = midline_points(solution)
+    assert met is not None and "point V" in beside.get_ylabel()
+    np.testing.assert_allclose(beside.lines[0].get_ydata(), 1e3 * met.beside)
+
+
+def test_slack_cables_break_between_runs_and_where_the_platform_does_not_rest(drawn: Drawn) -> None:
+    robot = load_robot(model_path("planar_vertical"))
+    poses = np.tile(robot.reference_pose, (4, 1))
+    solution = solve(robot, poses)
+    (zone,) = slack_spans(solution)
+    zones = [
+        replace(zone, rows=(0.0, 1.0)), replace(zone, run=1, rows=(2.0, 2.5)),
+        replace(zone, run=1, rows=(2.5, 3.0), slack=None),
+    ]  # fmt: skip
+    slack = drawn(solution, zones=zones, runs=[0, 0, 1, 1])[3]
+    np.testing.assert_array_equal(slack.lines[0].get_xdata(), [0, 1, np.nan, 2, 2.5, 2.5, 3])
+    np.testing.assert_array_equal(slack.lines[0].get_ydata(), [0, 0, np.nan, 0, 0, np.nan, np.nan])
+
+
+def test_the_tilt_of_a_bar_is_drawn_beside_the_manifold(drawn: Drawn) -> None:
+    robot = load_robot(model_path("planar_two_cable"))
+    poses = np.tile(robot.reference_pose, (3, 1))
+    poses[:, 0] = [0.2, 0.4, 0.5]
+    solution = solve(robot, poses)
+    bar = bar_manifold(solution)
+    assert bar is not None
+    ax = drawn(solution, bar=bar)[-1]
+    here, asked = ax.lines
+    assert here.get_label() == "at rest, manifold there"
+    np.testing.assert_allclose(here.get_ydata(), np.degrees(bar.tilt))
+    np.testing.assert_allclose(asked.get_ydata(), np.degrees(bar.at_command))

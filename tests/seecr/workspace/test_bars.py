@@ -12,9 +12,9 @@ from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
-from seecr.planar import bar_equilibria
+from seecr.planar import bar_equilibria, bar_tilt
 from seecr.pose import transform_points
-from seecr.workspace.bars import bar_balances
+from seecr.workspace.bars import bar_balances, bar_manifold
 from seecr.workspace.zones import balance_equations
 
 BAR = load_robot(model_path("planar_two_cable"))
@@ -60,6 +60,43 @@ def test_they_are_all_tilts_of_the_closed_form_and_balance_the_weight(
     assert not any(one.here for one in rests)
 
 
+@pytest.mark.parametrize(("robot", "up"), [(BAR, 1.0), (flipped(BAR), -1.0)])
+def test_it_rests_on_the_manifold_and_not_at_its_command(robot: Robot, up: float) -> None:
+    """Tilts are upwards towards the second cable; beyond the exit points one cable holds it."""
+    poses = np.tile(BAR.reference_pose, (5, 1))
+    poses[:, 0], poses[:, 2] = [0.2, 0.35, 0.5, 0.65, 2.5], 0.5
+    found = solve(robot, poses)
+    met = bar_manifold(found)
+    assert met is not None and found.converged.all() and found.slack[4].any()
+    ends = transform_points(found.pose, BAR.anchor_points)
+    along = ends[:, 1] - ends[:, 0]
+    assert met.tilt == pytest.approx(up * np.arctan2(along[:, 2], along[:, 0]), abs=1e-12)
+    assert met.there[:4] == pytest.approx(met.tilt[:4], abs=1e-9)
+    closed = up * bar_tilt(BAR.exit_points[:, [0, 2]], poses[:, [0, 2]], 0.1)
+    np.testing.assert_allclose(met.at_command, closed, atol=1e-12)
+    assert np.isnan([met.there[4], met.at_command[4]]).all() and np.isfinite(closed[:4]).all()
+    assert up * (met.tilt[0] - met.at_command[0]) > np.radians(10.0)
+
+
+def test_a_sweep_of_a_bar_in_words() -> None:
+    poses = np.tile(BAR.reference_pose, (2, 1))
+    poses[0, 0] = 0.2
+    assert str(bar_manifold(solve(BAR, poses))).splitlines() == [
+        "the bar is tilted by -34.86 to +0.00 deg (positive: the second cable's end is up), on the "
+        "manifold of its equilibria to rounding",
+        "to rest where it was commanded to it would tilt by -49.61 to +0.00 deg",
+    ]
+
+
+def test_off_the_manifold_it_is_said_by_how_much() -> None:
+    found = solve(BAR, [0.3, 0.0, 0.5, 1, 0, 0, 0])
+    aside = BAR.reference_pose - np.array([0.1, 0, 0, 0, 0, 0, 0])
+    met = bar_manifold(replace(found, pose=aside[None]))
+    assert met is not None and met.tilt[0] == 0.0
+    off = np.degrees(abs(met.there[0]))
+    assert f"on the manifold of its equilibria to within {off:.2g} deg" in str(met)
+
+
 def test_other_robots_are_no_bars() -> None:
     pose = BAR.reference_pose
     heavy_end = replace(BAR, centre_of_mass=np.array([0.01, 0.0, 0.0]))
@@ -70,6 +107,7 @@ def test_other_robots_are_no_bars() -> None:
     on_rail = replace(BAR, joints=BAR.joints[:1] + BAR.joints[2:])
     for other in (heavy_end, lifted, free, still, sideways, on_rail):
         assert bar_balances(other, pose) is None
+        assert bar_manifold(solve(other, pose)) is None
     vertical = load_robot(model_path("planar_vertical"))
     assert bar_balances(vertical, vertical.reference_pose) is None
     with pytest.raises(InputError, match="needs one pose"):

@@ -38,7 +38,11 @@ def test_they_are_where_the_midlines_meet(robot: object, name: str) -> None:
     assert (np.abs(met.beside).max() < 1e-9) == (name == "H")
     most = 1e3 * met.beside.max()
     far = f"-{most:.2f} to +{most:.2f}" if name == "V" else "+0.00"
-    assert str(met) == f"point {name} is {far} mm beside the line of the weight"
+    first, last = (f"x z {1e3 * x:.2f} {1e3 * z:.2f}" for x, _, z in met.points[[0, -1]])
+    way = f"point {name} goes from {first} to {last} mm"
+    assert str(met) == f"{way}, {far} mm beside the line of the weight"
+    (one,) = midline_points(solve(robot, line(1))).lines()
+    assert one.startswith(f"point {name} is at {first} mm, ")
 
 
 def test_a_centre_of_mass_that_is_off_counts() -> None:

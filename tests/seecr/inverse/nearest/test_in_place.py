@@ -41,7 +41,9 @@ def problem_of(poses: Array, turned: float = 0.0) -> tuple[Reaching, Tables]:
 
 def test_the_orientation_is_that_in_which_the_platform_rests_there() -> None:
     poses = rests(np.array([0.35, 0.5, 0.7]))
-    np.testing.assert_allclose(in_place.poses_in_place(*problem_of(poses)), poses, atol=1e-9)
+    there, found = in_place.poses_in_place(*problem_of(poses))
+    assert found.all()
+    np.testing.assert_allclose(there, poses, atol=1e-9)
 
 
 @pytest.mark.parametrize(("stiffer", "weight", "n"), [(1.0, 1.0, 101), (100.0, 0.3, 31)])
