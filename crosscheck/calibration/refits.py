@@ -31,8 +31,6 @@ ROUNDS = 4
 _BESIDE = 6
 # Most rounds of challenges: a challenger that wins is challenged in turn.
 _CHALLENGES = 3
-# Of two sets nearer to each other than this in ln evidence, the one with fewer numbers is taken.
-_NEARLY = 0.5 * EQUAL
 # A set that is worse than the best by no more than this explains as much.
 _AS_MUCH = 12.5
 
@@ -121,9 +119,7 @@ def plainer(exact: Exact, best: Refit) -> Refit:
     """The best set, or an equivalent one that is easier to believe.
 
     That is one with an effect that a member contains in its place, such as the cable behind the
-    exit points for friction on it, or with fewer members that are larger than any effect is. Of
-    two that are nearly as good it is the one with fewer numbers, which is worth more elsewhere:
-    gains of all drums follow what a force does to these readings, and predict others worse.
+    exit points for friction on it, or with fewer members that are larger than any effect is.
     """
     always = frozenset(exact.plain.terms.names)
 
@@ -136,10 +132,7 @@ def plainer(exact: Exact, best: Refit) -> Refit:
             return False
         (member,), (instead,) = gone, come
         contained = exact.catalogue.start(member).layout.effect.parent == instead
-        if strange(other) != strange(best):
-            return strange(other) < strange(best)
-        fewer = exact.size(instead) < exact.size(member)
-        return contained or (fewer and best.score - other.score < _NEARLY)
+        return strange(other) < strange(best) + contained
 
     some = filter(is_plainer, exact.possible.values())
     return min(some, key=lambda other: (strange(other), -other.score), default=best)

@@ -53,10 +53,11 @@ def measured(value: float, error: float, unit: str) -> str:
     """A value with its standard error, to the digits that are known: 8.369 ± 0.013 mm."""
     factor, word = in_unit(unit)
     number, spread = with_error(factor * value, factor * error)
+    known = 0.0 if number == "0" else value
     if not np.isfinite(error):
-        return f"{f'{number} {word}'.strip()} (not determined by these data)"
+        return f"{shown(known, unit)} (not determined by these data)"
     if error == 0.0:
-        return f"{shown(value, unit)} (fixed)"
+        return f"{shown(known, unit)} (fixed)"
     return f"{number} ± {spread} {word}".strip()
 
 
