@@ -331,11 +331,13 @@ def _bar(
 ) -> tuple[BarManifold | None, tuple[str, ...]]:
     """Of a bar as it is described, the tilts beside the manifold; and why they are not computed."""
     from seecr import bar_manifold
+    from seecr.counted import counted
 
     if model is not None or commands.loads is not None or solution.robot.n_cables != 2:
         return None, ()
     if len(solution) > _MOST_TILTS:
-        return None, (f"Tilts of the manifold are not computed: more than {_MOST_TILTS} poses.",)
+        most = counted(_MOST_TILTS, "pose")
+        return None, (f"Tilts of the manifold are not computed: more than {most}.",)
     return bar_manifold(solution), ()
 
 

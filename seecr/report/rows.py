@@ -122,7 +122,8 @@ class SweepRows:
     def _tilts(self) -> dict[str, list[float]]:
         """Of a bar on two cables, beside those of the manifold."""
         rows = [] if self.bar is None else self.bar.records()
-        return {name: [row[name] for row in rows] for name in rows[0]} if rows else {}
+        names = rows[0] if rows else ()
+        return {name: [row[name] for row in rows] for name in names}
 
     def _slack(self) -> list[list[str]]:
         """Names of the slack cables of each row."""
