@@ -48,8 +48,8 @@ _REACHED = 1e-6
 # Strain of a cable up to which the nearest poses are sought where no highest tension is given:
 # steel yields before, fibres tear. Without an end, poses near the edge take any tension.
 _STRAIN = 0.05
-# Rotations below this [deg] are rounding.
-_TURNED = 1e-9
+# Rotations below this [deg] are rounding, and displacements of nearest poses below this [mm].
+_TURNED, _MOVED = 1e-9, 1e-6
 # Number of poses whose reason is printed.
 _NAMED = 5
 
@@ -122,7 +122,7 @@ class Correction(Result):
         if np.any(near):
             out.append(
                 f"the nearest poses that can be held are up to "
-                f"{1e3 * np.linalg.norm(left[near, :3], axis=1).max():.4g} mm and "
+                f"{_millimetres(left[near, :3]):.4g} mm and "
                 f"{_degrees(left[near, 3:]):.4g} deg away"
             )
             pulls = self.solution.tensions[near]
@@ -445,6 +445,12 @@ class _Search:
                 held.rest = last + to_their_limit(change, before)
             before = change
         return told, prediction
+
+
+def _millimetres(moved: Array) -> float:
+    """The largest of displacements (n, 3) [m] in millimetres; 0 where that is rounding."""
+    largest = 1e3 * float(np.linalg.norm(moved, axis=1).max())
+    return 0.0 if largest < _MOVED else largest
 
 
 def _degrees(turned: Array) -> float:

@@ -54,7 +54,9 @@ def softest_line(found: Workspace) -> Iterator[str]:
     """The softest pose of those that can be held, and the direction in which it is soft."""
     at = found.softest_at
     if at is not None:
-        place = " ".join(f"{1e3 * axis[k]:.4g}" for axis, k in zip(found.axes, at, strict=True))
+        # of robots of many metres, too, without an exponent
+        at_mm = [round(1e3 * axis[k], 1) for axis, k in zip(found.axes, at, strict=True)]
+        place = " ".join(f"{value + 0.0:.7g}" for value in at_mm)
         direction = direction_words(found.robot, found.softest[at])
         yield f"softest of these at x y z {place} mm: {direction}, {found.stiffness[at]:.4g} N/m"
 

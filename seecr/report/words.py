@@ -291,7 +291,7 @@ def other_lines(
         line = (
             f"could also rest {1e3 * np.linalg.norm(gap[:3]):.4g} mm and "
             f"{np.degrees(np.linalg.norm(gap[3:])):.4g} deg away: at "
-            f"{_three(1e3 * others.pose[k, :3], '.4g')} mm, turned "
+            f"{_three(np.round(1e3 * others.pose[k, :3], 1), '.7g')} mm, turned "
             f"{_three(np.degrees(rxyz_from_quat(others.pose[k, 3:])), '.4g')} deg, "
             f"{_more_energy(others.energy[k] - solution.energy[0])}slack: "
             f"{' '.join(slack) or 'none'}"

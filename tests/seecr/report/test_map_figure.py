@@ -17,6 +17,7 @@ from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
 from seecr.report.map_slices import map_figure
+from seecr.report.maps import softest_line
 from seecr.workspace.grid import Workspace
 from seecr.workspace.maps import workspace_map
 
@@ -127,3 +128,9 @@ def test_a_map_says_whose_it_is(drawn: Drawn) -> None:
 def test_turns_are_drawn_where_the_platform_can(drawn: Drawn, robot: Robot, turns: bool) -> None:
     figure = drawn(workspace_map(robot, AXIS, np.array([0.0]), np.array([0.15, 0.2])))
     assert ("turned [°]" in [ax.get_ylabel() for ax in figure.axes]) == turns
+
+
+def test_the_softest_pose_of_a_large_robot_has_no_exponent() -> None:
+    robot = load_robot("camera")
+    (line,) = softest_line(workspace_map(robot, [52.5, 60.0], [34.0], [20.0]))
+    assert line.startswith("softest of these at x y z 52500 34000 20000 mm: ")
