@@ -102,7 +102,7 @@ def judge(
     few = few and not doubted and not more and not large
     sure = adequate(found, sure) if few and sure else sure_effects(found, classes, False)
     sure = tuple(name for name in sure if name not in doubted)
-    if len(best) <= _FEW and not doubted and not large:
+    if not doubted and not large:
         sure = tuple(dict.fromkeys([*sure, *in_each(found, classes)]))
     if more:
         worth = worths(found)

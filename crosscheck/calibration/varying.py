@@ -129,7 +129,7 @@ def _of_lens(setting: Setting, joint: JointFit) -> Iterator[tuple[Varying, Array
 
 
 def widening(place: Array) -> Array:
-    """(n, 3, 16) how places (n, 3) move in such a picture, about any point, to first order.
+    """(n, 3, 16) how places (n, 3) move in such a picture, about any point.
 
     Moving the point adds what is quadratic, linear and constant in the place; the linear part is
     left free, as for a tracker whose axes have scales of their own.

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 _WANTED = "Lengths are commanded; deviations are from the wanted poses, columns want_*."
 # Poses of --line.
 _COUNT = 24
-# A bar's tilts are compared with the manifold in sweeps of at most so many poses: it takes half a
+# A bar's tilts are compared with the manifold in sweeps of at most so many poses: it takes nearly a
 # millisecond for each.
 _MOST_TILTS = 10_000
 # Zones of slack cables are computed for sweeps with at most so many changes of them.

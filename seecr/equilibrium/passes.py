@@ -22,7 +22,7 @@ from seecr.equilibrium.following import apart_from, evaluated, moved, rest_below
 from seecr.errors import InputError
 from seecr.pose import Array, pose_difference
 from seecr.result import COORDINATES, Record, Result, named
-from seecr.statics.solution import Solution
+from seecr.statics.solution import Solution, check_solution
 from seecr.statics.tables import Tables, take
 from seecr.units import joules
 
@@ -126,8 +126,7 @@ def barriers(solution: Solution, others: Solution, i: int = 0) -> tuple[Barrier,
         InputError: the equilibria belong to another command or robot, or a row is not at rest.
     """
     for one in (solution, others):
-        if not isinstance(one, Solution):
-            raise InputError(f"barriers: expected a seecr.Solution, got {type(one).__name__}")
+        check_solution(one, "barriers: ")
     lengths = solution.rest_lengths[i]
     if others.robot.n_cables != len(lengths) or not np.allclose(others.rest_lengths, lengths):
         raise InputError("barriers: expected equilibria of one command, got other rest lengths")

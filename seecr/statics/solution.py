@@ -24,6 +24,7 @@ from seecr.compiled.outcomes import (
 )
 from seecr.counted import between, counted, rows_words
 from seecr.description.robot import Robot
+from seecr.errors import InputError
 from seecr.pose import Array, rotvec_from_quat
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics import batch
@@ -381,3 +382,13 @@ def _blank(values: Array, rows: NDArray[np.bool_]) -> Array:
     values = values.copy()
     values[rows] = np.nan
     return values
+
+
+def check_solution(given: object, start: str = "") -> None:
+    """Check that a caller gave a solution; ``start`` is for the error.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if not isinstance(given, Solution):
+        raise InputError(f"{start}expected a seecr.Solution, got {type(given).__name__}")

@@ -17,7 +17,7 @@ from seecr.errors import InputError
 from seecr.planar import BarRest, bar_equilibria, bar_tilt
 from seecr.pose import Array, quat_from_rotvec, quat_multiply, quat_rotate, transform_points
 from seecr.result import COORDINATES, Record, Result, named
-from seecr.statics.solution import Solution
+from seecr.statics.solution import Solution, check_solution
 from seecr.statics.starts import commanded_poses
 
 __all__ = ["BarBalance", "BarManifold", "bar_balances", "bar_manifold"]
@@ -168,8 +168,7 @@ def bar_manifold(solution: Solution) -> BarManifold | None:
     Raises:
         InputError: not a solution.
     """
-    if not isinstance(solution, Solution):
-        raise InputError(f"expected a seecr.Solution, got {type(solution).__name__}")
+    check_solution(solution)
     robot = solution.robot
     across = _across(robot)
     if across is None:

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.description.robot import Robot
-from seecr.errors import InputError
 from seecr.planar import midline_point
 from seecr.pose import Array, transform_points
 from seecr.result import Record, Result
-from seecr.statics.solution import Solution
+from seecr.statics.solution import Solution, check_solution
 
 __all__ = ["Midlines", "midline_points"]
 
@@ -80,8 +79,7 @@ def midline_points(solution: Solution) -> Midlines | None:
     Raises:
         InputError: not a solution.
     """
-    if not isinstance(solution, Solution):
-        raise InputError(f"expected a seecr.Solution, got {type(solution).__name__}")
+    check_solution(solution)
     robot = solution.robot
     plane = _plane(robot)
     if plane is None:

@@ -21,7 +21,7 @@ from seecr.pose import Array
 from seecr.prediction.experiment import effects_of
 from seecr.prediction.model import GivenEffects
 from seecr.result import COORDINATES, Record, Result, named
-from seecr.statics.solution import Solution
+from seecr.statics.solution import Solution, check_solution
 from seecr.statics.starts import Commanded, commands_from
 
 __all__ = ["SlackSpan", "slack_spans"]
@@ -132,8 +132,7 @@ def slack_spans(
         InputError: not a solution, other commands than its own, lengths, or a tolerance that is not
             above zero.
     """
-    if not isinstance(solution, Solution):
-        raise InputError(f"expected a seecr.Solution, got {type(solution).__name__}")
+    check_solution(solution)
     near = finite(tolerance, "tolerance")
     if near.shape or not near > 0.0:
         raise InputError(f"tolerance must be one number above zero [m], got {tolerance!r}")

@@ -24,7 +24,7 @@ from seecr.errors import InputError
 from seecr.holding.distribution import tension_limits
 from seecr.pose import Array, all_finite, quat_rotate, transform_points
 from seecr.result import Record, Result
-from seecr.statics.solution import Solution
+from seecr.statics.solution import Solution, check_solution
 from seecr.statics.starts import commanded_poses
 from seecr.threads import in_parts
 
@@ -252,8 +252,7 @@ def slack_zones(solution: Solution) -> list[Zone]:
     Raises:
         InputError: not a solution.
     """
-    if not isinstance(solution, Solution):
-        raise InputError(f"expected a seecr.Solution, got {type(solution).__name__}")
+    check_solution(solution)
     counts = [
         int(row.sum()) if ok else None
         for row, ok in zip(solution.slack, solution.converged, strict=True)

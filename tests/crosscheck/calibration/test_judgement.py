@@ -223,6 +223,23 @@ def test_what_each_of_several_sets_has_is_sure_though_what_is_open_is_worth_more
     # unless what it is worth is little, or there is one set only
     said = judged({**either, "b": -20.0, "cd": -21.0})
     assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ())
+    more = [k for size in (2, 3) for k in combinations("cdefg", size)]
+    alone = {"".join(("ab", *k)): -0.1 for k in more}
+    said = judged({"": -9000.0, "ab": 0.0, "a": -5000.0, "b": -300.0, **alone})
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ("b",))
+    # or many others that explain nearly as well lack it
+    assert judged({**either, **{f"b{other}": -3.2 for other in "cdefg"}}).sure == ()
+    # or a member is of a size that may stand for anything
+    found = found_of(either)
+    classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
+    assert judge(found, classes, -5.0, 1.0, doubted=frozenset("b")).sure == ()
+    # or all are groups that together imitate anything
+    found = found_of(large)
+    classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
+    seven = dict.fromkeys("abe", ColumnGroup(np.arange(7), np.array([1.0])))
+    gram = replace(found.scores.gram, groups={**found.scores.gram.groups, **seven})
+    grown = replace(found, scores=replace(found.scores, gram=gram))
+    assert judge(grown, classes, -5.0, 1.0).sure == ("e",)
     # or a set has something else in its place
     assert judged({**either, "ec": -0.2}).sure == ()
 
