@@ -16,7 +16,7 @@ from crosscheck.calibration.imitated import NOT_ASKED, Imitated
 from crosscheck.calibration.judgement import Judgement
 from crosscheck.calibration.search import SetSearch
 from crosscheck.calibration.varying import Varying
-from crosscheck.diagnosis import unexplained
+from crosscheck.diagnosis import small, unexplained, verdict
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.small import spoils
 from crosscheck.diagnosis.unexplained import beside_imitated
@@ -26,9 +26,11 @@ from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.measurements.data import Measurements
 from seecr.commands.data import Commands
 from seecr.description.mjcf import load_robot
+from seecr.effects import Terms
 from seecr.pose import Array, quat_from_rxyz
 from seecr.prediction.experiment import Experiment
 
+HEAVY = term(load_robot(COGIRO), "platform_mass", added_kg=0.02)
 PLANAR = """<mujoco model="tri">
   <option gravity="0 0 -9.81"/>
   <worldbody>
@@ -190,3 +192,49 @@ def test_what_takes_a_kind_of_reading_farther_off_is_not_there() -> None:
     before = step(3e-4, 1.0)
     assert spoils(before, step(1e-4, 1.2)) and spoils(before, step(3.4e-4, 0.1))
     assert not spoils(before, step(1e-4, 1.05)) and not spoils(step(3e-4, None), step(1e-4, None))
+
+
+def test_the_steps_vouch_for_what_sets_leave_beside_something_unknown(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    imitated = Imitated(9.0, frozenset({"creep"}), (Varying.WINCHES,))
+    said = Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), 0.0, imitated=imitated)
+    sought, vouched = SimpleNamespace(judgement=said), object()
+    noisy = SimpleNamespace(whiteness=SimpleNamespace(is_noise=False))
+    steps = SimpleNamespace(last=noisy, steps=())
+    data = SimpleNamespace(data=SimpleNamespace(sigma=None))
+    ready: Any = SimpleNamespace(problem=data, terms=None)
+    monkeypatch.setattr(verdict, "by_steps", lambda *_: (steps, ()))
+    monkeypatch.setattr(verdict, "search_sets", lambda *_: sought)
+    monkeypatch.setattr(verdict, "beside_imitated", lambda *given: (given, vouched))
+    monkeypatch.setattr(verdict, "explained", lambda shown, _notes: shown)
+    nothing: Any = None
+    told: Any = verdict._searched(ready, nothing, nothing, (), lambda _text, _part: None)
+    assert told == ((steps, sought), vouched)
+
+
+@pytest.mark.parametrize("spoilt", [False, True])
+def test_no_step_is_listed_that_spoils_something(
+    monkeypatch: pytest.MonkeyPatch, spoilt: bool
+) -> None:
+    for module in (small, unexplained):
+        monkeypatch.setattr(module, "share_of", lambda *_: 1.0)
+        monkeypatch.setattr(module, "spoils", lambda *_: spoilt)
+        monkeypatch.setattr(module, "beyond_smooth", lambda *_: True)
+    monkeypatch.setattr(unexplained, "is_plausible", lambda _term: True)
+    fit = SimpleNamespace(
+        state=None, at_bound=np.zeros(1, dtype=bool), valid=True, terms=Terms([HEAVY])
+    )
+    step = SimpleNamespace(fit=fit, held_out=None, candidates=())
+    name = "platform_mass"
+    steps: Any = SimpleNamespace(
+        found=(name,), steps=(step, step), last=step, problem=None,
+        trials=SimpleNamespace(refit=lambda *_: fit),
+    )  # fmt: skip
+    assert unexplained._is_warranted(steps, name) is not spoilt
+    best = SimpleNamespace(name=name, fit=fit)
+    monkeypatch.setattr(small, "_best_small", lambda *_: best)
+    monkeypatch.setattr(small, "node_of", lambda *_: None)
+    monkeypatch.setattr(small, "step_of", lambda *_: step)
+    monkeypatch.setattr(small, "significantly_improves", lambda *_: True)
+    assert small._small_step(steps, 3, 0.5) is (None if spoilt else step)
