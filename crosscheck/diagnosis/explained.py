@@ -191,7 +191,7 @@ def _sentence(
             + (f"Certain in each of them: {sure}. " if sure else "")
             + all_of_them
         )
-    if alternatives and not sure:
+    if alternatives:
         some = probable_words(hints_of(chances, (), alternatives[0]))
         return (
             "No few effects explain the error with certainty; most probably it is "

@@ -15,6 +15,7 @@ from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.judgement import Judgement, judge
 from crosscheck.calibration.search import SetSearch, search_sets
 from crosscheck.diagnosis.explained import MORE, explained
+from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.reasons import DiagnosisVerdict, Why
 from crosscheck.given import considered
@@ -60,6 +61,7 @@ def test_two_effects_are_named_and_a_field_makes_the_verdict_unknown() -> None:
     values = found.found.best.joint.terms
     assert values["pulley_radius"].vector[0] == pytest.approx(0.006, rel=0.05)
     assert_shown_as_many(found)
+    assert_certain_in_each(found)
     assert_a_model_by_itself(found)
     assert_open_which(found)
     assert_not_beyond_doubt(found)
@@ -144,6 +146,30 @@ def assert_open_which(found: SetSearch) -> None:
     assert "gravity_tilt + pulley_radius" in said.sentence
     assert "backlash + drum_gain" in said.sentence
     assert any(line.endswith("(gravity_tilt)") for line in said.measure_next)
+
+
+def assert_certain_in_each(found: SetSearch) -> None:
+    """As it is told where sets that explain as well have one effect in common."""
+    best = found.found.best
+    pair = frozenset({"gravity_tilt", "drum_gain"})
+    one = Judgement(DiagnosisVerdict.MANY_EFFECTS, ("gravity_tilt",), 0.0)
+
+    def told(names: frozenset[str]) -> Diagnosis:
+        refits = {**found.found.refits, names: replace(best, names=names)}
+        sets = replace(found.found, refits=refits)
+        return explained(replace(found, found=sets, judgement=one), [])
+
+    said = told(pair)
+    assert ", or drum_gain + gravity_tilt. Certain in each of them: gravity_tilt. On" in (
+        said.sentence
+    )
+    (pulley,) = (row for row in said.candidates if row.effect == "pulley_radius")
+    assert pulley.why_not.why is Why.NOT_SURE
+    assert any(line.endswith("(pulley_radius)") for line in said.measure_next)
+    # not what only one of them has
+    assert told(frozenset({"backlash", "drum_gain"})).sentence.endswith(
+        "Certain among them: gravity_tilt."
+    )
 
 
 def assert_not_beyond_doubt(found: SetSearch) -> None:
