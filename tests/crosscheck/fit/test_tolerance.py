@@ -76,6 +76,8 @@ def test_noise_that_nobody_stated_says_nothing_of_what_matters() -> None:
     left = remainder_of(rms(1.1e-4, 1.1e-3), NOISE, HALF_THE_NOISE, some)
     assert left.undecided and left.limit["orientation_rms_rad"] is None and not left.important
     assert left.as_json()["important"] is None
+    far = remainder_of(rms(9e-4, 1.1e-3), NOISE, HALF_THE_NOISE, some)
+    assert far.undecided and far.as_json()["important"] is True
     told = remainder_of(rms(1.1e-4, 1.1e-3), NOISE, Tolerance(orientation_rad=1e-3), some)
     assert not told.undecided and told.as_json()["important"] is False
     nothing = remainder_of(rms(1.1e-4, 1.1e-3), NOISE, HALF_THE_NOISE, Sigma())

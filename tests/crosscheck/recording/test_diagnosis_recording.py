@@ -15,12 +15,13 @@ from recordings import Readback, headless_viewer
 from crosscheck.comparison.residuals import Comparison, compare
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, stages_of
+from crosscheck.diagnosis.words import removed
 from crosscheck.fit.problem import KINDS, POSITION
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.recording import bars
 from crosscheck.recording.comparison import write_comparison_recording
 from crosscheck.recording.diagnosis import write_diagnosis_recording
-from crosscheck.recording.diagnosis_words import plain
+from crosscheck.recording.diagnosis_words import model_words, plain
 from crosscheck.recording.misfit import Misfit, predicted_poses, states_of, worst_row
 from crosscheck.units import short
 from seecr.errors import InputFileError
@@ -92,6 +93,13 @@ def test_arrows_are_the_errors_so_many_times_too_long(
     assert sizes[1] < 0.1 * sizes[0]
     text = back.static("/text/verdict", "TextDocument:text")[0]
     assert f"drawn **at {shown.magnify:g} times their length**" in text
+
+
+def test_a_step_tells_what_its_effect_removes(
+    found: Diagnosis, stages: list[Stage], shown: Misfit
+) -> None:
+    text = model_words(found, stages, 1, shown, 0)
+    assert f"It {removed(found.missing[0].share)}: {found.missing[0].title}." in text
 
 
 def test_maps_dim_as_the_error_falls(back: Readback, shown: Misfit) -> None:

@@ -29,7 +29,7 @@ from crosscheck.diagnosis.steps import (
     stages_of,
     views_of,
 )
-from crosscheck.diagnosis.words import WITHIN
+from crosscheck.diagnosis.words import WITHIN, removed
 from crosscheck.fit.candidates import Candidate
 from crosscheck.fit.imitation import imitated
 from crosscheck.fit.problem import KINDS
@@ -138,6 +138,7 @@ def test_numbers_are_those_of_the_json() -> None:
     value, error = with_error(1e3 * radius["value"], 1e3 * radius["stderr"])
     assert f"radius {value} ± {error} mm" in seen
     assert document["missing"][0]["check"] in seen
+    assert f"Adding it {removed(document['missing'][0]['share_of_error_removed'])}; the" in seen
 
 
 @pytest.mark.parametrize("name", ["nothing", "unknown"])
