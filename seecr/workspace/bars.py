@@ -135,7 +135,7 @@ class BarManifold(Result):
         out, known = [], np.isfinite(self.tilt)
         if known.any():
             out.append(f"the bar is tilted by {_range(self.tilt[known])} deg ({_POSITIVE})")
-            off = np.abs(self.tilt - self.there)[known]
+            off = _apart(self.tilt, self.there)[known]
             if np.isfinite(off).any():
                 most = float(np.degrees(np.nanmax(off)))
                 near = "to rounding" if most < _ROUNDED else f"to within {most:.2g} deg"
@@ -180,7 +180,7 @@ def bar_manifold(solution: Solution) -> BarManifold | None:
         rests = bar_equilibria(exits, middles[k], half)
         stable = np.array([rest.theta for rest in rests if rest.stable])
         if len(stable):
-            there[k] = stable[np.argmin(np.abs(stable - tilt[k]))]
+            there[k] = stable[np.argmin(_apart(stable, tilt[k]))]
     asked = np.full(len(tilt), np.nan)
     commanded = np.isfinite(solution.command).all(axis=1)
     places = _in_plane(robot, solution.command[commanded], across)[1]
@@ -203,6 +203,11 @@ def _in_plane(robot: Robot, poses: Array, across: Array) -> tuple[Array, Array, 
         half,
         np.arctan2(along[:, 1], along[:, 0]),
     )
+
+
+def _apart(one: Array, other: Array) -> Array:
+    """How far tilts [rad] are apart, the short way round."""
+    return np.asarray(np.abs(np.angle(np.exp(1j * (one - other)))))
 
 
 def _range(angles: Array) -> str:

@@ -57,6 +57,16 @@ def test_evidence_of_a_set_is_that_of_its_whole_covariance(count: int) -> None:
         assert gram.solved(chosen).log_evidence == pytest.approx(direct(0, chosen))
 
 
+def test_the_sets_solved_last_are_kept_and_no_more() -> None:
+    gram = toy()
+    first = gram.solved({"e0": 1.0, "e1": 1.0})
+    assert gram.solved({"e0": 1.0, "e1": 1.0}) is first
+    assert gram.solved({"e1": 1.0, "e0": 1.0}) is not first  # columns in another order
+    for width in np.linspace(0.1, 2.0, 30):
+        gram.solved({"e0": float(width)})
+    assert len(gram._last) == 8 and gram.solved({"e0": 1.0, "e1": 1.0}) is not first
+
+
 def test_what_a_member_or_another_is_worth_is_the_difference_of_two_sets() -> None:
     gram = toy()
     chosen = {"e0": 1.0, "e2": 3.0}

@@ -13,7 +13,7 @@ from effect_cases import experiment_of, random_effect
 
 from seecr.effects import Effect, catalogue
 from seecr.effects.edits import Edits
-from seecr.effects.setup import QUANTITIES, Setup, plain_setup
+from seecr.effects.setup import _FEW_POSES, QUANTITIES, Setup, _kept_lengths, plain_setup
 
 
 def plain() -> Setup:
@@ -126,3 +126,15 @@ def test_threads_may_ask_at_once() -> None:
     finally:
         sys.setswitchinterval(before)
     assert not wrong
+
+
+def test_straight_lengths_are_kept_of_few_poses_only() -> None:
+    """Those of a map of a million would fill gigabytes."""
+    setup = plain()
+    poses = np.tile(setup.robot.reference_pose, (_FEW_POSES + 1, 1))
+    poses[:, 0] += np.linspace(0.0, 0.01, len(poses))
+    few = setup.geometric_lengths(poses[:-1])
+    assert setup.geometric_lengths(poses[:-1].copy()) is few
+    kept = _kept_lengths.cache_info()
+    many = setup.geometric_lengths(poses)
+    assert np.array_equal(many[:-1], few) and _kept_lengths.cache_info() == kept

@@ -82,6 +82,12 @@ def test_drum_eccentricity_is_a_sine_of_the_drums_angle_and_nothing_at_the_zero(
     extra = experiment.setup([ring]).rest_lengths() - experiment.setup([]).rest_lengths()
     expected = 1e-3 * np.sin(told / 0.02) + 5e-4 * (np.cos(told / 0.02) - 1)
     assert extra == pytest.approx(expected, abs=1e-14)
+    # of absolute lengths nothing is the zero
+    lengths = experiment_of("lengths")
+    told = lengths.commands.lengths
+    extra = lengths.setup([ring]).rest_lengths() - lengths.setup([]).rest_lengths()
+    expected = 1e-3 * np.sin(told / 0.02) + 5e-4 * np.cos(told / 0.02)
+    assert extra == pytest.approx(expected, abs=1e-14)
 
 
 @pytest.mark.parametrize("kind", ["demobot_cogiro", "demobot_parallel"])

@@ -97,6 +97,24 @@ def test_off_the_manifold_it_is_said_by_how_much() -> None:
     assert f"on the manifold of its equilibria to within {off:.2g} deg" in str(met)
 
 
+@pytest.mark.parametrize("tilt", [np.pi - 0.05, -2.5, 0.3])
+def test_of_two_stable_tilts_the_nearer_one_counts_the_short_way_round(tilt: float) -> None:
+    """Below a wide bar's exit points it may also hang upside down, with its cables crossed."""
+    wide = replace(BAR, anchor_points=3.0 * BAR.anchor_points)
+    stable = [r.theta for r in bar_equilibria(wide.exit_points[:, [0, 2]], (0.6, -0.2), 0.3)
+              if r.stable]  # fmt: skip
+    assert sorted(stable) == pytest.approx([-2.838, 0.746], abs=1e-3)
+    found = solve(BAR, [0.3, 0.0, 0.5, 1, 0, 0, 0])
+    turn = [np.cos(0.5 * tilt), 0.0, -np.sin(0.5 * tilt), 0.0]  # about -y: up towards +x
+    posed = replace(found, robot=wide, pose=np.array([[0.6, 0.0, -0.2, *turn]]))
+    met = bar_manifold(posed)
+    assert met is not None and met.tilt[0] == pytest.approx(tilt)
+    nearer = max(stable) if tilt == 0.3 else min(stable)
+    assert met.there[0] == pytest.approx(nearer)
+    off = np.degrees(abs(np.angle(np.exp(1j * (tilt - nearer)))))
+    assert f"to within {off:.2g} deg" in str(met)
+
+
 def test_other_robots_are_no_bars() -> None:
     pose = BAR.reference_pose
     heavy_end = replace(BAR, centre_of_mass=np.array([0.01, 0.0, 0.0]))

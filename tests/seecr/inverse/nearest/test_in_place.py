@@ -60,6 +60,19 @@ def test_positions_between_others_that_are_held_are_held(
     np.testing.assert_allclose(margins, margins[::-1], rtol=1e-6)
 
 
+@pytest.mark.parametrize("effects", [Terms(), HEAVY])
+def test_what_is_not_held_leaves_the_margins_of_others_as_they_are(effects: Terms) -> None:
+    poses = np.tile(ROBOT.reference_pose, (4, 1))
+    poses[:, 0] = [0.35, 0.4, 0.5, 0.7]
+    poses[[0, 2], 2] += 10.0  # above all exit points
+    margins = correction.margins_in_place(ROBOT, poses, effects, 0.0, np.inf)
+    one_by_one = [
+        correction.margins_in_place(ROBOT, pose[None], effects, 0.0, np.inf)[0] for pose in poses
+    ]
+    assert np.isneginf(margins).tolist() == [True, False, True, False]
+    np.testing.assert_allclose(margins, one_by_one, rtol=1e-6)
+
+
 def test_others_start_from_the_results_of_their_nearest() -> None:
     """Of a platform that is asked for nearly upside down, where nothing else is near."""
     poses = rests(np.linspace(0.3, 0.7, 9))
