@@ -352,7 +352,7 @@ def test_rotations_that_are_rounding_are_printed_as_none() -> None:
 def test_positions_that_are_kept_are_printed_as_kept() -> None:
     robot = robot_named("planar_two_cable")
     found = correct(robot, robot.reference_pose - [0.3, 0, 0, 0, 0, 0, 0], prefer="position")
-    kept = replace(found, aimed=found.aimed + 5e-16)  # such were printed: 1.241e-13 mm
+    kept = replace(found, wanted=found.wanted + 5e-16)  # such were printed: 1.241e-13 mm
     assert np.linalg.norm(kept.left[0, :3]) > 0.0
     assert "that can be held are up to 0 mm and 49.61 deg away" in "\n".join(kept.lines())
 
