@@ -18,6 +18,8 @@ from seecr.pose import (
 
 # Allowed distance of a commanded pose from what the joints reach [robot's length, or rad].
 _OFF_MANIFOLD = 1e-6
+# Poses nearer than this [m or robot's length, rad] are the same but for rounding.
+_EXACT = 1e-15
 # Changes of a pose below this are rounding [m or robot's length, rad]; so many values show them.
 _ROUNDING, _TRIES = 1e-12, 8
 
@@ -68,8 +70,7 @@ def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:
         InputError: the joints cannot reach a pose.
     """
     poses = np.atleast_2d(np.asarray(poses, float))
-    values = _nearest(robot, poses)
-    reached, screws = pose_of_values(robot, values)
+    values, reached, screws = _nearest(robot, poses)
     off = _off_joints(robot, poses, reached)
     if off is not None:
         raise InputError(
@@ -79,12 +80,18 @@ def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:
     return values, screws
 
 
-def _nearest(robot: Robot, poses: Array) -> Array:
-    """Joint values (n, d) that bring the platform nearest to poses (n, 7), by Newton steps."""
+def _nearest(robot: Robot, poses: Array) -> tuple[Array, Array, Array]:
+    """Joint values (n, d) that bring the platform nearest to poses (n, 7), by Newton steps.
+
+    Also returns the poses that it reaches, and the joints there, as :func:`pose_of_values` does.
+    """
     values, before = np.zeros((len(poses), len(robot.joints))), np.inf
+    exact = _EXACT * np.repeat([max(robot.length, 1.0), 1.0], 3)
     for _ in range(50):
         reached, screws = pose_of_values(robot, values)
         miss = pose_difference(poses, reached)
+        if np.all(np.abs(miss) <= exact):
+            return values, reached, screws
         columns = motion_columns(screws, reached[:, :3])
         if not (np.isfinite(columns).all() and np.isfinite(miss).all()):
             break  # so far away that rounding is longer than the robot
@@ -95,12 +102,12 @@ def _nearest(robot: Robot, poses: Array) -> Array:
         if size < 1e-14 or 0.5 * before <= size < 1e-12:
             break
         before = size
-    return values
+    return values, *pose_of_values(robot, values)
 
 
 def reachable(robot: Robot, poses: Array) -> Array:
     """The poses (n, 7) that the robot's joints can reach nearest to ``poses``."""
-    return pose_of_values(robot, _nearest(robot, poses))[0] if robot.joints else poses
+    return _nearest(robot, poses)[1] if robot.joints else poses
 
 
 def _off_joints(robot: Robot, poses: Array, reached: Array) -> tuple[int, str] | None:
@@ -121,7 +128,7 @@ def off_joints(robot: Robot, poses: Array) -> tuple[int, str] | None:
     """
     if not robot.joints:
         return None
-    return _off_joints(robot, poses, pose_of_values(robot, _nearest(robot, poses))[0])
+    return _off_joints(robot, poses, _nearest(robot, poses)[1])
 
 
 def motion_columns(screws: Array, position: Array) -> Array:

@@ -273,7 +273,8 @@ def step_between(robot: Robot, poses: Array, before: Array) -> Array:
     unit = np.where(robot.hinges, robot.length, 1.0)
     if not robot.joints:
         return pose_difference(poses, before) * unit
-    return (values_of_pose(robot, poses)[0] - values_of_pose(robot, before)[0]) * unit
+    values = values_of_pose(robot, np.concatenate([poses, before]))[0]
+    return (values[: len(poses)] - values[len(poses) :]) * unit
 
 
 def rest_below(robot: Robot, tables: Tables, pose: Array) -> Array:

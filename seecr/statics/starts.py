@@ -52,7 +52,8 @@ def start_of(
         return None, None
     if not robot.joints:
         return batch.deviations(tables, start), None
-    change = values_of_pose(robot, start)[0] - values_of_pose(robot, tables.poses)[0]
+    values = values_of_pose(robot, np.concatenate([start, tables.poses]))[0]
+    change = values[: len(start)] - values[len(start) :]
     return batch.deviations(tables, start), change * np.where(robot.hinges, robot.length, 1.0)
 
 

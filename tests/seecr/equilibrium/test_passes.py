@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from seecr.effects import Term, effect_named, layout_of
 from seecr.equilibrium import passes
 from seecr.equilibrium.following import _stepped, evaluated, moved
 from seecr.equilibrium.multiple import elsewhere, equilibria
-from seecr.equilibrium.passes import barriers
+from seecr.equilibrium.passes import Barrier, barriers
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import pose_difference, quat_from_rotvec, transform_points
@@ -125,6 +127,14 @@ EXITS = PLANAR.exit_points
 LEANING = np.array([0.6, 0.0, 0.4, 0.9, 0.0, np.sqrt(0.19), 0.0])
 
 
+@cache
+def barrier_without_a_moment() -> tuple[Barrier, float]:
+    """The same barrier if nothing acts, and the turn [rad] to its top."""
+    own, every = solve(PLANAR, LEANING), equilibria(PLANAR, LEANING)
+    (way,) = barriers(own, every.rows(elsewhere(own, every)))
+    return way, float(pose_difference(way.pose, own.pose[0])[4])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("moment", [0.02, -0.05])
 def test_under_a_moment_a_planar_platform_has_energies_and_barriers(moment: float) -> None:
@@ -147,9 +157,7 @@ def test_under_a_moment_a_planar_platform_has_energies_and_barriers(moment: floa
     ]
     assert np.abs(np.subtract(*around)).max() / 2e-5 < 1e-4 * PLANAR.weight
     # more or less of it by what the moment does on the turn from rest to saddle, nearly
-    free = solve(PLANAR, LEANING), equilibria(PLANAR, LEANING)
-    (plain,) = barriers(free[0], free[1].rows(elsewhere(*free)))
-    turn = pose_difference(plain.pose, free[0].pose[0])[4]
+    plain, turn = barrier_without_a_moment()
     assert way.energy - plain.energy == pytest.approx(-moment * turn, rel=0.02)
 
 
