@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from seecr.compiled.algebra import solve_3x3
 from seecr.compiled.bracketed import guess_by_brackets
 from seecr.compiled.catenary import catenary_energy, solve_catenary
@@ -29,8 +31,12 @@ from seecr.compiled.law import straight_law, strain_of_tension, winch_tension
 from seecr.compiled.pulley import length_in_plane, pulley_geometry
 from seecr.compiled.yielding import along, lift_slope, lowered, soften
 
-# Most Newton steps for the lift of an exit point; two or three suffice.
-_LIFTINGS = 50
+# Most Newton steps for the lift of an exit point, of which two or three suffice where a cable stays
+# taut; errors [of the rest length] at which they end, and of a lift that was found.
+_LIFTINGS, _LIFTED, _LIFTED_ENOUGH = 50, 1e-15, 1e-12
+
+# Most Newton steps for a catenary, from a start that may be a bad one, and from the last.
+_FEW, _MANY = 20, 200
 
 
 @jit
@@ -56,6 +62,7 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
     """
     seen, more = work[32], row[LIFT]
     lift, hanging = 0.0, row[WEIGHT] * row[REST]
+    low, high = -np.inf, np.inf
     for _ in range(_LIFTINGS):
         lowered(move, lift, up, seen)
         if not _fixed_pull(row, start, seen, up, guess, work, force, stiffness, gradient, state):
@@ -64,9 +71,21 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
             return True
         pull = -along(up, force) - hanging
         error = lift - more * pull
-        if abs(error) <= 1e-15 * row[REST]:
+        if abs(error) <= _LIFTED * row[REST]:
             break
-        lift -= error / lift_slope(more, up, stiffness)
+        # the error grows with the lift, but has kinks, about which plain Newton steps may circle
+        if error > 0.0:
+            high = lift
+        else:
+            low = lift
+        following = lift - error / lift_slope(more, up, stiffness)
+        if not low < following < high:
+            following = 0.5 * (low + high)
+        if following == lift or not math.isfinite(following):
+            break
+        lift = following
+    if not abs(error) <= _LIFTED_ENOUGH * row[REST]:
+        return False
     soften(more, up, stiffness, gradient, work[33])
     # energy of the yielding frame, and of the cable's weight that is lifted with it
     state[ENERGY] += lift * (0.5 * pull + hanging)
@@ -167,18 +186,29 @@ def _pulley_pull(row, start, move, up, work, force, stiffness, gradient, state):
 
 
 @jit_inner
+def _catenary(row, across, rise, guess, error, jacobian, work):
+    """A catenary from its guess, else a first one, else brackets; patiently only in the end."""
+    if solve_catenary(row, across, rise, _FEW, guess, error, jacobian, work):
+        return True
+    guess[2] = 0.0  # a first guess is made
+    if solve_catenary(row, across, rise, _FEW, guess, error, jacobian, work):
+        return True
+    guess_by_brackets(row, across, rise, guess)
+    if solve_catenary(row, across, rise, _MANY, guess, error, jacobian, work):
+        return True
+    guess[2] = 0.0
+    return solve_catenary(row, across, rise, _MANY, guess, error, jacobian, work)
+
+
+@jit_inner
 def _catenary_pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
     e, f, k2, g2 = work[0], work[1], work[2], work[3]
     across, rise = _plane(row, start, move, up, e)
     flat = max(across, 1e-9 * row[REST])
     jacobian = work[4:7]
     error, scratch = work[7], work[8:10]
-    if not solve_catenary(row, flat, -rise, guess, error, jacobian, scratch):
-        guess[2] = 0.0  # try again, from a first guess of its own
-        if not solve_catenary(row, flat, -rise, guess, error, jacobian, scratch):
-            guess_by_brackets(row, flat, -rise, guess)
-            if not solve_catenary(row, flat, -rise, guess, error, jacobian, scratch):
-                return False
+    if not _catenary(row, flat, -rise, guess, error, jacobian, scratch):
+        return False
     h, v, length = guess[0], guess[1], guess[2]
     top = v + row[WEIGHT] * length
     tension = math.sqrt(h * h + top * top)

@@ -27,6 +27,7 @@ from seecr.compiled.law import (
     is_linear,
     stored_per_metre,
     strain_of_tension,
+    tension_of_stretch,
     winch_tension,
 )
 from seecr.compiled.pulley import pulley_geometry
@@ -207,6 +208,8 @@ def _first_guess(row, across, rise, unknown):
         chord = math.sqrt(chord2)
         soft = length + row[WINCH_SIDE] + row[EA] * (row[COMPLIANCE] + row[REST] * row[CREEP_RATE])
         pull = row[EA] * (chord - length) / soft
+        if not is_linear(row):
+            pull = tension_of_stretch(row, chord - length + row[REST] * row[CREEP])
         pull = max(pull, 0.5 * w * length / math.sqrt(24.0 * 0.05))
         unknown[0] = pull * across / chord
         if abs(unknown[0]) < 1e-9 * w * length:
@@ -226,8 +229,8 @@ def _size(error, length):
 
 
 @jit_inner
-def solve_catenary(row, across, rise, unknown, error, jacobian, work):
-    """Find the pull of a catenary with the given span; True if found to rounding.
+def solve_catenary(row, across, rise, most, unknown, error, jacobian, work):
+    """Find the pull of a catenary with the given span in so many steps; True if to rounding.
 
     ``unknown`` is a warm start if its third entry is positive; otherwise a first guess is made. On
     return ``jacobian`` is that of the equations at the solution.
@@ -239,7 +242,7 @@ def solve_catenary(row, across, rise, unknown, error, jacobian, work):
     step = work[1]
     _catenary_equations(row, unknown, across, rise, error, jacobian)
     size = _size(error, scale)
-    for _ in range(200):
+    for _ in range(most):
         if size < 1e-15:
             return True
         solve_3x3(jacobian, error, step)

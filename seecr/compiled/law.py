@@ -218,6 +218,13 @@ def straight_law(row, stretch, state):
 
 
 @jit_inner
+def tension_of_stretch(row, stretch):
+    """Tension [N] of a straight cable stretched by ``stretch`` [m], all its parts together."""
+    strain = _solve_strain(row, stretch, max(stretch / row[REST] - row[CREEP], 0.0))
+    return max(series_length(row, strain)[2], 0.0)
+
+
+@jit_inner
 def _solve_strain(row, stretch, guess):
     """Strain at which the series has the given stretch: Newton's method inside a bracket."""
     low, high = 0.0, max(2.0 * guess, 1e-6)

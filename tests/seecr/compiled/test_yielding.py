@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from from_python import from_python
+from one_cable import UP as ABOVE
+from one_cable import cable, in_direction, pull
 
 from seecr.compiled.yielding import lift_slope, soften
 
@@ -29,3 +31,23 @@ def test_a_cable_across_the_vertical_does_not_lift_its_exit_point() -> None:
     across = np.array([1.0, 0.0, 0.0])
     assert slope(5.0, UP, 100.0 * np.outer(across, across)) == 1.0
     assert slope(5.0, UP, 100.0 * np.outer(UP, UP)) == pytest.approx(501.0)
+
+
+@pytest.mark.parametrize("law", [{}, {"QUADRATIC": -218.0, "CUBIC": 25278.0}, {"QUADRATIC": -40.0}])
+@pytest.mark.parametrize("series", [{}, {"WINCH_SIDE": 4.5}, {"RADIUS": 0.03}])
+def test_the_lift_is_found_also_about_kinks(
+    law: dict[str, float], series: dict[str, float]
+) -> None:
+    """Newton steps went to and fro about the kink of a cable that is lifted till it is slack.
+
+    After fifty of them the force was that of no lift, and rows that can be held had stalled.
+    """
+    rng, lifts = np.random.default_rng(2), []
+    for more in 10.0 ** rng.uniform(-4.0, -2.0, 60):
+        anchor = in_direction(rng.uniform(20.0, 89.0), 2.0 + rng.uniform(-0.01, 0.08))
+        here = pull(cable(**law, **series, LIFT=more), anchor)
+        lifts.append(-more * (ABOVE @ here.force))
+        there = pull(cable(**law, **series), anchor, -lifts[-1] * ABOVE)
+        assert here.ok
+        assert here.force == pytest.approx(there.force, rel=1e-9, abs=1e-9)
+    assert min(lifts) < -0.03
