@@ -404,3 +404,19 @@ def test_friction_holds_the_stretch_behind_the_exit_point() -> None:
     slipping = pull(row, [2.0 * 1.03 + 1.5 * 30 * np.exp(-0.2) / 1000, 0, 0])
     assert slipping.tension == pytest.approx(30.0, rel=1e-9)
     assert slipping.state[WINCH_TENSION] == pytest.approx(30 * np.exp(-0.2), rel=1e-9)
+
+
+@pytest.mark.parametrize("part", [0.1, 1.0, 5.0])
+@pytest.mark.parametrize("curve", [(-218.0, 25278.0), (20.0, 14313.0)])
+def test_far_stretched_a_curved_law_hangs_as_a_straight_cable(
+    curve: tuple[float, float], part: float
+) -> None:
+    """None was found: the start was the tension of a linear cable, thousands of times too small.
+
+    So robots whose first step went far fell, though a rest was near.
+    """
+    law, rng = dict(zip(("QUADRATIC", "CUBIC"), curve, strict=True)), np.random.default_rng(0)
+    for weight in 10.0 ** rng.uniform(-3.0, 0.0, 40):
+        anchor = in_direction(rng.uniform(-30.0, 89.0), 2.0 * (1.0 + part))
+        hanging, straight = pull(cable(**law, WEIGHT=weight), anchor), pull(cable(**law), anchor)
+        assert hanging.ok and hanging.tension == pytest.approx(straight.tension, rel=1e-3)
