@@ -38,7 +38,7 @@ SI and radians throughout; quaternions are scalar first.
 Paths and loaded objects both work. `GivenRobot` is a `Robot`, the path of its MJCF, or the name of
 a shipped one; `GivenModel` and `GivenEffects` are a `Model`, the path of its TOML, or a list of
 `Term`s; `GivenData` is `Measurements`, their file, or several files; `GivenCommands` is poses
-(n, 7), a file of commands, or what was read from it; `Commanded` is poses (n, 7),
+(n, 7), `seecr.Commands`, a file of commands, or what was read from it; `Commanded` is poses (n, 7),
 `seecr.Commands`, or `Measurements`; `GivenCase` is a case of the suite, the name of shipped ones
 or a pattern such as `"cogiro-*"`, or a robot.
 

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from seecr.pose import Array
 
-__all__ = ["UNITS", "Unit", "joules", "of_columns", "short", "with_error"]
+__all__ = ["UNITS", "Unit", "joules", "millimetres", "of_columns", "short", "with_error"]
 
 Numbers = TypeVar("Numbers", float, Array)
 
@@ -96,6 +96,13 @@ def short(value: float | None, digits: int = 3) -> str:
         return f"{mantissa}e{int(power)}"
     decimals = max(digits - size, 0)
     return f"{value:.{decimals}f}"
+
+
+def millimetres(length: float | np.floating[Any], digits: int = 4) -> str:
+    """A length [m] in mm with so many digits, and no exponent however many metres it is."""
+    value = 1e3 * float(length)
+    form = ".0f" if abs(value) >= 10.0**digits - 0.5 else f".{digits}g"
+    return f"{value:{form}} mm"
 
 
 def joules(energy: float, form: str = ".3g") -> str:

@@ -18,11 +18,16 @@ ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def printed_by(number: int) -> tuple[str, str, dict[str, Any]]:
-    """What an example of README prints, what README says that it prints, and its names."""
+def printed_by(
+    number: int, before: dict[str, Any] | None = None
+) -> tuple[str, str, dict[str, Any]]:
+    """What an example of README prints, what README says that it prints, and its names.
+
+    ``before`` are the names of the example that it goes on from.
+    """
     examples = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", README, re.DOTALL)
     code, said = examples[number]
-    printed, names = io.StringIO(), dict[str, Any]()
+    printed, names = io.StringIO(), dict[str, Any](before or {})
     with contextlib.redirect_stdout(printed):
         exec(compile(code, "README.md", "exec"), names)
     return printed.getvalue(), said, names
@@ -42,6 +47,8 @@ def test_the_diagnosis_from_python_prints_what_it_says() -> None:
         shown = render_pictures.numbers_in(render_pictures.FOLDER / f"{name}.png")
         today = render_pictures.numbers_of_diagnosis(names["found"])
         assert shown == pytest.approx(today, rel=1e-3), "run: scripts/render_pictures.py"
+    printed, said, after = printed_by(2, names)
+    assert printed == said and after["corrected"].reached.all()
     fall = draw_fall.steps(names["robot"], names["twin"].measured, names["found"])
     drawn = json.loads(draw_fall.NUMBERS.read_text(encoding="utf-8"))
     now = draw_fall.numbers(fall)

@@ -88,7 +88,8 @@ def command(
     tilted loop, 144 rows in all, scaled to the robot. MuJoCo brings it to rest at each row; a
     tracker with noise reads its pose. With --poses it follows your own commands: rows of POSES.csv
     without a reading are way points if other rows have one; the noise level is that of the TOML
-    beside it, or of --sigma, and other poses get other noise.
+    beside it, or of --sigma, and other poses get other noise. With the same seed and noise level
+    it is the same robot, whatever is commanded: measure again what seecr correct has written.
 
     \b
     Writes into --out:

@@ -20,11 +20,13 @@ from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.dwells import averaged_dwells
 from crosscheck.measurements.notice import notice
 from crosscheck.measurements.together import together
+from seecr.arguments import finite
 from seecr.columns.known import POSITION, Columns, know_columns
 from seecr.columns.loads import known_loads
 from seecr.columns.poses import command_lengths, command_poses, measured_orientation
 from seecr.columns.table import read_table
 from seecr.columns.times import began, runs, temperatures, times
+from seecr.commands.data import Commands
 from seecr.counted import counted
 from seecr.errors import InputError
 from seecr.files import path_of
@@ -35,7 +37,7 @@ if TYPE_CHECKING:
 GivenData: TypeAlias = Measurements | str | Path | Sequence[str | Path]
 """Measurements, their file, or several files of one robot."""
 
-GivenCommands: TypeAlias = Measurements | str | Path | ArrayLike
+GivenCommands: TypeAlias = Measurements | Commands | str | Path | ArrayLike
 """Commands, their file, or commanded poses (n, 7)."""
 
 
@@ -102,7 +104,7 @@ def measurements_of(given: GivenData, robot: Robot) -> Measurements:
 
 
 def commands_of(given: GivenCommands, robot: Robot) -> Measurements:
-    """The commands, read if a path is given; poses (n, 7) are one run.
+    """The commands, read if a path is given; poses (n, 7) are one run, and so are commands without.
 
     Raises:
         InputFileError: any mistake in the file.
@@ -112,11 +114,38 @@ def commands_of(given: GivenCommands, robot: Robot) -> Measurements:
         return given
     if isinstance(given, str | Path):
         return load_commands(given, robot)
+    if isinstance(given, Commands):
+        return _of_one_clock(given, robot)
     from seecr.statics.starts import commanded_poses  # takes a while to import
 
     pose = commanded_poses(given)
     run = np.full(len(pose), "all")
     return Measurements(Path("poses.csv"), robot.n_cables, run, command_pose=pose)
+
+
+def _of_one_clock(given: Commands, robot: Robot) -> Measurements:
+    """Commands as a file of them would be read."""
+    from seecr.statics.starts import commanded_poses  # takes a while to import
+
+    if given.clock is not None and len(np.unique(given.clock)) > 1:
+        raise InputError("commands of several clocks; expected those of one file")
+    lengths, n = given.lengths, len(given)
+    if lengths is not None:
+        lengths = finite(lengths, "lengths of the commands")
+    run = np.full(n, "all") if given.run is None else given.run
+    return Measurements(
+        Path("commands.csv"),
+        robot.n_cables,
+        run.astype(np.str_),
+        command_pose=commanded_poses(given.pose) if lengths is None else None,
+        command_lengths=lengths,
+        told=given.told and lengths is not None,
+        t_s=given.time,
+        temperature_C=given.temperature,
+        loads=given.loads,
+        stands=np.zeros(n, dtype=bool) if given.stands is None else given.stands,
+        line=np.arange(2, n + 2) if given.line is None else given.line,
+    )
 
 
 def _open(path: str | Path, robot: Robot) -> Columns:

@@ -105,14 +105,38 @@ def lacking_in(case: Measurements) -> dict[str, str]:
     return {need: words for need, (has, words) in there.items() if not has}
 
 
-def rest_of(lab: Lab, cases: Sequence[Measurements], hidden: list[Term]) -> Measured:
-    """The first commands at which MuJoCo comes to rest, with sizes of effects that show there."""
+def sized(lab: Lab, points: int, hidden: list[Term]) -> list[Term]:
+    """The effects as large as along the lab's own sweeps, for whatever else is commanded.
+
+    So a seed measured along corrected commands is the robot that was measured before. Where the
+    platform does not rest along sweeps, sizes are as drawn.
+    """
+    own = replace(lab, commanded=())
+    cases = [sweeps(lab.robot, points, extent, lab.seed) for extent in EXTENTS]
+    try:
+        return [one for one, _ in rest_of(own, cases, hidden).alone] if hidden else []
+    except CrosscheckError:
+        return hidden
+
+
+def rest_of(
+    lab: Lab,
+    cases: Sequence[Measurements],
+    hidden: list[Term],
+    enlarged: Sequence[float] = _ENLARGED,
+) -> Measured:
+    """The first commands at which MuJoCo comes to rest, with sizes of effects that show there.
+
+    Args:
+        lab: that measures. cases: commands to try. hidden: effects with the sizes drawn.
+        enlarged: factors of the sizes to try until an effect shows.
+    """
     for case in cases:
         plain = lab.measure(case, (), "without effects")
         if not _mostly(plain.at_rest):
             continue
         sigma = _sigma(lab, plain)
-        alone = [_made_visible(lab, case, one, plain, sigma) for one in hidden]
+        alone = [_made_visible(lab, case, one, plain, sigma, enlarged) for one in hidden]
         if any(one is None for one in alone):
             continue
         fine = [one for one in alone if one is not None]
@@ -156,7 +180,12 @@ def sweeps(robot: Robot, points: int, extent: float, seed: int) -> Measurements:
 
 
 def _made_visible(
-    lab: Lab, case: Measurements, hidden: Term, plain: Truth, sigma: Sigma
+    lab: Lab,
+    case: Measurements,
+    hidden: Term,
+    plain: Truth,
+    sigma: Sigma,
+    enlarged: Sequence[float],
 ) -> tuple[Term, Truth] | None:
     """The effect, enlarged if the noise would hide it; None if MuJoCo does not come to rest.
 
@@ -164,7 +193,7 @@ def _made_visible(
     the effect moves only tensions.
     """
     best, of_poses = None, replace(sigma, tension_N=None)
-    for factor in _ENLARGED:
+    for factor in enlarged:
         one = times(hidden, factor)
         truth = lab.measure(case, [one.effect()], "with effects")
         if not _mostly(truth.at_rest & plain.at_rest):

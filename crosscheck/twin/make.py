@@ -30,6 +30,7 @@ from crosscheck.twin.lab import (
     random_of,
     read_of,
     rest_of,
+    sized,
     sweeps,
 )
 from crosscheck.twin.measure import Truth
@@ -113,7 +114,7 @@ def make_twin(
         points: of each sweep; 18 make 144 rows.
         poses: instead of the sweeps: poses (n, 7), or commands, loads and way points, or their
             file. If some rows have readings, those without are way points; a list of commands has
-            none.
+            none. With the same seed and noise it is the same robot as along the sweeps.
         sigma: noise; kinds that are not stated are those of a good tracker.
         progress: called with the number of rows done since the last call, and what is going on.
 
@@ -141,7 +142,10 @@ def make_twin(
     tell = progress or (lambda rows, now: None)
     commanded = () if given is None else key_of(given)
     lab = Lab(robot, seed, stated, tensions, tell, commanded)
-    made = rest_of(lab, cases, hidden)
+    if given is None:
+        made = rest_of(lab, cases, hidden)
+    else:
+        made = rest_of(lab, cases, sized(lab, points, hidden), enlarged=(1.0,))
     measured = read_of(made, random_of(seed, 2, commanded))
     twin = Twin(
         robot=robot,

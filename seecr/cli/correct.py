@@ -189,6 +189,7 @@ def _as_tracked(
     from seecr import InputError
     from seecr.prediction.sensed import placed, tracked
     from seecr.report.corrections import joint_lines
+    from seecr.units import millimetres
 
     if model is None:
         if as_read:
@@ -199,7 +200,7 @@ def _as_tracked(
         at = placed(robot, commands, model)
         away = np.linalg.norm(at.pose[:, :3] - commands.pose[:, :3], axis=1).max()
         return replace(wanted, commands=at), [
-            f"as read: the platform is brought to places up to {1e3 * away:.3g} mm from the "
+            f"as read: the platform is brought to places up to {millimetres(away, 3)} from the "
             "wanted poses, where the model's tracker reads the wanted poses; want_* are those "
             "places",
             *joint_lines(commands.pose, tracked(robot, at, model), _SEEN),
@@ -209,7 +210,7 @@ def _as_tracked(
     if away <= _SEEN:
         return wanted, []
     return wanted, [
-        f"the model's tracker reads these poses up to {1e3 * away:.3g} mm off: the platform is "
+        f"the model's tracker reads these poses up to {millimetres(away, 3)} off: the platform is "
         "brought to them in the base frame, which a calibration with a tracker knows no better "
         "than that; --as-read brings the readings to them"
     ]

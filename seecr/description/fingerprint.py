@@ -12,6 +12,7 @@ import tomlkit
 
 from seecr.counted import counted
 from seecr.errors import InputFileError
+from seecr.units import millimetres
 
 if TYPE_CHECKING:
     from seecr.description.robot import Robot
@@ -181,7 +182,7 @@ def _elsewhere(
     else:
         word = key.removesuffix("s_m").replace("_", " ")
         what = (
-            f"its {word} of {robot.cable_names[k]} is {1e3 * float(apart[k]):.3g} mm from that "
+            f"its {word} of {robot.cable_names[k]} is {millimetres(apart[k], 3)} from that "
             f"{'of this robot' if robot.source is None else f'in {robot.source}'}"
         )
     other = f": {name}, not {robot.name}"

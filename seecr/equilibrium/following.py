@@ -28,7 +28,7 @@ from seecr.statics.batch import under_moment
 from seecr.statics.solution import Solution, certify
 from seecr.statics.starts import start_of
 from seecr.statics.tables import Tables, assemble, take
-from seecr.units import joules
+from seecr.units import joules, millimetres
 
 __all__ = ["Jump", "follow_commands", "moved", "step_between"]
 
@@ -97,7 +97,7 @@ class Jump(Result):
         free = f", releasing {joules(self.energy)}" if np.isfinite(self.energy) else ""
         sure = "" if self.certain else "; where it lands depends on damping"
         return (
-            f"its equilibrium ends and it jumps by {1e3 * moved:.4g} mm and "
+            f"its equilibrium ends and it jumps by {millimetres(moved)} and "
             f"{np.degrees(turned):.4g} deg{free}{sure}"
         )
 

@@ -30,6 +30,7 @@ from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics.solution import Solution
 from seecr.statics.starts import Commanded, commands_from
 from seecr.statics.tables import Tables, assemble, take
+from seecr.units import millimetres
 
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects
@@ -48,8 +49,8 @@ _REACHED = 1e-6
 # Strain of a cable up to which the nearest poses are sought where no highest tension is given:
 # steel yields before, fibres tear. Without an end, poses near the edge take any tension.
 _STRAIN = 0.05
-# Rotations below this [deg] are rounding, and displacements of nearest poses below this [mm].
-_TURNED, _MOVED = 1e-9, 1e-6
+# Rotations below this [deg] are rounding, and displacements of nearest poses below this [m].
+_TURNED, _MOVED = 1e-9, 1e-9
 # Number of poses whose reason is printed.
 _NAMED = 5
 
@@ -122,7 +123,7 @@ class Correction(Result):
         if np.any(near):
             out.append(
                 f"the nearest poses that can be held are up to "
-                f"{_millimetres(left[near, :3]):.4g} mm and "
+                f"{millimetres(_largest(left[near, :3]))} and "
                 f"{_degrees(left[near, 3:]):.4g} deg away"
             )
             pulls = self.solution.tensions[near]
@@ -447,9 +448,9 @@ class _Search:
         return told, prediction
 
 
-def _millimetres(moved: Array) -> float:
-    """The largest of displacements (n, 3) [m] in millimetres; 0 where that is rounding."""
-    largest = 1e3 * float(np.linalg.norm(moved, axis=1).max())
+def _largest(moved: Array) -> float:
+    """The largest of displacements (n, 3) [m]; 0 where that is rounding."""
+    largest = float(np.linalg.norm(moved, axis=1).max())
     return 0.0 if largest < _MOVED else largest
 
 

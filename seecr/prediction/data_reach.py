@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seecr.counted import between, counted
 from seecr.pose import Array
+from seecr.units import millimetres
 
 if TYPE_CHECKING:
     from seecr.prediction.cells import Where
@@ -116,7 +117,7 @@ class DataReach:
                 f"{between(self.least, self.largest)} N"
             )
         if np.any(away > 0.0):
-            parts.append(f"up to {1e3 * away.max():.3g} mm outside the region of the data")
+            parts.append(f"up to {millimetres(away.max(), 3)} outside the region of the data")
         which = "" if len(rows) == 1 else f" at {int(rows.sum())} of {counted(len(rows), 'pose')}"
         return (
             f"beyond the data that the model was fitted to{which}: {', '.join(parts)}; "

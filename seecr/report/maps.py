@@ -16,6 +16,7 @@ from seecr.files import written
 from seecr.pose import Array
 from seecr.prediction.data_reach import DataReach
 from seecr.report.words import SAGS, direction_words
+from seecr.units import millimetres
 from seecr.workspace.grid import Workspace
 
 __all__ = [
@@ -46,7 +47,8 @@ def beyond_line(found: Workspace, reach: DataReach | None) -> Iterator[str]:
         yield (
             "beyond the data that the model was fitted to: "
             f"{counted(int(np.sum(away > 0.0)), 'pose')} of those that can be held "
-            f"{'is' if np.sum(away > 0.0) == 1 else 'are'} up to {1e3 * away.max():.3g} mm outside"
+            f"{'is' if np.sum(away > 0.0) == 1 else 'are'} "
+            f"up to {millimetres(away.max(), 3)} outside"
         )
 
 

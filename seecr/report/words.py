@@ -15,7 +15,7 @@ from seecr.pose import Array, pose_difference, rxyz_from_quat
 from seecr.prediction.uncertainty import Spread
 from seecr.statics.solution import Solution, Status
 from seecr.statics.tables import Tables
-from seecr.units import joules, short, with_error
+from seecr.units import joules, millimetres, short, with_error
 from seecr.workspace.bars import BarBalance
 from seecr.workspace.midlines import midline_points
 from seecr.workspace.spans import SlackSpan
@@ -80,7 +80,7 @@ def pose_lines(solution: Solution, spread: Spread | None = None) -> Iterator[str
     yield "  quaternion " + " ".join(f"{q + 0.0:.7f}" for q in np.round(pose[3:], 9))
     yield (
         f"off its command by {_three(1e3 * away[:3], '+.4f')} mm "
-        f"({np.round(1e3 * np.linalg.norm(away[:3]), _DECIMALS):.4g} mm), turned by "
+        f"({millimetres(1e-3 * np.round(1e3 * np.linalg.norm(away[:3]), _DECIMALS))}), turned by "
         f"{np.round(np.degrees(np.linalg.norm(away[3:])), _DECIMALS):.4g} deg"
         f" ({_three(np.degrees(away[3:]), '+.4f')} deg about x y z)"
     )
@@ -165,7 +165,7 @@ def _nudged(solution: Solution) -> str:
     whole = np.linalg.norm(step * _metre(robot))
     moved = float(np.linalg.norm(step[~robot.hinges]))
     turned = float(np.linalg.norm(step[robot.hinges]))
-    parts = [f"{1e3 * moved:.3g} mm"] if moved > _PART * whole else []
+    parts = [millimetres(moved, 3)] if moved > _PART * whole else []
     if turned * robot.length > _PART * whole:
         parts.append(f"{np.degrees(turned):.3g} deg")
     return f"; 1 % of the weight moves it by {' and '.join(parts)}"
@@ -289,7 +289,7 @@ def other_lines(
         gap = pose_difference(others.pose[k], solution.pose[0])
         slack = [n for n, s in zip(solution.robot.cable_names, others.slack[k], strict=True) if s]
         line = (
-            f"could also rest {1e3 * np.linalg.norm(gap[:3]):.4g} mm and "
+            f"could also rest {millimetres(np.linalg.norm(gap[:3]))} and "
             f"{np.degrees(np.linalg.norm(gap[3:])):.4g} deg away: at "
             f"{_three(np.round(1e3 * others.pose[k, :3], 1), '.7g')} mm, turned "
             f"{_three(np.degrees(rxyz_from_quat(others.pose[k, 3:])), '.4g')} deg, "

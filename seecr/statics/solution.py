@@ -32,6 +32,7 @@ from seecr.statics.inertia import mass_matrices
 from seecr.statics.starts import start_of
 from seecr.statics.tables import Tables, take
 from seecr.threads import in_parts
+from seecr.units import millimetres
 
 if TYPE_CHECKING:
     from seecr.equilibrium.following import Jump
@@ -268,7 +269,8 @@ class Solution(Result):
         # rounding must not say which of two is further
         first = np.flatnonzero(away >= away.max() * (1.0 - _ALIKE) - _ALIKE)
         k = int(first[np.argmax(turned[first])])
-        by = f"largest deviation from the command: {self.place(known[k])}, {away[k]:.4g} mm"
+        far = millimetres(1e-3 * away[k])
+        by = f"largest deviation from the command: {self.place(known[k])}, {far}"
         if turned[k] >= turned.max() * (1.0 - _ALIKE) - _ALIKE:
             return f"{by} and {turned[k]:.4g} deg"
         t = int(np.argmax(turned))

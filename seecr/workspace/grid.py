@@ -12,6 +12,7 @@ from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.result import Record, Result
+from seecr.units import millimetres
 from seecr.workspace.margins import is_held
 
 __all__ = ["NEVER", "Workspace"]
@@ -156,11 +157,11 @@ class Workspace(Result):
             )
             where = rests & self.feasible
             if np.any(where):
-                away = 1e3 * np.linalg.norm(self.deviation[where], axis=-1).max()
+                away = np.linalg.norm(self.deviation[where], axis=-1).max()
                 turn = np.degrees(np.linalg.norm(self.rotation[where], axis=-1).max())
                 out.append(
-                    f"deviation from the command where poses can be held: up to {away:.4g} mm and "
-                    f"{turn:.4g} deg"
+                    f"deviation from the command where poses can be held: up to "
+                    f"{millimetres(away)} and {turn:.4g} deg"
                 )
         return out
 

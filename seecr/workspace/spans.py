@@ -23,6 +23,7 @@ from seecr.prediction.model import GivenEffects
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics.solution import Solution, check_solution
 from seecr.statics.starts import Commanded, commands_from
+from seecr.units import millimetres
 
 __all__ = ["SlackSpan", "slack_spans"]
 
@@ -72,7 +73,7 @@ class SlackSpan(Result):
             " ".join(f"{value + 0.0:.4f}" for value in 1e3 * pose[:3])
             for pose in (self.first, self.last)
         )
-        return [f"x y z {' to '.join(places)} mm, {1e3 * self.width:.4g} mm wide: {self.words}"]
+        return [f"x y z {' to '.join(places)} mm, {millimetres(self.width)} wide: {self.words}"]
 
     def as_json(self) -> Record:
         """One entry of ``zones`` in ``sweep.json``."""

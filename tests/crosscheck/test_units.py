@@ -18,7 +18,7 @@ from crosscheck.units import (
     short,
     with_error,
 )
-from seecr.units import UNITS, of_columns
+from seecr.units import UNITS, millimetres, of_columns
 
 
 def test_columns_of_millimetres_are_rounded_once() -> None:
@@ -88,6 +88,16 @@ def test_a_unit_of_another_kind_is_refused() -> None:
 )  # fmt: skip
 def test_short_numbers(value: float | None, text: str) -> None:
     assert short(value) == text
+
+
+@pytest.mark.parametrize(
+    ("length", "digits", "text"),
+    [(0.0, 4, "0 mm"), (0.035039, 4, "35.04 mm"), (9.9994, 4, "9999 mm"), (9.9996, 4, "10000 mm"),
+     (124.9981, 4, "124998 mm"), (7.76012, 3, "7760 mm"), (-0.0123456, 3, "-12.3 mm")],
+)  # fmt: skip
+def test_lengths_of_many_metres_have_no_exponent(length: float, digits: int, text: str) -> None:
+    assert millimetres(length, digits) == text
+    assert millimetres(np.float64(length), digits) == text
 
 
 @pytest.mark.parametrize(

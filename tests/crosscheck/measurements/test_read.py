@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from measured_csv import CMD
 
 from crosscheck.measurements.data import Sigma
-from crosscheck.measurements.read import load_commands, load_measurements
-from seecr.errors import InputFileError
+from crosscheck.measurements.read import commands_of, load_commands, load_measurements
+from seecr.errors import InputError, InputFileError
 from seecr.pose import quat_from_rxyz, quat_rotate, quat_to_matrix
 
 
@@ -225,3 +227,24 @@ def test_measurements_show_themselves(csv_file, robot):
     assert [row["tension_2_N"] for row in data.records()] == [None, 3.0]
     assert "meas_y_m" not in data.records()[0] and data.records()[1]["cmd_x_m"] == 1.0
     assert data.to_frame().num_rows == 2
+
+
+def test_commands_that_were_made_are_as_if_read(csv_file, robot):
+    """Commands of a correction had been refused as "expected numbers, got a Commands"."""
+    read = load_commands(
+        csv_file(f"run,t_s,temperature_C,{CMD}", "a,0,20,0,0,0", "a,9,21,1,0,0", "b,20,22,0,0,1"),
+        robot,
+    )
+    made = read.as_commands(robot)
+    same = commands_of(made, robot)
+    np.testing.assert_array_equal(same.command_pose, read.command_pose)
+    assert same.run_index.tolist() == [0, 0, 1] and same.t_s.tolist() == [0, 9, 20]
+    assert same.temperature_C.tolist() == [20, 21, 22] and same.line.tolist() == [2, 3, 4]
+    lengths = np.full((3, 4), 0.5)
+    told = commands_of(replace(made, lengths=lengths, told=True), robot)
+    assert told.told and told.command_pose is None and told.command_lengths.tolist()[0] == [0.5] * 4
+    lengths[1] = np.nan  # a row without an answer
+    with pytest.raises(InputError, match="lengths of the commands holds numbers that are not fin"):
+        commands_of(replace(made, lengths=lengths), robot)
+    with pytest.raises(InputError, match="commands of several clocks; expected those of one file"):
+        commands_of(replace(made, clock=np.arange(3)), robot)

@@ -27,6 +27,7 @@ from seecr.description.shipped import model_path
 from seecr.effects import Term, effect_named, layout_of
 from seecr.errors import InputError, InputFileError
 from seecr.files import json_text
+from seecr.inverse.correction import correct
 from seecr.pose import pose_difference
 from seecr.prediction.experiment import Experiment
 
@@ -466,3 +467,20 @@ def test_effects_that_cannot_be_hidden_are_refused():
         make_twin(COGIRO, 1, effects=("stiffness", "stiffness"))
     with pytest.raises(CrosscheckError, match="99 effects: expected at most"):
         make_twin(COGIRO, 1, n_effects=99)
+
+
+def test_measured_again_along_other_commands_it_is_the_same_robot():
+    """Level poses in the middle hardly show a tilted frame: it had been tilted twice as far."""
+    path = model_path("demobot_parallel")
+    poses = np.tile([0.4, 0.25, 0.15, 1.0, 0.0, 0.0, 0.0], (6, 1))
+    poses[:, 0] = np.linspace(0.37, 0.43, 6)
+    own = make_twin(path, 13)
+    told = correct(path, poses, effects=own.hidden)
+    again = [make_twin(path, 13, poses=commands) for commands in (poses, told.commands)]
+    for twin in again:
+        for one, other in zip(twin.hidden, own.hidden, strict=True):
+            assert one.name == other.name
+            np.testing.assert_array_equal(one.vector, other.vector)
+    before, after = (np.abs(twin.truth.position - poses[:, :3]).max() for twin in again)
+    assert before > 2e-4 and after < 1e-8
+    assert again[1].measured.told and again[1].measured.command_pose is None

@@ -29,6 +29,12 @@ def test_rounding_is_no_turn() -> None:
     assert re.search(r"\(0\.2 mm\), turned by 0 deg \(", text), text
 
 
+def test_a_large_robot_off_by_many_metres_has_no_exponent() -> None:
+    found = seecr.solve(seecr.load_robot("camera"), [[200.0, 30.0, 10.0, 1, 0, 0, 0]])
+    text = "\n".join([*pose_lines(found), str(found)])
+    assert text.count("125032 mm") == 2 and "e+0" not in text, text
+
+
 def test_a_platform_that_hangs_twisted_is_told_so() -> None:
     """It may rest where no way leads from the reference pose."""
     robot = seecr.load_robot(model_path("ipanema"))
