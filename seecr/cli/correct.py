@@ -47,7 +47,8 @@ Examples:
     metavar="minimum|middle|N,N,...",
     help=(
         "Where tensions should be within their limits, or the wanted tensions: one, or one per "
-        "cable."
+        "cable. The nearest ones that balance are taken: with the middle Pott's closed form, "
+        "wherever that is within the limits."
     ),
 )
 @click.option(

@@ -78,6 +78,10 @@ def distribute(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Tensions nearest to wanted ones, by least squares, that balance loads.
 
+    Where no limit is reached these are f + A^+ (load - A f) with f the wanted ones. With the middle
+    of the limits that is the closed form of Pott, Bruckmann and Mikelsons (Closed-form force
+    distribution for parallel wire robots, Computational Kinematics, 2009).
+
     Args:
         matrices: (n, d, m). loads: (n, d), to be balanced: A tau = load.
         aim, low, high: (m,) or (n, m) [N].

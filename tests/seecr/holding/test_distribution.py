@@ -56,6 +56,18 @@ def test_no_tensions_are_nearer() -> None:
         np.testing.assert_allclose(tensions[i], best.x, atol=1e-6)
 
 
+def test_within_the_limits_the_middle_leads_to_the_closed_form() -> None:
+    matrix, load = problems(6, 8)
+    low, high = np.zeros(8), np.full(8, 2.0)
+    middle = wanted_tensions("middle", low, high)
+    left = load - np.einsum("ndm,m->nd", matrix, middle)
+    closed = middle + np.einsum("nmd,nd->nm", np.linalg.pinv(matrix), left)
+    within = ((closed > low) & (closed < high)).all(axis=1)
+    tensions, found = distribute(matrix, load, middle, low, high)
+    assert within.sum() > 10 and found[within].all()
+    np.testing.assert_allclose(tensions[within], closed[within], atol=1e-10)
+
+
 def test_tensions_many_times_the_load_are_found_too() -> None:
     # two nearly parallel cables against each other
     matrix = np.array([[[1.0, -1.0, 0.0], [1e-4, 1e-4, 1.0]]])
