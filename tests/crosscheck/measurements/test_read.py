@@ -10,6 +10,7 @@ from measured_csv import CMD
 
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import commands_of, load_commands, load_measurements
+from seecr.commands.loads import Loads
 from seecr.errors import InputError, InputFileError
 from seecr.pose import quat_from_rxyz, quat_rotate, quat_to_matrix
 
@@ -240,6 +241,10 @@ def test_commands_that_were_made_are_as_if_read(csv_file, robot):
     np.testing.assert_array_equal(same.command_pose, read.command_pose)
     assert same.run_index.tolist() == [0, 0, 1] and same.t_s.tolist() == [0, 9, 20]
     assert same.temperature_C.tolist() == [20, 21, 22] and same.line.tolist() == [2, 3, 4]
+    loads = Loads.of(3, mass=np.array([0.0, 0.5, 0.0]))
+    assert commands_of(replace(made, loads=loads), robot).loads is loads
+    stands = np.array([False, True, False])
+    assert commands_of(replace(made, stands=stands), robot).stands.tolist() == stands.tolist()
     lengths = np.full((3, 4), 0.5)
     told = commands_of(replace(made, lengths=lengths, told=True), robot)
     assert told.told and told.command_pose is None and told.command_lengths.tolist()[0] == [0.5] * 4

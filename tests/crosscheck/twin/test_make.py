@@ -484,3 +484,19 @@ def test_measured_again_along_other_commands_it_is_the_same_robot():
     before, after = (np.abs(twin.truth.position - poses[:, :3]).max() for twin in again)
     assert before > 2e-4 and after < 1e-8
     assert again[1].measured.told and again[1].measured.command_pose is None
+
+
+def test_what_sweeps_enlarge_is_as_large_along_other_commands():
+    """A coarse tracker sees a tilt only if it is three times as large as drawn."""
+    path, coarse = model_path("demobot_parallel"), Sigma(3e-3, 0.03)
+    poses = np.tile([0.4, 0.25, 0.15, 1.0, 0.0, 0.0, 0.0], (2, 1))
+    drawn = make_twin(path, 13, points=4)
+    swept = make_twin(path, 13, points=4, sigma=coarse)
+    again = make_twin(path, 13, points=4, sigma=coarse, poses=poses)
+    factors = [
+        float(one.vector[0] / other.vector[0])
+        for one, other in zip(swept.hidden, drawn.hidden, strict=True)
+    ]
+    assert factors == pytest.approx([3.0, 1.0])
+    for one, other in zip(again.hidden, swept.hidden, strict=True):
+        np.testing.assert_array_equal(one.vector, other.vector)
