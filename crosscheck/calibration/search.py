@@ -206,7 +206,13 @@ def _classes(
     """
     scores, fitted = {**all_scores(found), **further}, {*found.refits, *further}
     hints = alike_beyond(found.scores, own, sizes)
-    return probabilities(scores, own, list(sizes), sizes, fitted, hints)
+    near, base = found.scores.neighbours(own), found.scores.score(own)
+    worth = {
+        name: scores[own] - scores[rest] if rest in fitted else base - near[rest]
+        for name in own - found.always
+        if (rest := own - {name}) in near
+    }
+    return probabilities(scores, own, list(sizes), sizes, fitted, hints, worth)
 
 
 def with_equivalents(
