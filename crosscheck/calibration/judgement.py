@@ -10,7 +10,7 @@ nothing beside the whole catalogue.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -57,7 +57,6 @@ class Judgement:
         doubted: members of the best set that are implausibly large.
         more: whether a smooth field explains something beside the best set.
         imitated: something unknown that members of the best set imitate; None if there is nothing.
-        replaceable: members that are probable, but others together explain as much.
     """
 
     verdict: DiagnosisVerdict
@@ -66,13 +65,6 @@ class Judgement:
     doubted: Names = NONE
     more: bool = False
     imitated: Imitated | None = None
-    replaceable: Names = NONE
-
-    def without(self, replaceable: Iterable[str]) -> Judgement:
-        """The same, but effects that others together can replace are not sure."""
-        some = frozenset(replaceable)
-        sure = tuple(name for name in self.sure if name not in some)
-        return replace(self, sure=sure, replaceable=some)
 
 
 def judge(

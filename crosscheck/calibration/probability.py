@@ -15,8 +15,7 @@ from crosscheck.calibration.sets import Names, Scores
 
 # Only the neighbours of sets that are worse than the best by less than this ln evidence count.
 _COUNTED = 8.0
-# Two effects do the same if one gains less beside the other than this part of what it gains alone;
-# one does what another does if it is worth at least this part of it.
+# Two effects do the same if one gains less beside the other than this part of what it gains alone.
 _SAME = 0.5
 # So many effects that are not listed are tested for doing the same.
 _HINTS = 10
@@ -142,7 +141,6 @@ def probabilities(
     sizes: Mapping[str, int] | None = None,
     fitted: Collection[Names] | None = None,
     hints: Iterable[tuple[str, ...]] = (),
-    worth: Mapping[str, float] | None = None,
 ) -> Classes:
     """Posterior probabilities of effects and classes: sums over sets.
 
@@ -154,13 +152,10 @@ def probabilities(
         fitted: sets whose scores are exact, by default all: only these decide which effects are
             equivalent.
         hints: effects beyond the best set that do the same, from :func:`alike_beyond`.
-        worth: ln evidence that members of the best set are worth; by default by the given scores.
     """
     effects = list(effects)
     exact = scores if fitted is None else {n: scores[n] for n in fitted}
-    by_drop = {e: scores[best] - scores[best - {e}] for e in best if best - {e} in scores}
-    members = _classes(exact, best, effects, sizes or {}, {**by_drop, **(worth or {})})
-    members = with_hints(members, hints)
+    members = with_hints(_classes(exact, best, effects, sizes or {}), hints)
     return of_classes(scores, best, effects, members)
 
 
@@ -237,23 +232,12 @@ def of_classes(
 
 
 def _classes(
-    scores: Mapping[Names, float],
-    best: Names,
-    effects: list[str],
-    sizes: Mapping[str, int],
-    worth: Mapping[str, float],
+    scores: Mapping[Names, float], best: Names, effects: list[str], sizes: Mapping[str, int]
 ) -> list[tuple[str, ...]]:
-    """Classes of equivalent effects, by exchanges that cost the best set little; others alone.
-
-    Exchanging a member that is worth next to nothing costs little whatever comes in its place. So
-    that has to be worth something too: half as much, or as much as counts as a difference.
-    """
+    """Classes of equivalent effects, by exchanges that cost the best set little; others alone."""
     together = {e: {e} for e in effects}
 
-    def join(a: str, b: str, loss: float) -> None:
-        own = worth.get(a, np.inf)
-        if own - loss < min(EQUAL, _SAME * own):
-            return
+    def join(a: str, b: str) -> None:
         joined = together[a] | together[b]
         for e in joined:
             together[e] = joined
@@ -264,14 +248,14 @@ def _classes(
         if len(gone) == len(come) == 1:
             (a,), (b,) = gone, come
             if are_equals(loss, sizes.get(a, 1), sizes.get(b, 1)):
-                join(a, b, loss)
+                join(a, b)
         elif len(gone) == len(come) and loss < EQUAL:
             beside.append((loss, gone, come))
-    for loss, gone, come in sorted(beside, key=lambda one: one[0]):
+    for _loss, gone, come in sorted(beside, key=lambda one: one[0]):
         # two sets differ in known equivalents and one more pair: that pair is equivalent too
         left = _left(gone, come, together)
         if left is not None:
-            join(*left, loss)
+            join(*left)
     out = []
     for e in effects:
         if together[e] and e == min(together[e], key=effects.index):

@@ -12,7 +12,6 @@ from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.colour import Colour
 from crosscheck.calibration.detectable import detectable_size
 from crosscheck.calibration.equals import parameters_counted
-from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.field import UNKNOWN, log_odds
 from crosscheck.calibration.imitated import Imitated, field_in_place
 from crosscheck.calibration.joining import layouts
@@ -28,7 +27,6 @@ from crosscheck.calibration.probability import (
     probabilities,
 )
 from crosscheck.calibration.refits import ROUNDS, Found, compare_sets
-from crosscheck.calibration.replaceable import Replaced
 from crosscheck.calibration.sets import Names
 from crosscheck.calibration.stages import Progress
 from crosscheck.fit.possible import can_be, hardly_happens
@@ -109,15 +107,6 @@ def search_sets(
     said = judge(
         found, classes, odds, surprise, not_noise, _doubted(found), beside, in_place, without
     )
-    if said.verdict is DiagnosisVerdict.MANY_EFFECTS and said.sure:
-
-        def possible(refit: Refit) -> bool:
-            return can_be(problem.robot, refit.joint.terms, terms)
-
-        others = Replaced(found, sizes.__getitem__, possible)
-        others.try_without(said.sure, classes)
-        classes = _classes(found, best.names, sizes, others.scores)
-        said = said.without(others.replaceable)
     listed = found.always | set(said.sure)
     alone = found.refit(listed) if said.verdict is DiagnosisVerdict.EFFECTS_FOUND else None
     if alone is not None and listed != best.names:
@@ -217,13 +206,7 @@ def _classes(
     """
     scores, fitted = {**all_scores(found), **further}, {*found.refits, *further}
     hints = alike_beyond(found.scores, own, sizes)
-    near, base = found.scores.neighbours(own), found.scores.score(own)
-    worth = {
-        name: scores[own] - scores[rest] if rest in fitted else base - near[rest]
-        for name in own - found.always
-        if (rest := own - {name}) in near
-    }
-    return probabilities(scores, own, list(sizes), sizes, fitted, hints, worth)
+    return probabilities(scores, own, list(sizes), sizes, fitted, hints)
 
 
 def with_equivalents(
