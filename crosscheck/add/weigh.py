@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from crosscheck.add.result import Addition
 from crosscheck.comparison.coloured import coloured_noise
@@ -17,6 +16,7 @@ from crosscheck.fit.gauss_newton import Fit, fit
 from crosscheck.fit.held_out import HeldOut, hold_out, improves, pays, unfitted
 from crosscheck.fit.known import firmer
 from crosscheck.fit.noise import Whiteness, whiteness
+from crosscheck.fit.nothing import distance_from_nothing, is_nothing
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.state import evaluate
 from crosscheck.fit.systematic import moved_by_others
@@ -148,45 +148,6 @@ def _refuse_unsettled(problem: Problem, names: Sequence[str], best: Fit, held: H
         f"{problem.data.path}: the fit of {' + '.join(names)} {why}; nothing was added: find what "
         "else is missing with crosscheck diagnose, or fix known values in the model"
     )
-
-
-def distance_from_nothing(
-    terms: Terms, covariance: Array, own: NDArray[np.bool_]
-) -> tuple[float, int]:
-    """Distance of some parameters together from null, in standard errors (Mahalanobis).
-
-    Args:
-        terms: effects with their values.
-        covariance: (p, p) covariance of these; inf on the diagonal if unidentifiable.
-        own: (p,) bool, which parameters.
-
-    Returns:
-        The distance and the number of parameters in it. Shapes, fixed values and unidentifiable
-        parameters do not count. The distance is infinite if no parameter was free.
-    """
-    shape = np.concatenate([term.layout.shape for term in terms])
-    free = own & ~shape & ~terms.knowledge.fixed
-    if not free.any():
-        return float("inf"), 0
-    seen = np.flatnonzero(free & np.isfinite(np.diag(covariance)) & (np.diag(covariance) > 0.0))
-    if not len(seen):
-        return 0.0, 1
-    scale = terms.scale[seen]
-    z = (terms.vector - terms.null)[seen] / scale
-    part = covariance[np.ix_(seen, seen)] / np.outer(scale, scale)
-    squared = float(z @ np.linalg.pinv(part, hermitian=True) @ z)
-    return float(np.sqrt(max(squared, 0.0))), len(seen)
-
-
-def is_nothing(distance: float, count: int) -> bool:
-    """Whether values together are within one standard error of null.
-
-    For one value that is a distance of 1, below which chance stays in 68 %; for several values it
-    is the distance below which chance stays as often.
-    """
-    if not np.isfinite(distance):
-        return False
-    return bool(special.chdtr(count, distance**2) <= special.chdtr(1, 1.0))
 
 
 def whiteness_of(problem: Problem, found: Fit) -> Whiteness:

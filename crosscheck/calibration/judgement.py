@@ -10,7 +10,7 @@ nothing beside the whole catalogue.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -65,6 +65,15 @@ class Judgement:
     doubted: Names = NONE
     more: bool = False
     imitated: Imitated | None = None
+
+    def without(self, some: Names) -> Judgement:
+        """The same with some effects that are not sure after all; a model of none is no finding."""
+        if not some:
+            return self
+        sure, verdict = tuple(n for n in self.sure if n not in some), self.verdict
+        if not sure and verdict is DiagnosisVerdict.EFFECTS_FOUND:
+            verdict = DiagnosisVerdict.MANY_EFFECTS
+        return replace(self, sure=sure, verdict=verdict)
 
 
 def judge(

@@ -7,15 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from crosscheck.calibration.all_effects import PLAIN, Calibration, fit_all_effects
+from crosscheck.calibration.all_effects import PLAIN, Calibration, covariance, fit_all_effects
 from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.colour import Colour
 from crosscheck.calibration.detectable import detectable_size
 from crosscheck.calibration.equals import parameters_counted
-from crosscheck.calibration.field import UNKNOWN, log_odds
 from crosscheck.calibration.imitated import Imitated, field_in_place
 from crosscheck.calibration.joining import layouts
-from crosscheck.calibration.joint import JointFit
+from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.judgement import NOTHING, SURPRISE, Judgement, judge
 from crosscheck.calibration.linearised import free_of
 from crosscheck.calibration.not_noise import is_not_noise
@@ -29,6 +28,9 @@ from crosscheck.calibration.probability import (
 from crosscheck.calibration.refits import ROUNDS, Found, compare_sets
 from crosscheck.calibration.sets import Names
 from crosscheck.calibration.stages import Progress
+from crosscheck.calibration.unknown import unknown_beside
+from crosscheck.calibration.varying import Varying
+from crosscheck.fit.nothing import distance_from_nothing, is_nothing
 from crosscheck.fit.possible import can_be, hardly_happens
 from crosscheck.fit.problem import KINDS, Problem, Rms, kinds_read
 from crosscheck.fit.reasons import DiagnosisVerdict
@@ -53,10 +55,12 @@ class SetSearch:
         calibration: the fit of all effects at once. found: the sets that were compared.
         catalogue: all effects with their starting values.
         classes: posterior probabilities.
-        field_odds: ln odds of something smooth and unknown, beside all effects or in place of some.
+        field_odds: ln odds of something unknown that varies, beside all effects or in place of
+            some.
         shown: by kind of reading, the size from which on that would have shown; None if unsaid.
         judgement: the verdict.
         in_place: something unknown in place of some members of the best set.
+        varies: what something unknown beside all effects changes in time; None if it does not.
     """
 
     calibration: Calibration
@@ -67,6 +71,7 @@ class SetSearch:
     shown: Rms | None
     judgement: Judgement
     in_place: Imitated
+    varies: Varying | None = None
 
 
 def search_sets(
@@ -91,9 +96,9 @@ def search_sets(
     setting, joint = whole.setting, whole.joint
     known = [k.name for k in kinds_read(problem) if getattr(stated, k.sigma) is not None]
     all_stated = len(known) == len(kinds_read(problem))
-    odds = log_odds(setting, joint, all_stated)
+    unknown = unknown_beside(setting, joint, all_stated)
     surprise = float(np.max(whole.held_out.surprise, initial=0.0))
-    smooth = odds > UNKNOWN or surprise > SURPRISE
+    odds, smooth = unknown.odds, unknown.is_there or surprise > SURPRISE
     catalogue = _catalogue(problem, terms, whole)
     found, not_noise, without = _compared(
         whole, catalogue, evaluate(problem, terms, setting.factor), progress, given, known, smooth
@@ -103,10 +108,11 @@ def search_sets(
     best = found.best
     in_place = field_in_place(setting, best.joint, best.widths, found.scores)
     classes = _classes(found, best.names, sizes)
-    beside = log_odds(setting, best.joint, all_stated)
+    beside = unknown_beside(setting, best.joint, all_stated).odds
     said = judge(
         found, classes, odds, surprise, not_noise, _doubted(found), beside, in_place, without
     )
+    said = said.without(nothing_by_themselves(setting, found, said))
     listed = found.always | set(said.sure)
     alone = found.refit(listed) if said.verdict is DiagnosisVerdict.EFFECTS_FOUND else None
     if alone is not None and listed != best.names:
@@ -125,7 +131,9 @@ def search_sets(
     shown = None if said.more or said.imitated else detectable_size(
         setting, joint, joint.jacobian * free, joint.width * free
     )  # fmt: skip
-    return SetSearch(whole, found, catalogue, classes, odds, shown, said, in_place)
+    return SetSearch(
+        whole, found, catalogue, classes, odds, shown, said, in_place, unknown.likeliest
+    )
 
 
 def _compared(
@@ -222,6 +230,28 @@ def with_equivalents(
                 if swapped is not None and can_be(robot, swapped.joint.terms, stood):
                     out[swapped.names] = swapped.score
     return out
+
+
+def nothing_by_themselves(setting: Setting, found: Found, said: Judgement) -> Names:
+    """Sure effects whose values are within one standard error of nothing, the nearest first.
+
+    That one of a class is there may be probable because all of its members help a little, each in
+    its own way; what its values cannot tell from nothing is no finding.
+    """
+    sure, none = set(said.sure), set[str]()
+    while sure:
+        is_model = said.verdict is DiagnosisVerdict.EFFECTS_FOUND
+        fit = found.refit(found.always | sure) if is_model else found.best
+        if fit is None:
+            break
+        terms, spread = fit.joint.terms, covariance(setting, fit.joint)
+        far = {n: distance_from_nothing(terms, spread, terms.own(n)) for n in sorted(sure)}
+        near = [name for name, both in far.items() if is_nothing(*both)]
+        if not near:
+            break
+        nearest = min(near, key=lambda name: far[name][0])
+        sure, none = sure - {nearest}, none | {nearest}
+    return frozenset(none)
 
 
 def _doubted(found: Found) -> Names:

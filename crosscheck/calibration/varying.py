@@ -4,12 +4,15 @@ A hose pulls differently at each place. A few numbers describe such a force, but
 imitate what it does to all readings. So besides cubics of the readings, the candidates are a force
 and cable lengths that change linearly with the position, a spring, which pulls towards a point, and
 lengths that are a cubic of how far each winch has turned. Of a lens a few numbers describe all as
-well. A tracker that moves shows over the session, wherever the platform is.
+well. A tracker that moves shows over the session, wherever the platform is; so do exit points that
+move and cables that grow, but their platform moves as they make it. And readings that are taken too
+early lag behind the last step.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from enum import StrEnum
 
 import numpy as np
@@ -53,6 +56,25 @@ class Varying(StrEnum):
         "read a stationary target before, between and after the runs, and measure the first poses "
         "again at the end",
     )
+    LAG = (
+        "readings that lag behind the last step, as if the platform were still on its way",
+        "wait longer after each step before reading, and come to some poses from the other side",
+    )
+    EXIT_POINTS_MOVE = (
+        "exit points that move over the session",
+        "survey the exit points before and after the runs, and measure the first poses again at "
+        "the end",
+    )
+    LENGTHS_DRIFT = (
+        "cable lengths that change over the session",
+        "mark the cables where they leave the winches, see whether the marks come back to their "
+        "places, and measure the first poses again at the end",
+    )
+    FORCE_DRIFTS = (
+        "a force on the platform that changes over the session",
+        "weigh the platform before and after the runs, and measure the first poses again at the "
+        "end",
+    )
     FORCE = "a force on the platform that changes with its position", _FREE
     SPRING = "something that pulls the platform like a spring", _FREE
     LENGTHS = (
@@ -86,7 +108,19 @@ def varying(setting: Setting, joint: JointFit) -> list[tuple[Varying, Array]]:
     quadratic, and a prior as wide for all coefficients would cost it more than it explains. In all
     readings together whatever is known is smooth as well, so that this tells nothing there.
     """
-    parts = (_of_readings, _of_one_kind, _of_lens, _of_tracker, _of_robot)
+    parts = (_of_readings, _of_one_kind, _of_lens, _of_tracker, _of_steps, _of_robot, _of_drifts)
+    every = (one for part in parts for one in part(setting, joint))
+    return [(what, columns) for what, columns in every if np.any(columns)]
+
+
+def in_all_readings(setting: Setting, joint: JointFit) -> Array:
+    """(N, k) a cubic in the position for each channel."""
+    return field_of(setting.problem, joint.state.prediction.pose[:, :3])
+
+
+def varying_in_time(setting: Setting, joint: JointFit) -> list[tuple[Varying, Array]]:
+    """The candidates of :func:`varying` that depend on when a row was read, or on that before."""
+    parts = (_of_tracker, _of_steps, _of_drifts)
     every = (one for part in parts for one in part(setting, joint))
     return [(what, columns) for what, columns in every if np.any(columns)]
 
@@ -157,6 +191,28 @@ def _session(setting: Setting) -> Array:
     if clock is not None and np.all(np.diff(clock) >= 0.0) and np.ptp(clock) > 0.0:
         return clock
     return np.arange(data.n_rows, dtype=float)
+
+
+def _of_steps(setting: Setting, joint: JointFit) -> Iterator[tuple[Varying, Array]]:
+    """The pose of each row on its way from that of the row before in its run."""
+    problem, state = setting.problem, joint.state
+    run, here = problem.data.run_index, state.prediction.readings
+    before = np.maximum(np.arange(len(run)) - 1, 0)
+    before[run[before] != run] += 1
+    there = replace(here, position=here.position[before], quat_wxyz=here.quat_wxyz[before])
+    step = problem.residuals(there) - problem.residuals(here)
+    yield Varying.LAG, _scaled(problem.whiten(state.factor, step)[:, None])
+
+
+def _of_drifts(setting: Setting, joint: JointFit) -> Iterator[tuple[Varying, Array]]:
+    """Changes of the robot that are quadratic in the time."""
+    time = monomials(_session(setting)[:, None], 2, SMOOTH)[setting.problem.row_of, 1:]
+    for what, name in (
+        (Varying.EXIT_POINTS_MOVE, "exit_point_error"),
+        (Varying.LENGTHS_DRIFT, "cable_length_offset"),
+        (Varying.FORCE_DRIFTS, "external_wrench"),
+    ):
+        yield what, _scaled(_products(_rates(setting, joint, name), time))
 
 
 def _of_robot(setting: Setting, joint: JointFit) -> Iterator[tuple[Varying, Array]]:

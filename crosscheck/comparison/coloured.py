@@ -2,8 +2,8 @@
 
 The error of a tracker is smooth in time. Size and autocorrelation of the noise maximise the
 likelihood, and residuals are whitened accordingly. What is left is noise if its size is plausible,
-outliers do not lie side by side, neighbours are no longer correlated, and a smooth field over the
-workspace explains nothing.
+outliers do not lie side by side, neighbours are no longer correlated, and neither a smooth field
+over the workspace nor anything that varies in time explains anything.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.calibration.colour import WHITE, chain_of
-from crosscheck.calibration.field import UNKNOWN, log_odds
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.not_noise import is_not_noise
 from crosscheck.calibration.restricted import estimate
 from crosscheck.calibration.robust import outliers, row_weights
+from crosscheck.calibration.unknown import unknown_beside
 from crosscheck.fit.problem import Problem, kinds_stated
 from crosscheck.fit.state import State
 from seecr.counted import counted
@@ -74,7 +74,7 @@ def coloured_noise(problem: Problem, state: State, factor: Array) -> Coloured | 
     larger = any(scale[name] > _LARGER for name in stated)
     if larger or is_not_noise(setting, left, stated):
         return None
-    if log_odds(setting, left, len(stated) == len(scale)) > UNKNOWN:
+    if unknown_beside(setting, left, len(stated) == len(scale)).is_there:
         return None
     return Coloured(
         scale, rho, int(outliers(setting.chain, weight, problem.data.n_rows).sum())

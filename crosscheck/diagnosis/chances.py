@@ -10,6 +10,7 @@ from typing import Any
 from crosscheck.calibration.all_effects import JointErrors
 from crosscheck.calibration.imitated import Imitated
 from crosscheck.calibration.search import SetSearch
+from crosscheck.calibration.varying import Varying
 from crosscheck.fit.problem import Rms
 from crosscheck.fit.words import rms_words
 
@@ -39,6 +40,7 @@ class Chances:
         imitated: something smooth and unknown that some of the effects found imitate.
         doubt: something smooth and unknown that is less likely than the effects it could replace,
             but that the data do not exclude.
+        varies: what something unknown beside all effects changes in time; None if it does not.
     """
 
     effect: dict[str, float]
@@ -49,6 +51,14 @@ class Chances:
     further: Mapping[str, float] = dataclasses.field(default_factory=dict)
     imitated: Imitated | None = None
     doubt: Imitated | None = None
+    varies: Varying | None = None
+
+    @property
+    def seen(self) -> tuple[Varying, ...]:
+        """What something unknown may change, the likeliest first; empty if that is not known."""
+        if self.imitated is not None:
+            return self.imitated.seen
+        return () if self.varies is None else (self.varies,)
 
     @property
     def words(self) -> str:
@@ -80,6 +90,8 @@ class Chances:
             unknown |= {
                 "instead_of": sorted(self.imitated.replaced), **_seen(self.imitated),
             }  # fmt: skip
+        elif self.varies is not None:
+            unknown["seen_in"] = self.varies
         if self.doubt is not None:
             unknown["not_excluded"] = {
                 "probability": self.doubt.probability,
@@ -111,5 +123,5 @@ def chances_of(sought: SetSearch) -> Chances:
     return Chances(
         classes.effect, tuple(pairs), sought.field_odds, sought.calibration.together, sought.shown,
         classes.further, sought.judgement.imitated,
-        in_place if in_place.is_doubt else None,
+        in_place if in_place.is_doubt else None, sought.varies,
     )  # fmt: skip

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from crosscheck.calibration.alternatives import alternatives, shared
 from crosscheck.calibration.equals import EQUAL
 from crosscheck.calibration.exact import Refit
@@ -124,9 +126,15 @@ def _rival(sought: SetSearch, own: Refit, swapped: Refit, other: str) -> Rival:
 
 
 def _floor(sought: SetSearch) -> Rms:
-    """The rms errors of the noise at its estimated size."""
+    """The rms errors of the noise at its estimated size.
+
+    Beside something unknown it is no larger than assumed: the estimate takes what is unknown for
+    noise, which would then never be large enough to matter.
+    """
     floor = noise_floor(sought.calibration.setting.problem, sought.calibration.joint.state)
     scale = sought.found.best.joint.colour.scale
+    if sought.judgement.verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
+        scale = np.minimum(scale, 1.0)
     return {
         kind.key: None if floor[kind.key] is None else float(scale[k]) * (floor[kind.key] or 0.0)
         for k, kind in enumerate(KINDS)

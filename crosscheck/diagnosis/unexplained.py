@@ -41,7 +41,7 @@ def unexplained(found: Search, chances: Chances, notes: Sequence[str]) -> Diagno
     found = shown if missing else found
     return diagnosis_of(
         DiagnosisVerdict.UNKNOWN_EFFECT,
-        _sentence(missing, found.tried),
+        _sentence(missing, found.tried, chances),
         missing,
         found,
         before=rms_by_kind(found.problem, found.steps[0].fit.state.raw),
@@ -93,11 +93,12 @@ def _is_warranted(found: Search, name: str) -> bool:
     return beyond_smooth(found.problem, before.fit.state, step.fit.state, 0.0)
 
 
-def _sentence(missing: Sequence[MissingEffect], tried: int) -> str:
+def _sentence(missing: Sequence[MissingEffect], tried: int, chances: Chances) -> str:
+    like = f" It looks like {' or '.join(chances.seen)}." if chances.seen else ""
     if not missing:
-        return f"Structure remains that {none_of(tried)}: an unknown effect is missing."
+        return f"Structure remains that {none_of(tried)}: an unknown effect is missing.{like}"
     left = "structure remains that no known effect explains"
-    return and_what_is_left(words_of(missing), left, tried)
+    return and_what_is_left(words_of(missing), left, tried) + like
 
 
 def where_of(found: Search) -> tuple[Association, ...]:

@@ -10,9 +10,10 @@ from made_data import COGIRO, SIGMA, measured
 
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.detectable import detectable_size
-from crosscheck.calibration.field import UNKNOWN, field_of, log_odds
+from crosscheck.calibration.field import field_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.priors import widths_of
+from crosscheck.calibration.unknown import unknown_beside
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
 from seecr.description.mjcf import load_robot
@@ -53,7 +54,7 @@ def test_nine_in_ten_fields_of_that_size_are_seen_and_few_of_a_third() -> None:
             drawn *= part * shown / SIGMA.position_m / np.sqrt(np.mean(drawn**2))
             white = random.standard_normal(len(drawn)) + drawn
             there = replace(joint, state=replace(joint.state, white=white))
-            out += log_odds(setting, there) > UNKNOWN
+            out += unknown_beside(setting, there).is_there
         return out / DRAWN
 
     assert seen(1.0) > 0.7

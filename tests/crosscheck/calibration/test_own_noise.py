@@ -15,6 +15,7 @@ from crosscheck.calibration.colour import Colour
 from crosscheck.calibration.own_noise import OwnNoise
 from crosscheck.calibration.refits import Found
 from crosscheck.calibration.search import SetSearch, search_sets
+from crosscheck.calibration.unknown import UnknownOdds
 from crosscheck.fit.prepare import prepare
 from crosscheck.given import considered
 from crosscheck.measurements.data import Measurements, Sigma
@@ -52,7 +53,9 @@ def test_noise_that_all_effects_followed_is_found_again(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(search, "fit_all_effects", followed)
     monkeypatch.setattr(search, "is_not_noise", lambda _setting, _joint, _stated: False)
-    monkeypatch.setattr(search, "log_odds", lambda _setting, _joint, _stated: -5.0)
+    monkeypatch.setattr(
+        search, "unknown_beside", lambda _setting, _joint, _stated: UnknownOdds(-5.0)
+    )
     data = correlated()
     found = sought(data)
     assert found.found.best.names == {"pulley_radius"}

@@ -13,7 +13,8 @@ from made_data import COGIRO, SIGMA, measured, term
 from crosscheck.calibration import refits, search
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.judgement import Judgement, judge
-from crosscheck.calibration.search import SetSearch, search_sets
+from crosscheck.calibration.search import SetSearch, nothing_by_themselves, search_sets
+from crosscheck.calibration.unknown import UnknownOdds
 from crosscheck.diagnosis.explained import MORE, explained
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.fit.prepare import prepare
@@ -109,11 +110,11 @@ def test_what_a_set_leaves_is_asked_of_a_field(monkeypatch: pytest.MonkeyPatch) 
     """Of the best set by itself, and the answer is told."""
     asked: list[JointFit] = []
 
-    def odds(_setting: Setting, joint: JointFit, stated: bool) -> float:
+    def odds(_setting: Setting, joint: JointFit, stated: bool) -> UnknownOdds:
         asked.append(joint)
-        return 8.0 if len(asked) > 1 else 1.0
+        return UnknownOdds(8.0 if len(asked) > 1 else 1.0)
 
-    monkeypatch.setattr(search, "log_odds", odds)
+    monkeypatch.setattr(search, "unknown_beside", odds)
     found = sought([term(ROBOT, "pulley_radius", radius_m=0.006)])
     assert [joint.terms.names for joint in asked[1:]] == [found.found.best.joint.terms.names]
     assert found.judgement.verdict is DiagnosisVerdict.MANY_EFFECTS and found.judgement.more
@@ -123,6 +124,22 @@ def test_what_a_set_leaves_is_asked_of_a_field(monkeypatch: pytest.MonkeyPatch) 
     assert "most probably" not in explained(replace(found, judgement=none), []).sentence
     few = replace(none, more=False)
     assert "most probably it is pulley" in explained(replace(found, judgement=few), []).sentence
+
+
+def test_what_is_within_its_error_of_nothing_is_not_sure() -> None:
+    """However probable that something of its class is missing; and the others stay."""
+    found = sought([term(ROBOT, "pulley_radius", radius_m=0.006)])
+    setting = found.calibration.setting
+    both = Judgement(DiagnosisVerdict.EFFECTS_FOUND, ("stiffness", "pulley_radius"), 0.0)
+    assert nothing_by_themselves(setting, found.found, both) == {"stiffness"}
+    one = both.without(frozenset({"stiffness"}))
+    assert one.sure == ("pulley_radius",) and one.verdict is DiagnosisVerdict.EFFECTS_FOUND
+    assert nothing_by_themselves(setting, found.found, one) == frozenset()
+    assert one.without(frozenset()) is one
+    # nothing that is sure is no finding
+    none = one.without(frozenset({"pulley_radius"}))
+    assert none.sure == () and none.verdict is DiagnosisVerdict.MANY_EFFECTS
+    assert nothing_by_themselves(setting, found.found, none) == frozenset()
 
 
 def assert_a_model_by_itself(found: SetSearch) -> None:

@@ -145,7 +145,11 @@ def test_a_lens_is_said_with_few_numbers(fit: tuple[Setting, JointFit]) -> None:
     """Wherever its middle is, if the picture widens little from there to here."""
     setting, joint = fit
     place = joint.state.prediction.pose[:, :3]
-    ((what, few),) = (one for one in varying(setting, joint) if one[1].shape[1] == 16)
+    ((what, few),) = (
+        one
+        for one in varying(setting, joint)
+        if one[1].shape[1] == 16 and one[0] is Varying.POSITION
+    )
     assert what is Varying.POSITION
     problem = setting.problem
     for aside in ([0.0, 0.0, 0.0], [0.7, -0.2, 1.5]):
