@@ -209,11 +209,24 @@ def scored(
     gram = own_gram(linear, joint)
     # what moves readings at this fit need not have been in the linear model of the search
     inside = {n: widths.get(n, 1.0) for n in gram.names}
-    better = best_widths(gram, inside)
+    better = widths_near(gram, inside, joint.z)
     share = sum(log_shares(joint, linear).values()) + log_absent(setting, joint, linear, better)
     score = averaged(gram, better) + share + scores.log_prior(names)
     score -= 0.5 * (joint.state.log_det + left_to_gain(linear, joint.z))
     return Refit(names, joint, widths | better, score)
+
+
+def widths_near(gram: Gram, fitted: dict[str, float], z: Array) -> dict[str, float]:
+    """The widths that maximise the evidence; the fitted ones if the optimum with these is far off.
+
+    The linear model holds about the fit. Other widths may promise much for values far from there:
+    without its mass and with cables that do not pull, no force would be needed on a platform.
+
+    Args:
+        gram: normal equations about a fit. fitted: its widths. z: (p,) its values.
+    """
+    better = best_widths(gram, fitted)
+    return fitted if gram.solved(better).left_to_gain(z) > LOCAL_MINIMUM else better
 
 
 def own_gram(linear: Linear, joint: JointFit) -> Gram:

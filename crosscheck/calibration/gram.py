@@ -119,6 +119,16 @@ class Solved:
         spread = float(volume) - 2.0 * float(np.sum(np.log(self.width)))
         return -0.5 * (self.gram.power - gained) + 0.5 * spread + self._one_sided
 
+    def left_to_gain(self, z: Array) -> float:
+        """How much ln posterior is lost at other values z than the most probable ones.
+
+        Args:
+            z: values of all columns.
+        """
+        away = self.values - z[self.columns]
+        normal = self.gram.normal[np.ix_(self.columns, self.columns)]
+        return 0.5 * float(away @ normal @ away + np.sum((away / self.width) ** 2))
+
     @property
     def _one_sided(self) -> float:
         """ln of the change of Z for parameters that cannot be negative, each treated by itself."""

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import integrate, special, stats
 
+from crosscheck.calibration.exact import widths_near
 from crosscheck.calibration.gram import (
     ColumnGroup,
     Gram,
@@ -181,3 +182,44 @@ def test_the_best_widths_are_the_best_of_all() -> None:
 def test_a_price_keeps_a_width_that_is_nearly_as_good() -> None:
     gram = toy(3)
     assert best_widths(gram, {"e1": 1.0}, price=1e6) == {"e1": 1.0}
+
+
+def test_widths_are_not_chosen_for_what_a_linear_model_promises_far_from_the_fit() -> None:
+    # the first parameter of a group does what another effect does, if that is a hundred times
+    # larger than it was fitted: by then no derivative holds any more
+    rng = np.random.default_rng(5)
+    one, own = rng.normal(size=200), rng.normal(size=(200, 4))
+    x = np.column_stack([one, own, 0.3 * one])
+    groups = {
+        "group": ColumnGroup(np.arange(5), WIDTHS),
+        "imitates": ColumnGroup(np.array([5]), WIDTHS),
+    }
+    gram = gram_of(x, 3.0 * one, groups)
+    fitted = {"group": 1.0, "imitates": 0.1}
+    z = np.array([3.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    promised = best_widths(gram, fitted)
+    assert promised == {"group": 0.1, "imitates": 10.0}
+    assert averaged(gram, promised) > averaged(gram, fitted) + 2.0
+    assert widths_near(gram, fitted, z) == fitted
+
+
+def test_widths_are_chosen_if_the_values_stay_where_they_were_fitted() -> None:
+    gram = toy()
+    fitted = dict.fromkeys(gram.names, 10.0)
+    solved = gram.solved(fitted)
+    assert solved.left_to_gain(solved.values) == pytest.approx(0.0)
+    assert widths_near(gram, fitted, solved.values) == best_widths(gram, fitted) != fitted
+
+
+def test_what_is_left_to_gain_is_the_ln_posterior_lost_elsewhere() -> None:
+    gram, chosen = toy(), {"e1": 0.3, "e4": 3.0}
+    solved = gram.solved(chosen)
+    z = np.random.default_rng(2).normal(size=15)
+
+    def log_posterior(values: np.ndarray) -> float:
+        normal = gram.normal[np.ix_(solved.columns, solved.columns)]
+        away = gram.gradient[solved.columns] @ values - 0.5 * values @ normal @ values
+        return float(away - 0.5 * np.sum((values / solved.width) ** 2))
+
+    lost = log_posterior(solved.values) - log_posterior(z[solved.columns])
+    assert solved.left_to_gain(z) == pytest.approx(lost)
