@@ -57,6 +57,7 @@ class Judgement:
         doubted: members of the best set that are implausibly large.
         more: whether a smooth field explains something beside the best set.
         imitated: something unknown that members of the best set imitate; None if there is nothing.
+        replaceable: members that are probable, but others together explain as much.
     """
 
     verdict: DiagnosisVerdict
@@ -65,6 +66,7 @@ class Judgement:
     doubted: Names = NONE
     more: bool = False
     imitated: Imitated | None = None
+    replaceable: Names = NONE
 
     def without(self, some: Names) -> Judgement:
         """The same with some effects that are not sure after all; a model of none is no finding."""
@@ -74,6 +76,10 @@ class Judgement:
         if not sure and verdict is DiagnosisVerdict.EFFECTS_FOUND:
             verdict = DiagnosisVerdict.MANY_EFFECTS
         return replace(self, sure=sure, verdict=verdict)
+
+    def replacing(self, some: Names) -> Judgement:
+        """The same, but effects that others together can replace are not sure."""
+        return replace(self.without(some), replaceable=some)
 
 
 def judge(

@@ -12,6 +12,7 @@ from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.colour import Colour
 from crosscheck.calibration.detectable import detectable_size
 from crosscheck.calibration.equals import parameters_counted
+from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.imitated import Imitated, field_in_place
 from crosscheck.calibration.joining import layouts
 from crosscheck.calibration.joint import JointFit, Setting
@@ -26,6 +27,7 @@ from crosscheck.calibration.probability import (
     probabilities,
 )
 from crosscheck.calibration.refits import ROUNDS, Found, compare_sets
+from crosscheck.calibration.replaceable import Replaced
 from crosscheck.calibration.sets import Names
 from crosscheck.calibration.stages import Progress
 from crosscheck.calibration.unknown import unknown_beside
@@ -113,6 +115,15 @@ def search_sets(
         found, classes, odds, surprise, not_noise, _doubted(found), beside, in_place, without
     )
     said = said.without(nothing_by_themselves(setting, found, said))
+    if said.verdict is DiagnosisVerdict.MANY_EFFECTS and said.sure:
+
+        def possible(refit: Refit) -> bool:
+            return can_be(problem.robot, refit.joint.terms, terms)
+
+        others = Replaced(found, sizes.__getitem__, possible)
+        others.try_without(said.sure, classes)
+        classes = _classes(found, best.names, sizes, others.scores)
+        said = said.replacing(frozenset(others.replaceable))
     listed = found.always | set(said.sure)
     alone = found.refit(listed) if said.verdict is DiagnosisVerdict.EFFECTS_FOUND else None
     if alone is not None and listed != best.names:

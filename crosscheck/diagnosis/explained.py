@@ -71,7 +71,7 @@ def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
         search,
         before=sought.calibration.before,
         floor=_floor(sought),
-        candidates=_not_listed(search, chances, verdict, frozenset().union(*some)),
+        candidates=_not_listed(search, chances, sought.judgement, frozenset().union(*some)),
         notes=(*notes, *_noise_notes(sought), *_size_notes(sought), *([MORE] * more)),
         chances=chances,
         where=where_of(search) if imitated else (),
@@ -213,11 +213,12 @@ def _sentence(
 
 
 def _not_listed(
-    search: Search, chances: Chances, verdict: DiagnosisVerdict, undecided: Names
+    search: Search, chances: Chances, said: Judgement, undecided: Names
 ) -> list[NotListed]:
     """All effects that are not listed, the most probable first.
 
     Args:
+        said: the verdict, and the effects that others can replace.
         undecided: members of sets of which the data leave open which it is.
     """
     listed = search.found
@@ -227,11 +228,13 @@ def _not_listed(
         alike = _alike(search, chances, c)
         if alike is not None:
             return alike
-        if listed and verdict is not DiagnosisVerdict.MANY_EFFECTS:
+        if listed and said.verdict is not DiagnosisVerdict.MANY_EFFECTS:
             why = Why.CARRIES_LITTLE if p > PROBABLE else Why.NOT_NEEDED_BESIDE
             return Reason(why, p=p, by=listed)
         if p <= PROBABLE:
             return Reason(Why.IMPROBABLE, p=p)
+        if c.name in said.replaceable:
+            return Reason(Why.REPLACEABLE, p=p)
         is_small = listed and c.name not in undecided
         return Reason(Why.DOES_LITTLE if is_small else Why.NOT_SURE, p=p)
 

@@ -51,6 +51,7 @@ class Why(Enum):
         "probable ({chance}) but not certain: it does little beside the others that are probable"
     )
     NOT_SURE = "probable ({chance}) but not certain"
+    REPLACEABLE = "probable ({chance}) but not certain: others together explain as much without it"
     IMPROBABLE = "explains too little (probability {chance})"
     IMITATES = "not certain: its {parameters} can imitate much of the unexplained error"
     MAY_IMITATE = "not certain: more probably it imitates an unknown effect"

@@ -221,6 +221,11 @@ def assert_shown_as_many(found: SetSearch) -> None:
     assert pulley.why_not.why is Why.DOES_LITTLE
     assert "does little beside the others that are probable" in pulley.why_not.words
     assert pulley.why_not.p > 0.95
+    other = replace(many, replaceable=frozenset({"pulley_radius"}))
+    rows = explained(replace(found, judgement=other), []).candidates
+    (pulley,) = (one for one in rows if one.effect == "pulley_radius")
+    assert pulley.why_not.why is Why.REPLACEABLE
+    assert "others together explain as much without it" in pulley.why_not.words
     assert any("crosscheck calibrate" in text for text in said.measure_next)
 
 
