@@ -11,7 +11,6 @@ import pytest
 from made_data import COGIRO, SIGMA, measured, term
 from scipy import special, stats
 
-from crosscheck.calibration import varying as what_varies
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN, field_of
 from crosscheck.calibration.gram import ColumnGroup, gram_of
@@ -21,7 +20,7 @@ from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.probability import Classes
 from crosscheck.calibration.search import search_sets
 from crosscheck.calibration.sets import Scores, log_prior
-from crosscheck.calibration.varying import Varying, varying
+from crosscheck.calibration.varying import Varying, anywhere, varying
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.fit.evidence import WIDTHS
 from crosscheck.fit.prepare import prepare
@@ -314,9 +313,9 @@ def test_a_lens_earns_more_with_smaller_coefficients_of_higher_degrees(
 ) -> None:
     setting, joint = with_a_lens()
     round_too = evidence(setting, joint)
-    monkeypatch.setattr(what_varies, "_of_lens", lambda *_: iter(()))
+    monkeypatch.setattr(anywhere, "_of_lens", lambda *_: iter(()))
     found = evidence(setting, joint)
     # what is known to be round has fewer still
     assert round_too > found + 5.0
-    monkeypatch.setattr(what_varies, "SMOOTH", 1.0)
+    monkeypatch.setattr(anywhere, "SMOOTH", 1.0)
     assert found > evidence(setting, joint) + 10.0

@@ -11,7 +11,7 @@ from made_data import COGIRO, measured, term
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.priors import widths_of
-from crosscheck.calibration.varying import SMOOTH, Varying, varying
+from crosscheck.calibration.varying import SMOOTH, Varying, varying, varying_in_time
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
 from seecr.commands.loads import Loads
@@ -110,9 +110,50 @@ def test_a_tracker_that_moves_shows_over_the_session(fit: tuple[Setting, JointFi
     assert np.array_equal(again[Varying.SESSION], rows[Varying.SESSION])
 
 
+def test_what_changes_from_run_to_run_is_an_offset_of_each() -> None:
+    robot = load_robot(COGIRO)
+    problem = prepare(robot, measured(robot, points=6), Terms()).problem
+    setting = Setting(problem, problem.noise(problem.experiment.predict(())), chain_of(problem))
+    terms = Terms([term(robot, "tracker_scale", factor=1.0)])
+    joint = settle(setting, evaluate(problem, terms, setting.factor), widths_of(terms), WHITE)
+    run = problem.data.run_index
+    kinds = dict(varying_in_time(setting, joint))
+    offsets = np.random.default_rng(0).standard_normal((run.max() + 1, robot.n_cables))
+    signal = lengthened(setting, joint, LITTLE * offsets[run])
+    assert unexplained(kinds[Varying.LENGTHS_BY_RUN], signal) < 1e-3
+    assert unexplained(kinds[Varying.POSITION_BY_RUN], signal) > 0.1
+    read = np.zeros(problem.measured.shape)
+    read[:, :3] = 1e-3 * offsets[run][:, :3]
+    signal = problem.whiten(setting.factor, read)
+    assert unexplained(kinds[Varying.POSITION_BY_RUN], signal) < 1e-9
+    assert unexplained(kinds[Varying.LENGTHS_BY_RUN], signal) > 0.1
+
+
+def test_exit_points_that_move_move_the_platform_as_they_do_at_each_place(
+    fit: tuple[Setting, JointFit],
+) -> None:
+    setting, joint = fit
+    problem, effects = setting.problem, joint.terms.effects
+    assert problem.data.t_s is not None
+    time = problem.data.t_s / problem.data.t_s.max()
+    there = term(ROBOT, "exit_point_error", **{"error_2_z_m": LITTLE}).effect()
+    far = problem.experiment.predict([*effects, there])
+    here = problem.experiment.predict(effects)
+    # so little that a row's reading goes with its own part of the way
+    full = problem.residuals(here.readings) - problem.residuals(far.readings)
+    signal = problem.whiten(setting.factor, full * time[:, None])
+    kinds = rough(setting, joint)
+    # beside exit points that are where they are all the time
+    always = problem.whiten(setting.factor, full)[:, None]
+    assert unexplained(np.hstack([kinds[Varying.EXIT_POINTS_MOVE], always]), signal) < 1e-3
+    assert unexplained(kinds[Varying.SESSION], signal) > 0.05
+
+
 def test_all_are_in_units_of_the_noise(fit: tuple[Setting, JointFit]) -> None:
     kinds = rough(*fit)
-    assert set(kinds) == set(Varying) - {Varying.TENSION}
+    # its runs are too short to have offsets of their own
+    by_run = {Varying.POSITION_BY_RUN, Varying.LENGTHS_BY_RUN}
+    assert set(kinds) == set(Varying) - {Varying.TENSION} - by_run
     for columns in kinds.values():
         size = np.sqrt(np.mean(np.sum(columns**2, axis=1)))
         assert 0.5 < size < 5.0
