@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from crosscheck.calibration.all_effects import PLAIN, Calibration, covariance, f
 from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.colour import Colour
 from crosscheck.calibration.detectable import detectable_size
-from crosscheck.calibration.equals import parameters_counted
+from crosscheck.calibration.equals import EQUAL, parameters_counted
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.imitated import Imitated, field_in_place
 from crosscheck.calibration.joining import layouts
@@ -247,22 +247,30 @@ def nothing_by_themselves(setting: Setting, found: Found, said: Judgement) -> Na
     """Sure effects whose values are within one standard error of nothing, the nearest first.
 
     That one of a class is there may be probable because all of its members help a little, each in
-    its own way; what its values cannot tell from nothing is no finding.
+    its own way; what its values cannot tell from nothing is no finding. Where the set without it
+    explains much less, its errors are those of a linear model that does not hold.
     """
     sure, none = set(said.sure), set[str]()
+    is_model = said.verdict is DiagnosisVerdict.EFFECTS_FOUND
     while sure:
-        is_model = said.verdict is DiagnosisVerdict.EFFECTS_FOUND
-        fit = found.refit(found.always | sure) if is_model else found.best
-        if fit is None:
+        names = found.always | sure if is_model else found.best.names
+        fit = found.refit(names)
+        near = {} if fit is None else _near_nothing(setting, fit, sure)
+        for name in sorted(near, key=lambda n: near[n]):
+            rest = found.refit(names - {name})
+            if fit is not None and rest is not None and rest.score > fit.score - EQUAL:
+                sure, none = sure - {name}, none | {name}
+                break
+        else:
             break
-        terms, spread = fit.joint.terms, covariance(setting, fit.joint)
-        far = {n: distance_from_nothing(terms, spread, terms.own(n)) for n in sorted(sure)}
-        near = [name for name, both in far.items() if is_nothing(*both)]
-        if not near:
-            break
-        nearest = min(near, key=lambda name: far[name][0])
-        sure, none = sure - {nearest}, none | {nearest}
     return frozenset(none)
+
+
+def _near_nothing(setting: Setting, fit: Refit, some: Iterable[str]) -> dict[str, float]:
+    """Those of some effects whose values are within one standard error of nothing, and how far."""
+    terms, spread = fit.joint.terms, covariance(setting, fit.joint)
+    far = {name: distance_from_nothing(terms, spread, terms.own(name)) for name in sorted(some)}
+    return {name: both[0] for name, both in far.items() if is_nothing(*both)}
 
 
 def _doubted(found: Found) -> Names:
