@@ -23,7 +23,12 @@ from crosscheck.measurements.together import together
 from seecr.arguments import finite
 from seecr.columns.known import POSITION, Columns, know_columns
 from seecr.columns.loads import known_loads
-from seecr.columns.poses import command_lengths, command_poses, measured_orientation
+from seecr.columns.poses import (
+    command_lengths,
+    command_poses,
+    measured_orientation,
+    wanted_poses,
+)
 from seecr.columns.table import read_table
 from seecr.columns.times import began, runs, temperatures, times
 from seecr.commands.data import Commands
@@ -174,6 +179,7 @@ def _load(columns: Columns, robot: Robot, sigma_path: str | Path | None) -> Meas
         command_pose=pose,
         command_lengths=lengths,
         told=beside.told and lengths is not None,
+        wanted=wanted_poses(columns, robot),
         position=position,
         quat_wxyz=quat,
         angles_rad=angles,

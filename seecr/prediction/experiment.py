@@ -211,6 +211,11 @@ class Experiment:
         kept = {"pose": pose}
         return Prediction(setup, tables, found, readings, False, sensors, kept=kept)
 
+    def readings_at(self, effects: Sequence[Effect], poses: Array) -> Readings:
+        """What the sensors would report if the platform were at poses (n, 7); no tensions."""
+        none = np.zeros((len(poses), self.robot.n_cables))
+        return read(effects, self.setup(effects), poses, none)
+
     def from_other_starts(
         self, effects: Sequence[Effect], at: Prediction, rows: NDArray[np.intp], poses: Array
     ) -> Prediction:
