@@ -25,7 +25,7 @@ from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics import batch
 from seecr.statics.led import led
 from seecr.statics.solution import Solution, certify
-from seecr.statics.starts import Commanded, commands_from, start_of
+from seecr.statics.starts import Commanded, answered, commands_from, start_of
 from seecr.statics.tables import Tables, assemble, relengthened, take
 
 if TYPE_CHECKING:
@@ -329,13 +329,14 @@ def predict(
         a :class:`Prediction`; check ``solved`` before using a row.
 
     Raises:
-        InputError: poses, robot or effects of a wrong type or shape.
+        InputError: poses, robot or effects of a wrong type or shape, or a row without lengths.
 
     Example:
         ``seecr.predict(robot, poses, [seecr.Term.of(robot, "pulley_radius", radius_m=0.01)])``
     """
     robot = robot_of(robot)
-    return Experiment(robot, commands_from(commands, robot)).predict(effects_of(model, robot))
+    told = answered(commands_from(commands, robot))
+    return Experiment(robot, told).predict(effects_of(model, robot))
 
 
 def effects_of(given: GivenEffects, robot: Robot) -> list[Effect]:

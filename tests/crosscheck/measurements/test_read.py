@@ -269,7 +269,13 @@ def test_commands_that_were_made_are_as_if_read(csv_file, robot):
     told = commands_of(replace(made, lengths=lengths, told=True), robot)
     assert told.told and told.command_pose is None and told.command_lengths.tolist()[0] == [0.5] * 4
     lengths[1] = np.nan  # a row without an answer
-    with pytest.raises(InputError, match="lengths of the commands holds numbers that are not fin"):
-        commands_of(replace(made, lengths=lengths), robot)
+    lost = replace(made, lengths=lengths, told=True)
+    words = r"of the commands: expected finite lengths, got nan; leave out rows for which a .*found"
+    with pytest.raises(InputError, match=f"^line 3 {words}"):
+        commands_of(lost, robot)
+    with pytest.raises(InputError, match=f"^pose 1 {words}"):
+        commands_of(replace(lost, line=None), robot)
+    rest = commands_of(lost.rows(np.array([0, 2])), robot)
+    assert rest.line.tolist() == [2, 4] and rest.command_lengths.tolist() == [[0.5] * 4] * 2
     with pytest.raises(InputError, match="commands of several clocks; expected those of one file"):
         commands_of(replace(made, clock=np.arange(3)), robot)
