@@ -57,7 +57,9 @@ def command(
 
     ROBOT.xml is the robot's MJCF, DATA.csv its measurements; a TOML file beside it states the
     noise. The model's values are used as they are; nothing is fitted but what the data leave free,
-    and the notes name it. Writes comparison.json, comparison.html and comparison.rrd.
+    and the notes name it. It also tells how far the platform is from the wanted poses (columns
+    want_*, as seecr correct writes them), else from the commanded ones. Writes comparison.json,
+    comparison.html and comparison.rrd.
 
     \b
     With limits the command is a gate for continuous integration: on the rms over all rows and

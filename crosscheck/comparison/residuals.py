@@ -10,6 +10,7 @@ from crosscheck.comparison.associations import associations
 from crosscheck.comparison.coloured import coloured_noise
 from crosscheck.comparison.quantities import channels
 from crosscheck.comparison.result import Comparison, Coordinate, Group, UnsolvedRow, WorstRow
+from crosscheck.comparison.tracking import tracking
 from crosscheck.comparison.travel import Travel, regions_of, travel
 from crosscheck.fit.noise import as_table, whiteness
 from crosscheck.fit.prepare import noise_floor, outlying_rows, prepare
@@ -66,6 +67,7 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
         unsolved=tuple(_unsolved(problem, state)),
         notes=tuple(dict.fromkeys(notes)),
         refusal=ready.refusal,
+        tracking=tracking(problem, state),
     )
 
 

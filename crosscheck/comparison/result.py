@@ -14,6 +14,7 @@ import numpy as np
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.coloured import Coloured
 from crosscheck.comparison.quantities import QuantityKind, channels
+from crosscheck.comparison.tracking import Tracking
 from crosscheck.comparison.travel import Travel
 from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.problem import BY_NAME, KINDS, Problem, Rms, kinds_read, kinds_stated
@@ -124,6 +125,8 @@ class Comparison(Result):
         unsolved: rows for which the model has no equilibrium.
         notes: what was assumed, estimated or left out.
         refusal: why the data are insufficient for a verdict; None if they are not.
+        tracking: how far the readings are from the wanted poses, else from the commanded ones; None
+            if these are lengths alone, or no pose was read.
     """
 
     problem: Problem
@@ -142,6 +145,7 @@ class Comparison(Result):
     unsolved: tuple[UnsolvedRow, ...]
     notes: tuple[str, ...]
     refusal: Refusal | None = None
+    tracking: Tracking | None = None
 
     @property
     def terms(self) -> Terms:
@@ -246,6 +250,7 @@ class Comparison(Result):
             "rows": {"all": problem.data.n_rows, "compared": int(problem.use.sum())},
             "rms": self.rms,
             "noise_floor": self.floor,
+            "tracking": self.tracking,
             "sigma": problem.sigma,
             "coloured_noise": self.coloured,
             "residual": None if w is None else {**vars(w), "structured": w.structured},

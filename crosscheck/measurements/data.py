@@ -35,6 +35,7 @@ _PER_ROW = (
     "t_s",
     "command_pose",
     "command_lengths",
+    "wanted",
     "position",
     "quat_wxyz",
     "angles_rad",
@@ -90,6 +91,8 @@ class Measurements(Result):
         command_pose: (n, 7) commanded platform pose, or None.
         command_lengths: (n, m) [m] rest lengths, or None. told: whether they are told lengths, in
             the plain model's terms; else they are absolute.
+        wanted: (n, 7) poses that the commands are for, if they are stated besides (columns
+            ``want_*``), or None; NaN where no coordinate is.
         t_s: (n,) [s] or None. began: the time of day at which it is 0, if the file states it.
         position: (n, 3) [m] in the base frame, NaN if not read.
         quat_wxyz: (n, 4) unit quaternions, NaN rows if not read, or None.
@@ -118,6 +121,7 @@ class Measurements(Result):
     run: Names
     command_pose: Array | None = None
     command_lengths: Array | None = None
+    wanted: Array | None = None
     t_s: Array | None = None
     began: datetime | None = None
     position: Array = _FILLED_IN
@@ -174,7 +178,7 @@ class Measurements(Result):
     def _check_shapes(self) -> None:
         n, m = len(self.run), self.n_cables
         widths = {"command_pose": 7, "command_lengths": m, "position": 3, "quat_wxyz": 4}
-        widths |= {"angles_rad": 3, "tensions": m}
+        widths |= {"angles_rad": 3, "tensions": m, "wanted": 7}
         shapes: dict[str, tuple[int, ...]] = {k: (n, width) for k, width in widths.items()}
         shapes |= dict.fromkeys(("t_s", "temperature_C", "line", "stands", "file"), (n,))
         shapes |= {"sigma_ratio": (n, len(fields(Sigma)))}

@@ -23,6 +23,9 @@ def named_columns(data: Measurements) -> Iterator[tuple[str, list[Any]]]:
     yield from _columns(["t_s"], data.t_s)
     yield from _columns([f"cmd_{c}" for c in COORDINATES], data.command_pose)
     yield from _columns([f"length_{i}_m" for i in cables], data.command_lengths)
+    if data.wanted is not None:
+        stated = np.asarray(np.isfinite(data.wanted).any(axis=0))
+        yield from _columns([f"want_{c}" for c in COORDINATES], data.wanted, stated)
     yield from _columns([f"meas_{c}_m" for c in "xyz"], data.position, data.position_mask)
     yield from _columns([f"meas_q{c}" for c in "wxyz"], data.quat_wxyz)
     yield from _columns([f"meas_r{c}_rad" for c in "xyz"], data.angles_rad, data.angle_mask)

@@ -20,10 +20,14 @@ from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.dwells import averaged_dwells
 from crosscheck.measurements.notice import notice
 from crosscheck.measurements.together import together
-from seecr.arguments import finite
 from seecr.columns.known import POSITION, Columns, know_columns
 from seecr.columns.loads import known_loads
-from seecr.columns.poses import command_lengths, command_poses, measured_orientation
+from seecr.columns.poses import (
+    command_lengths,
+    command_poses,
+    measured_orientation,
+    wanted_poses,
+)
 from seecr.columns.table import read_table
 from seecr.columns.times import began, runs, temperatures, times
 from seecr.commands.data import Commands
@@ -125,13 +129,11 @@ def commands_of(given: GivenCommands, robot: Robot) -> Measurements:
 
 def _of_one_clock(given: Commands, robot: Robot) -> Measurements:
     """Commands as a file of them would be read."""
-    from seecr.statics.starts import commanded_poses  # takes a while to import
+    from seecr.statics.starts import answered, commanded_poses  # takes a while to import
 
     if given.clock is not None and len(np.unique(given.clock)) > 1:
         raise InputError("commands of several clocks; expected those of one file")
-    lengths, n = given.lengths, len(given)
-    if lengths is not None:
-        lengths = finite(lengths, "lengths of the commands")
+    lengths, n = answered(given).lengths, len(given)
     run = np.full(n, "all") if given.run is None else given.run
     return Measurements(
         Path("commands.csv"),
@@ -174,6 +176,7 @@ def _load(columns: Columns, robot: Robot, sigma_path: str | Path | None) -> Meas
         command_pose=pose,
         command_lengths=lengths,
         told=beside.told and lengths is not None,
+        wanted=wanted_poses(columns, robot),
         position=position,
         quat_wxyz=quat,
         angles_rad=angles,

@@ -48,6 +48,7 @@ def together(parts: Sequence[Measurements]) -> Measurements:
         command_pose=_stack([part.command_pose for part in parts]),
         command_lengths=_stack([part.command_lengths for part in parts]),
         told=first.told,
+        wanted=_wanted(parts),
         position=np.concatenate([part.position for part in parts]),
         quat_wxyz=quat,
         angles_rad=angles,
@@ -115,6 +116,15 @@ def _runs(parts: Sequence[Measurements], names: Sequence[str]) -> Names:
 def _stack(columns: Sequence[Array | None]) -> Array | None:
     there = [column for column in columns if column is not None]
     return np.concatenate(there) if len(there) == len(columns) else None
+
+
+def _wanted(parts: Sequence[Measurements]) -> Array | None:
+    """Wanted poses of all files; NaN in those that state none, None if none does."""
+    if all(part.wanted is None for part in parts):
+        return None
+    blank = [np.full((part.n_rows, 7), np.nan) for part in parts]
+    pairs = zip(parts, blank, strict=True)
+    return np.concatenate([b if part.wanted is None else part.wanted for part, b in pairs])
 
 
 def _of_all(

@@ -36,6 +36,8 @@ def comparison_context(found: Comparison) -> dict[str, object]:
         "heads": [f"#{kind.name} [{kind.unit}]" for kind in kinds],
         "groups": _groups(found),
         "coordinates": _coordinates(found),
+        "tracking_title": found.tracking.title if found.tracking else "",
+        "tracking": _tracking(found),
         "where": [association_block(a) for a in found.associations if a.significant][:_MOST],
         "worst": _worst(found),
         "notes": [
@@ -95,6 +97,16 @@ def _coordinates(found: Comparison) -> list[tuple[str, list[str], str, str]]:
         factor, unit = in_unit(row.unit)
         numbers = [short(factor * value) for value in (row.bias, row.rms, row.max)]
         out.append((row.name, numbers, unit, found.problem.data.place(row.row)))
+    return out
+
+
+def _tracking(found: Comparison) -> list[tuple[str, list[str], str, str]]:
+    """Kind, rms and largest distance from the wanted poses, unit, line of the largest."""
+    out = []
+    for one in found.tracking.away if found.tracking else ():
+        factor, unit = in_unit(one.unit)
+        numbers = [short(factor * value) for value in (one.rms, one.max)]
+        out.append((one.kind, numbers, unit, found.problem.data.place(one.row)))
     return out
 
 

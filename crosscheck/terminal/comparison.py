@@ -35,6 +35,8 @@ def print_comparison(
         console.print(_errors(found))
         _print_associations(console, found)
         _print_worst(console, found)
+    if found.tracking is not None:
+        say(console, found.tracking.words(found.problem.data))
     for row in found.unsolved[:_MOST_UNSOLVED]:
         say(console, f"line {row.line}, run {row.run}: {row.why}", "bold yellow")
     if len(found.unsolved) > _MOST_UNSOLVED:

@@ -48,7 +48,7 @@ Examples:
     nargs=3,
     metavar="X Y Z",
     help="Each FIRST:LAST:COUNT or one number [m].  [default: over the exit points, down to as far "
-    "below the reference pose as they are above it]",
+    "below the reference pose as they are above it, or to the floor of the MJCF]",
 )
 @turned_option("all poses")
 @limit_options
@@ -123,7 +123,7 @@ def command(
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
-    axes = axes_of(grid, machine) if grid else list(default_axes(machine))
+    axes = axes_of(grid, machine) if grid else list(default_axes(machine, None, turned or None))
     total = int(np.prod([len(axis) for axis in axes]))
     asked: dict[str, Any] = {
         "lowest": lowest, "highest": np.inf if highest is None else highest,
@@ -164,7 +164,8 @@ def command(
     if as_json:
         click.echo(text)
         return status
-    lines = [*notes, *_lines(found, own.names if own else (), at_least, places, edge)]
+    where = [] if grid else [found.region]  # of their own grids people know it
+    lines = [*notes, *where, *_lines(found, own.names if own else (), at_least, places, edge)]
     if figure != "none" and flat:
         lines.append("no figure: the grid has more than one value along fewer than two axes")
     for line in [*lines, f"Results in {out}/", _next(robot, lowest, highest)]:

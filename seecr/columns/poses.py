@@ -78,12 +78,41 @@ def poses_of(columns: Columns, robot: Robot, prefix: str, word: str) -> Array | 
     return np.concatenate([position, orientation], axis=1)
 
 
+def wanted_poses(columns: Columns, robot: Robot) -> Array | None:
+    """Poses (n, 7) of columns ``want_*``, for what was measured; None if there are none.
+
+    Any part of the pose may be wanted, as any part of it may be read: NaN where a coordinate has no
+    column, or a row an empty cell.
+
+    Raises:
+        InputFileError: an orientation is incomplete.
+    """
+    present = columns.present
+    if not present("want", POSITION + QUATERNION + ANGLES):
+        return None
+    wanted = np.full((columns.n_rows, 7), np.nan)
+    for k, part in enumerate(POSITION):
+        if present("want", (part,)):
+            wanted[:, k] = columns.numbers(f"want_{part}", blank_is_nan=True)
+    if present("want", QUATERNION):
+        wanted[:, 3:] = _quaternions(columns, "want", blank_is_nan=True)
+    elif present("want", ANGLES):
+        rxyz = rxyz_from_quat(robot.reference_pose[3:])
+        of, free = ("want", "wanted", "deg"), _free_coordinates(robot)[3:]
+        angles = _group(columns, of, ANGLES, free, rxyz, blank_is_nan=True)
+        given = np.isfinite(angles).all(axis=1)
+        wanted[given, 3:] = quat_from_rxyz(angles[given])
+    return wanted
+
+
 def _group(
     columns: Columns,
     of: tuple[str, str, str],
     parts: tuple[str, ...],
     free: NDArray[np.bool_],
     reference: Array,
+    *,
+    blank_is_nan: bool = False,
 ) -> Array:
     """Three coordinates or angles (n, 3); the reference pose's where they cannot change.
 
@@ -92,6 +121,7 @@ def _group(
         of: the columns' prefix, the word for it, and a unit for errors.
         parts: the coordinates' names.
         free: (3,) which of them the robot can change. reference: (3,) the reference pose's.
+        blank_is_nan: whether cells may be empty.
     """
     prefix, word, unit = of
     absent = [k for k, part in enumerate(parts) if f"{prefix}_{part}" not in columns.known]
@@ -107,7 +137,7 @@ def _group(
     values = np.tile(np.asarray(reference, float), (columns.n_rows, 1))
     for k, part in enumerate(parts):
         if k not in absent:
-            values[:, k] = columns.numbers(f"{prefix}_{part}")
+            values[:, k] = columns.numbers(f"{prefix}_{part}", blank_is_nan=blank_is_nan)
     return values
 
 

@@ -279,7 +279,8 @@ def _cell_fault(cell: str, blank_is_nan: bool) -> str | None:
     if not cell:
         return None if blank_is_nan else f"{expected}, got an empty cell; fill it or drop the row"
     if cell.lower().lstrip("+-") in _NO_NUMBER or cell.lower() in _NO_NUMBER:
-        return f"{expected}, got {show(cell)}"
+        remedy = "" if blank_is_nan else "; fill it or drop the row"
+        return f"{expected}, got {show(cell)}{remedy}"
     if _COMMA_NUMBER.fullmatch(cell):
         point = cell.replace(",", ".")
         return f"{expected}, got a decimal comma in {show(cell)}; write {point}"

@@ -28,6 +28,8 @@ _NO_NUMBER = re.compile(
 )
 # No cable is stretched to a hundred times its rest length.
 _LEAST = 0.01
+# A plane is level if the cosine of its tilt is so near to one: 0.08 degrees.
+_LEVEL = 1e-6
 _EXPECTED = "expected the robot as MJCF, XML that begins with <mujoco"
 
 _quiet_lock = Lock()
@@ -108,6 +110,7 @@ def load_robot(path: str | Path) -> Robot:
         cable_names=tuple(names),
         source=path,
         left_out=hindrances(model, body),
+        floor=_floor(model, reference_pose[2]),
     )
     _check_sizes(robot, _body_name(model, body), path)
     return robot
@@ -274,6 +277,19 @@ def _inertia(model: mujoco.MjModel, body: int) -> Array:
     """Inertia (3, 3) [kg m^2] about the centre of mass, in the body's frame."""
     axes = quat_to_matrix(model.body_iquat[body])
     return np.asarray(axes @ np.diag(model.body_inertia[body]) @ axes.T)
+
+
+def _floor(model: mujoco.MjModel, below: float) -> float | None:
+    """z [m] of the highest static plane that is level and not above ``below``; None without one."""
+    import mujoco
+
+    still = model.body_weldid[model.geom_bodyid] == 0
+    planes = np.flatnonzero(still & (model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)))
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    level = data.geom_xmat[planes, 8] > 1.0 - _LEVEL  # z of the plane's normal
+    heights = data.geom_xpos[planes[level], 2]
+    return max((float(z) for z in heights if z <= below), default=None)
 
 
 def _read_joints(model: mujoco.MjModel, body: int, path: Path) -> tuple[Joint, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.errors import InputError, RobotError
-from seecr.pose import LARGEST, Array, all_finite, transform_points
+from seecr.pose import LARGEST, Array, all_finite, quat_rotate, transform_points
 
 ABSURD = 10.0
 """Commands and rest lengths beyond this many times the frame's reach are in another unit."""
@@ -59,6 +59,8 @@ class Robot:
             unknown. It affects no equilibrium.
         left_out: what the file has that may hold or stop the platform beside its cables, such as
             "contacts"; statics leave it out.
+        floor: [m] z of the level floor below the platform, a static plane of the file; None without
+            one. Statics leave it out; maps end there.
     """
 
     name: str
@@ -75,6 +77,7 @@ class Robot:
     source: Path | None = None
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
     left_out: tuple[str, ...] = ()
+    floor: float | None = None
 
     def __post_init__(self) -> None:
         m = np.shape(self.exit_points)[0]
@@ -181,6 +184,17 @@ class Robot:
         """
         g = np.linalg.norm(self.gravity)
         return -self.gravity / g if g > 0 else np.array([0.0, 0.0, 1.0])
+
+    def standing_height(self, quat_wxyz: Array) -> float:
+        """z [m] of the platform's origin where, so turned, it stands on the floor.
+
+        The platform is what is known of it: anchor points, centre of mass and origin. Without a
+        floor it is minus infinity.
+        """
+        if self.floor is None:
+            return -np.inf
+        points = np.concatenate([self.anchor_points, self.centre_of_mass[None], np.zeros((1, 3))])
+        return float(self.floor - quat_rotate(quat_wxyz, points)[:, 2].min())
 
     @property
     def weight(self) -> float:

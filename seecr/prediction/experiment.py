@@ -25,7 +25,7 @@ from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics import batch
 from seecr.statics.led import led
 from seecr.statics.solution import Solution, certify
-from seecr.statics.starts import Commanded, commands_from, start_of
+from seecr.statics.starts import Commanded, answered, commands_from, start_of
 from seecr.statics.tables import Tables, assemble, relengthened, take
 
 if TYPE_CHECKING:
@@ -211,6 +211,11 @@ class Experiment:
         kept = {"pose": pose}
         return Prediction(setup, tables, found, readings, False, sensors, kept=kept)
 
+    def readings_at(self, effects: Sequence[Effect], poses: Array) -> Readings:
+        """What the sensors would report if the platform were at poses (n, 7); no tensions."""
+        none = np.zeros((len(poses), self.robot.n_cables))
+        return read(effects, self.setup(effects), poses, none)
+
     def from_other_starts(
         self, effects: Sequence[Effect], at: Prediction, rows: NDArray[np.intp], poses: Array
     ) -> Prediction:
@@ -324,13 +329,14 @@ def predict(
         a :class:`Prediction`; check ``solved`` before using a row.
 
     Raises:
-        InputError: poses, robot or effects of a wrong type or shape.
+        InputError: poses, robot or effects of a wrong type or shape, or a row without lengths.
 
     Example:
         ``seecr.predict(robot, poses, [seecr.Term.of(robot, "pulley_radius", radius_m=0.01)])``
     """
     robot = robot_of(robot)
-    return Experiment(robot, commands_from(commands, robot)).predict(effects_of(model, robot))
+    told = answered(commands_from(commands, robot))
+    return Experiment(robot, told).predict(effects_of(model, robot))
 
 
 def effects_of(given: GivenEffects, robot: Robot) -> list[Effect]:

@@ -118,6 +118,15 @@ class Parted(Experiment):
         ]
         return self._joined(effects, parts, found)
 
+    def readings_at(self, effects: Sequence[Effect], poses: Array) -> Readings:
+        parts = self.parts(effects)
+        if not parts:
+            return super().readings_at(effects, poses)
+        order = np.argsort(np.concatenate([part.rows for part in parts]))
+        return _readings(
+            [p.experiment.readings_at(p.effects(effects), poses[p.rows]) for p in parts], order
+        )
+
     def from_other_starts(
         self, effects: Sequence[Effect], at: Prediction, rows: NDArray[np.intp], poses: Array
     ) -> Prediction:
@@ -144,17 +153,19 @@ class Parted(Experiment):
         whole = batch.Evaluation.empty(n, m, tables.n_dof)
         for part, one in zip(parts, found, strict=True):
             batch.put_evaluation(whole, part.rows, one.found)
-        readings = Readings(
-            **{
-                f.name: np.concatenate([getattr(one.readings, f.name) for one in found])[order]
-                for f in fields(Readings)
-            }
-        )
+        readings = _readings([one.readings for one in found], order)
         history = any(one.has_history for one in found)
         return PartedPrediction(
             self.setup(effects), tables, whole, readings, history, sensors_among(effects),
             parts=tuple(found), rows=tuple(part.rows for part in parts),
         )  # fmt: skip
+
+
+def _readings(parts: Sequence[Readings], order: NDArray[np.intp]) -> Readings:
+    """Readings stacked, in a given order of their rows."""
+    names = [f.name for f in fields(Readings)]
+    stacked = {name: np.concatenate([getattr(one, name) for one in parts]) for name in names}
+    return Readings(**{name: values[order] for name, values in stacked.items()})
 
 
 def _is_of(at: Prediction, parts: Sequence[Part]) -> TypeGuard[PartedPrediction]:

@@ -15,7 +15,7 @@ from seecr.description.robot import Robot
 from seecr.effects import Effect
 from seecr.errors import InputError
 from seecr.pose import Array, pose_add, pose_difference
-from seecr.prediction.experiment import Experiment, effects_of, read
+from seecr.prediction.experiment import Experiment, effects_of
 
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects
@@ -54,7 +54,5 @@ def placed(robot: GivenRobot, commands: Commands, effects: GivenEffects) -> Comm
 
 
 def _tracked(robot: Robot, commands: Commands, effects: Sequence[Effect]) -> Array:
-    setup = Experiment(robot, commands).setup(effects)
-    none = np.zeros((len(commands), robot.n_cables))
-    readings = read(effects, setup, commands.pose, none)
+    readings = Experiment(robot, commands).readings_at(effects, commands.pose)
     return np.concatenate([readings.position, readings.quat_wxyz], axis=1)

@@ -20,7 +20,7 @@ from seecr.prediction.experiment import Experiment, senses
 from seecr.prediction.model import CALIBRATION, FIT, Model, model_given
 from seecr.prediction.sensitivity import sensitivities
 from seecr.result import Record, Result, named
-from seecr.statics.starts import Commanded, commands_from
+from seecr.statics.starts import Commanded, answered, commands_from
 from seecr.units import short
 
 PARAMETERS, STDERR, CORRELATION = "parameters", "stderr", "correlation"
@@ -236,7 +236,7 @@ def spread_of(robot: GivenRobot, commands: Commanded, model: Model | str | Path)
     if whole is None or known is None:
         return None
     terms, covariance = known
-    experiment = Experiment(robot, commands_from(commands, robot))
+    experiment = Experiment(robot, answered(commands_from(commands, robot)))
     own = _spread(experiment, terms, covariance)
     all_move = len(terms.names) == len(model.terms.names)
     seen = own if all_move else _spread(experiment, model.terms, whole)

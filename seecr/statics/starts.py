@@ -7,16 +7,17 @@ from typing import Protocol, TypeAlias, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seecr.arguments import finite
+from seecr.arguments import finite, numbers
 from seecr.commands.data import Commands
+from seecr.counted import rows_words
 from seecr.description.joints import values_of_pose
 from seecr.description.robot import Robot
 from seecr.errors import InputError
-from seecr.pose import Array
+from seecr.pose import LARGEST, Array
 from seecr.statics import batch
 from seecr.statics.tables import Tables
 
-__all__ = ["Commanded", "HasCommands", "commanded_poses", "commands_from", "start_of"]
+__all__ = ["Commanded", "HasCommands", "answered", "commanded_poses", "commands_from", "start_of"]
 
 
 @runtime_checkable
@@ -42,6 +43,26 @@ def commands_from(given: Commanded, robot: Robot) -> Commands:
     if isinstance(given, HasCommands):
         return given.as_commands(robot)
     return Commands(commanded_poses(given))
+
+
+def answered(commands: Commands) -> Commands:
+    """The commands, if all lengths are numbers; a correction has NaN for poses without an answer.
+
+    Raises:
+        InputError: a row has none.
+    """
+    if commands.lengths is None:
+        return commands
+    lengths = numbers(commands.lengths, "lengths of the commands")
+    odd = ~(np.abs(lengths) <= LARGEST)  # also of NaN
+    lost = np.flatnonzero(np.atleast_2d(odd).any(axis=1))
+    if len(lost):
+        raise InputError(
+            f"{rows_words(lost, commands.line)} of the commands: expected finite lengths, got "
+            f"{lengths[odd][0]:g}; leave out rows for which a correction has none: "
+            "commands.rows(np.flatnonzero(correction.found))"
+        )
+    return commands
 
 
 def start_of(

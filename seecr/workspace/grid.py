@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.counted import counted
+from seecr.counted import between, counted
 from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.pose import Array
@@ -165,6 +165,15 @@ class Workspace(Result):
                 )
         return out
 
+    @property
+    def region(self) -> str:
+        """Where the grid is, in words; whether its lowest poses stand on the robot's floor."""
+        ends = [(float(axis.min()), float(axis.max())) for axis in self.axes]
+        parts = [f"{k} {between(*end)} m" for k, end in zip("xyz", ends, strict=True)]
+        above = ends[2][0] - self.robot.standing_height(self.orientation)
+        stands = abs(above) <= 1e-9 * self.robot.length
+        return f"region: {', '.join(parts)}{', down to the floor' if stands else ''}"
+
     def records(self) -> list[Record]:
         """One row per pose of the grid."""
         places = np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -204,6 +213,8 @@ class Workspace(Result):
         return {
             "robot": self.robot.name,
             "shape": self.margin.shape,
+            "region_m": [[axis.min(), axis.max()] for axis in self.axes],
+            "floor_m": self.robot.floor,
             "orientation": self.orientation,
             "poses": self.margin.size,
             "feasible": int(self.feasible.sum()),

@@ -38,13 +38,18 @@ _PART = 5_000
 _VALUES, _FEW = 33, 13
 
 
-def default_axes(robot: GivenRobot, values: int | None = None) -> tuple[Array, Array, Array]:
+def default_axes(
+    robot: GivenRobot, values: int | None = None, orientation: ArrayLike | None = None
+) -> tuple[Array, Array, Array]:
     """A grid over the exit points, down to as far below the reference pose as they are above it.
+
+    It ends where the platform's lowest anchor point would be on the robot's floor, if it has one.
 
     Args:
         robot: as described, or its MJCF.
         values: on each axis along which the grid extends; by default 33, or 13 for a robot with
             fewer cables than degrees of freedom.
+        orientation: (4,) quaternion of all poses; that of the reference pose by default.
 
     Returns:
         x, y and z of the grid, (nx,), (ny,) and (nz,) [m].
@@ -62,10 +67,20 @@ def default_axes(robot: GivenRobot, values: int | None = None) -> tuple[Array, A
     mirrored = 2.0 * robot.reference_pose[:3] - high
     down = np.abs(robot.up) > 0.5
     low = np.where(down, np.minimum(low, mirrored), low)
+    turned = robot.reference_pose[3:] if orientation is None else _quaternion(orientation)
+    low[2] = np.clip(robot.standing_height(turned), low[2], robot.reference_pose[2])
     return tuple(
         evenly(a, b, values) if b - a > 1e-9 * robot.length else np.array([a])
         for a, b in zip(low.tolist(), high.tolist(), strict=True)
     )  # type: ignore[return-value]
+
+
+def _quaternion(values: ArrayLike) -> Array:
+    """A checked unit quaternion (4,)."""
+    array = finite(values, "orientation")
+    if array.shape != (4,):
+        raise InputError(f"orientation must be (4,), qw qx qy qz, got {array.shape}")
+    return np.asarray(commanded_poses(np.concatenate([np.zeros(3), array]), "orientation")[0, 3:])
 
 
 def evenly(low: float, high: float, count: int) -> Array:

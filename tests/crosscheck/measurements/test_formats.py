@@ -342,11 +342,11 @@ def test_the_reference_s_examples_are_read(write: Write, robot: Robot):
 
 def test_the_reference_s_columns_and_units_are_known():
     rows = [row.split("|") for row in REFERENCE.splitlines() if row.startswith("| `")]
-    assert len(rows) == 13
+    assert len(rows) == 14
     for _, columns, _, units, _ in rows:
         names = [name for name in re.findall(r"`([^`]+)`", columns) for name in name.split()]
         table = Table(Path("a.csv"), tuple(names), np.array([2]), 1, [["1"]] * len(names))
-        if not {"cmd_qw", "cmd_rx_deg", "meas_qw", "length_1_m"} & set(names):
+        if not {"cmd_qw", "cmd_rx_deg", "meas_qw", "want_qw", "length_1_m"} & set(names):
             assert know_columns(table, M).unused == ()
         for unit in re.findall(r"_(\w+)", units):
             quantity = names[0].rpartition("_")[0]

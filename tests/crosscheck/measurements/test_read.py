@@ -6,13 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from measured_csv import CMD
+from measured_csv import CMD, POSE
 
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import commands_of, load_commands, load_measurements
 from seecr.commands.loads import Loads
 from seecr.errors import InputError, InputFileError
 from seecr.pose import quat_from_rxyz, quat_rotate, quat_to_matrix
+
+NO_TURN = "No commanded orientation: that of the reference pose is used."
 
 
 def test_units_and_order_of_columns_are_free(csv_file, robot):
@@ -59,7 +61,7 @@ def test_commanded_lengths_in_millimetres(csv_file, robot):
 def test_missing_orientation_is_the_reference_and_said(csv_file, robot):
     data = load_measurements(csv_file("run," + CMD + ",meas_x_m", "a,0,1,2,3"), robot)
     assert data.command_pose[0] == pytest.approx([0, 1, 2, 0.8, 0, 0, 0.6])
-    assert data.notes == ("No commanded orientation: that of the reference pose is used.",)
+    assert data.notes == (NO_TURN,)
 
 
 def test_planar_robot_needs_only_what_it_can_move(csv_file, robots):
@@ -136,6 +138,24 @@ def test_empty_quaternion_columns_are_not_measured(csv_file, robot):
     data = load_measurements(csv_file(header, "a,0,0,0,1,,,,"), robot)
     assert data.quat_wxyz is None and not data.has_orientation
     assert data.notes[-1] == "Columns meas_qw to meas_qz are empty: not measured."
+
+
+def test_any_part_of_a_pose_may_be_wanted(csv_file, robot, robots):
+    head = f"{CMD},meas_x_m,want_x_mm,want_z_m,want_qw,want_qx,want_qy,want_qz"
+    data = load_measurements(csv_file(head, "0,0,0,1,100,0.2,0,1,0,0", "0,0,0,1,,0.3,,,,"), robot)
+    nan = np.nan
+    np.testing.assert_array_equal(
+        data.wanted, [[0.1, nan, 0.2, 0, 1, 0, 0], [nan, nan, 0.3, nan, nan, nan, nan]]
+    )
+    assert data.unused_columns == () and data.notes[-1] == NO_TURN
+    assert load_measurements(csv_file(f"{POSE}", "0,0,0,1"), robot).wanted is None
+    planar = csv_file(f"{POSE},want_ry_deg", "0,0.05,0,1,90")
+    turned = load_measurements(planar, robots["planar"]).wanted
+    np.testing.assert_allclose(turned[0, 3:], np.sqrt([0.5, 0, 0.5, 0]), atol=1e-15)
+    with pytest.raises(InputFileError, match="incomplete wanted pose columns: expected want_rx"):
+        load_measurements(csv_file(f"{POSE},want_rx_deg", "0,0,0,1,90"), robot)
+    with pytest.raises(InputFileError, match="line 2, column want_qx: incomplete quaternion"):
+        load_measurements(csv_file(head, "0,0,0,1,100,0.2,0,,0,0"), robot)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -249,7 +269,13 @@ def test_commands_that_were_made_are_as_if_read(csv_file, robot):
     told = commands_of(replace(made, lengths=lengths, told=True), robot)
     assert told.told and told.command_pose is None and told.command_lengths.tolist()[0] == [0.5] * 4
     lengths[1] = np.nan  # a row without an answer
-    with pytest.raises(InputError, match="lengths of the commands holds numbers that are not fin"):
-        commands_of(replace(made, lengths=lengths), robot)
+    lost = replace(made, lengths=lengths, told=True)
+    words = r"of the commands: expected finite lengths, got nan; leave out rows for which a .*found"
+    with pytest.raises(InputError, match=f"^line 3 {words}"):
+        commands_of(lost, robot)
+    with pytest.raises(InputError, match=f"^pose 1 {words}"):
+        commands_of(replace(lost, line=None), robot)
+    rest = commands_of(lost.rows(np.array([0, 2])), robot)
+    assert rest.line.tolist() == [2, 4] and rest.command_lengths.tolist() == [[0.5] * 4] * 2
     with pytest.raises(InputError, match="commands of several clocks; expected those of one file"):
         commands_of(replace(made, clock=np.arange(3)), robot)

@@ -178,7 +178,8 @@ REFUSED = {
     "underscore": ([POSE, "0,0,0,1_000"], "line 2, column meas_x_m: .*got '1_000'"),
     "NaN command": (
         [POSE, "0,NaN,0,0"],
-        "line 2, column cmd_y_m: expected a number in every row, got 'NaN'",
+        "line 2, column cmd_y_m: expected a number in every row, got 'NaN'; "
+        "fill it or drop the row",
     ),
     "not available": (
         [POSE, "0,0,0,0", "0,0,0,N/A"],

@@ -22,12 +22,14 @@ def everything(path: Path) -> Measurements:
     tensions[:, 1] = rng.uniform(0, 9, 6)
     position = rng.normal(size=(6, 3))
     position[2] = np.nan
+    wanted = np.concatenate([position + 0.01, np.tile([0.0, 0.6, 0.8, 0.0], (6, 1))], axis=1)
     return Measurements(
         path=path,
         n_cables=4,
         run=np.array(["#a"] * 3 + ['b, "c"'] * 3),
         t_s=np.arange(6.0),
         command_lengths=rng.uniform(1, 2, (6, 4)),
+        wanted=wanted,
         position=position,
         quat_wxyz=quat / np.linalg.norm(quat, axis=1, keepdims=True),
         tensions=tensions,
@@ -40,7 +42,8 @@ def test_round_trip_through_a_file(tmp_path, robot):
     made = everything(tmp_path / "measured.csv")
     write_measurements(made.path, made)
     back = load_measurements(made.path, robot)
-    for name in ("t_s", "command_lengths", "position", "quat_wxyz", "tensions", "temperature_C"):
+    compared = ("t_s", "command_lengths", "wanted", "position", "quat_wxyz", "tensions")
+    for name in (*compared, "temperature_C"):
         np.testing.assert_allclose(getattr(back, name), getattr(made, name), rtol=1e-8, atol=1e-9)
     assert back.run.tolist() == made.run.tolist()
     assert back.sigma == made.sigma

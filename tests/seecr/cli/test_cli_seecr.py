@@ -381,6 +381,7 @@ def test_map_writes_its_files_or_says_why_not(tmp_path: Path) -> None:
         and f"edge, to within 0.001 m: {places} points" in edge.output
         and places > 20
     )
+    assert "region: x 0.04 to 0.76 m, y 0 m, z 0.018 to 0.486 m, down to the floor" in edge.output
     assert np.load(out / "map.npz")["edge"].shape == (places, 7)
     endless = run("map", "demobot_cogiro", "--edge", "nan", "--out", out)
     assert endless.exit_code == 2 and "'--edge': nan is not a finite number" in endless.output

@@ -108,6 +108,27 @@ def test_exit_points_may_stand_on_fixed_bodies_inside_one_another(tmp_path: Path
     assert robot.exit_points[0] == pytest.approx([0.2, 0.6, 1.7], abs=1e-15)
 
 
+@pytest.mark.parametrize(
+    ("planes", "floor"),
+    [
+        ("", None),
+        ('<geom type="plane" size="1 1 1" pos="9 9 -0.5"/>', -0.5),
+        ('<body pos="0 0 2" euler="180 0 0"><geom type="plane" size="1 1 1" pos="0 0 1.8" '
+         'euler="180 0 0"/></body>', 0.2),  # of a fixed body
+        ('<geom type="plane" size="1 1 1" euler="5 0 0"/>', None),  # a ramp
+        ('<geom type="plane" size="1 1 1" euler="180 0 0"/>', None),  # a ceiling
+        ('<geom type="plane" size="1 1 1" pos="0 0 3"/>', None),  # above the platform
+        ('<geom type="box" size="1 1 1"/>', None),
+        ('<geom type="plane" size="1 1 1"/><geom type="plane" size="1 1 1" pos="0 0 0.3"/>', 0.3),
+    ],
+)  # fmt: skip
+def test_the_floor_is_the_highest_level_plane_below(
+    planes: str, floor: float | None, tmp_path: Path
+) -> None:
+    robot = load_robot(mjcf(tmp_path, world=f"{WORLD}{planes}"))
+    assert robot.floor == (None if floor is None else pytest.approx(floor, abs=1e-12))
+
+
 def test_degrees_by_default_and_radians_where_the_compiler_says(tmp_path: Path) -> None:
     turned = PLATFORM.replace('pos="0.5 0 1"', 'pos="0.5 0 1" euler="0 0 30"')
     degrees = load_robot(mjcf(tmp_path, platform=turned))

@@ -17,7 +17,7 @@ from seecr.effects import effect_named
 from seecr.effects.setup import plain_setup
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
-from seecr.prediction.experiment import Experiment
+from seecr.prediction.experiment import Experiment, predict
 from seecr.prediction.sensitivity import length_sensitivities, readings_difference
 from seecr.statics import batch
 from seecr.statics.solution import Status
@@ -165,6 +165,15 @@ def test_a_wrench_of_the_wrong_shape_is_refused() -> None:
     experiment = experiment_of("demobot_cogiro")
     with pytest.raises(InputError, match=r"wrench must be \(6,\) or \(6, 6\), got \(3,\)"):
         plain_setup(experiment.robot, experiment.commands, np.zeros(3))
+
+
+def test_a_row_without_lengths_is_named() -> None:
+    given = experiment_of("demobot_cogiro").commands
+    robot = load_robot(model_path("demobot_cogiro"))
+    lengths = robot.commanded_lengths(given.pose)
+    lengths[1, 3] = np.inf
+    with pytest.raises(InputError, match=r"^pose 1 of the commands: expected finite .* got inf; "):
+        predict(robot, Commands(given.pose, lengths, told=True))
 
 
 def test_temperature_of_one_run_does_not_reach_another() -> None:

@@ -66,6 +66,14 @@ def test_each_file_is_predicted_as_if_alone():
         np.testing.assert_allclose(found.pose[rows], alone.pose, atol=1e-12)
 
 
+def test_a_tracker_reads_the_poses_of_each_file_in_its_own_frame():
+    experiment, effects = Parted(ROBOT, commands()), both().effects
+    found = experiment.predict(effects)
+    read = experiment.readings_at(effects, found.pose)
+    np.testing.assert_allclose(read.position, found.readings.position, atol=1e-15)
+    np.testing.assert_allclose(read.quat_wxyz, found.readings.quat_wxyz, atol=1e-15)
+
+
 def test_derivatives_are_those_of_each_file_alone_and_none_elsewhere():
     experiment, terms = Parted(ROBOT, commands()), both()
     found = rates(experiment, terms, experiment.predict(terms.effects))

@@ -432,6 +432,33 @@ def test_the_default_grid_lies_between_the_exit_points() -> None:
         default_axes(robot_named("demobot_cogiro"), -2)
 
 
+def test_the_default_grid_ends_where_the_platform_stands_on_the_floor() -> None:
+    robot = robot_named("demobot_cogiro")  # anchor points down to 18 mm below its origin
+    assert robot.floor == 0.0
+    assert default_axes(robot, 3)[2].tolist() == pytest.approx([0.018, 0.2515, 0.485])
+    upended = default_axes(robot, 3, [np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0])[2]
+    assert upended[0] == pytest.approx(0.0515)  # they are up to 51.5 mm beside it
+    lower = default_axes(replace(robot, floor=-0.1), 3)[2]
+    assert lower[0] == pytest.approx(-0.082)
+    for floor in (None, -5.0):  # as far below the reference pose as the exit points are above it
+        assert default_axes(replace(robot, floor=floor), 3)[2][0] == pytest.approx(-0.185)
+    tall = default_axes(replace(robot, floor=0.149), 3)[2]
+    assert tall[0] == 0.15  # the reference pose is in it all the same
+    with pytest.raises(InputError, match=r"orientation must be \(4,\), qw qx qy qz, got \(3,\)"):
+        default_axes(robot, 3, [1.0, 0.0, 0.0])
+
+
+def test_a_map_says_where_it_is_and_whether_it_ends_at_the_floor() -> None:
+    robot = robot_named("demobot_cogiro")
+    found = workspace_map(robot, *default_axes(robot, 2), elastic=False)
+    ends = "x 0.04 to 0.76 m, y 0.04 to 0.46 m, z 0.018 to 0.485 m"
+    assert found.region == f"region: {ends}, down to the floor"
+    document = found.as_json()
+    assert document["floor_m"] == 0.0 and document["region_m"][0] == [0.04, 0.76]
+    other = workspace_map(robot, 0.4, 0.25, [0.1, 0.2], elastic=False)
+    assert other.region == "region: x 0.4 m, y 0.25 m, z 0.1 to 0.2 m"
+
+
 def test_all_of_a_grid_is_as_large_as_its_box() -> None:
     robot = robot_named("demobot_cogiro")
     axes = np.linspace(0.1, 0.7, 7), np.array([0.1, 0.2, 0.4]), np.linspace(0.05, 0.25, 2)
@@ -479,6 +506,7 @@ def test_the_default_grid_has_a_zero_and_no_rounding_beside_it() -> None:
     robot = robot_named("demobot_cogiro")
     high = np.array(robot.exit_points)
     high[:, 2] += 2.0 - high[:, 2].max()
-    lifted = replace(robot, exit_points=high, reference_pose=np.array([0.4, 0.25, 0.8, 1, 0, 0, 0]))
+    home = np.array([0.4, 0.25, 0.8, 1, 0, 0, 0])
+    lifted = replace(robot, exit_points=high, reference_pose=home, floor=None)
     z = default_axes(lifted, 13)[2]  # from -0.4 to 2: linspace gives 5.6e-17 in place of 0
     assert z[[0, 2, -1]].tolist() == [pytest.approx(-0.4), 0.0, 2.0]
