@@ -1,10 +1,10 @@
 """Turns the compared sets into a verdict and a list of effects that are sure.
 
-Something unknown is there if a smooth field over the workspace earns evidence beside all effects,
-or in place of some, or if held-out runs are predicted worse than the fit itself expects. If the
-data leave open which effects are missing, or if it takes many, the verdict is ``many_effects``: a
-calibration and no diagnosis. The same holds if a field explains something beside the best set, but
-nothing beside the whole catalogue.
+Something unknown is there if a smooth field over the workspace, or something that changes in time,
+earns evidence beside all effects or in place of some, or if held-out runs are predicted worse than
+the fit itself expects. If the data leave open which effects are missing, or if it takes many, the
+verdict is ``many_effects``: a calibration and no diagnosis. The same holds if something unknown
+explains more beside the best set, but nothing beside the whole catalogue.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Judgement:
         sure: effects that are missing beyond doubt, each one representing its class.
         undecided: the expected number of open classes, see :class:`Classes`.
         doubted: members of the best set that are implausibly large.
-        more: whether a smooth field explains something beside the best set.
+        more: whether something unknown explains more beside the best set.
         imitated: something unknown that members of the best set imitate; None if there is nothing.
         replaceable: members that are probable, but others together explain as much.
     """
@@ -98,11 +98,11 @@ def judge(
     Args:
         found: the compared sets.
         classes: probabilities of the classes of equivalent effects.
-        field_odds: ln odds of a smooth field beside the whole catalogue.
+        field_odds: ln odds of something unknown beside the whole catalogue.
         surprise: chi2 per reading of the worst held-out run over what the joint fit expects.
         not_noise: whether what was taken for noise is not noise.
         doubted: members of the best set that are implausibly large.
-        beside: ln odds of a smooth field beside the best set.
+        beside: ln odds of something unknown beside the best set.
         in_place: a field in place of some members of the best set.
         without: how probable it is that groups of its members are noise; that makes them less sure,
             but it does not take many effects.

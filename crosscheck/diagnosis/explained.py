@@ -47,8 +47,8 @@ from crosscheck.fit.words import rms_words
 _ALIKE = 0.3
 
 MORE = (
-    "the residuals of a few effects are smooth over the workspace and not noise: all effects "
-    "together absorb them, and so might an unknown effect"
+    "the residuals of a few effects vary smoothly over the workspace or in time and are not noise: "
+    "all effects together absorb them, and so might an unknown effect"
 )
 
 
