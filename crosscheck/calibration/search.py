@@ -62,7 +62,7 @@ class SetSearch:
         shown: by kind of reading, the size from which on that would have shown; None if unsaid.
         judgement: the verdict.
         in_place: something unknown in place of some members of the best set.
-        varies: what something unknown beside all effects changes in time; None if it does not.
+        varies: what something unknown changes in time beside all effects, else in place of some.
     """
 
     calibration: Calibration
@@ -73,7 +73,7 @@ class SetSearch:
     shown: Rms | None
     judgement: Judgement
     in_place: Imitated
-    varies: Varying | None = None
+    varies: tuple[Varying, ...] = ()
 
 
 def search_sets(
@@ -142,9 +142,9 @@ def search_sets(
     shown = None if said.more or said.imitated else detectable_size(
         setting, joint, joint.jacobian * free, joint.width * free
     )  # fmt: skip
-    return SetSearch(
-        whole, found, catalogue, classes, odds, shown, said, in_place, unknown.likeliest
-    )
+    in_time = unknown.likeliest
+    varies = (in_time,) if in_time else in_place.seen if in_place.chance else ()
+    return SetSearch(whole, found, catalogue, classes, odds, shown, said, in_place, varies)
 
 
 def _compared(

@@ -40,7 +40,7 @@ class Chances:
         imitated: something smooth and unknown that some of the effects found imitate.
         doubt: something smooth and unknown that is less likely than the effects it could replace,
             but that the data do not exclude.
-        varies: what something unknown beside all effects changes in time; None if it does not.
+        varies: what something unknown changes that is beside all effects, the likeliest first.
     """
 
     effect: dict[str, float]
@@ -51,14 +51,19 @@ class Chances:
     further: Mapping[str, float] = dataclasses.field(default_factory=dict)
     imitated: Imitated | None = None
     doubt: Imitated | None = None
-    varies: Varying | None = None
+    varies: tuple[Varying, ...] = ()
 
     @property
     def seen(self) -> tuple[Varying, ...]:
         """What something unknown may change, the likeliest first; empty if that is not known."""
         if self.imitated is not None:
             return self.imitated.seen
-        return () if self.varies is None else (self.varies,)
+        return self.varies
+
+    @property
+    def looks_like(self) -> str:
+        """A sentence, after a space, about what something unknown may change; "" if unsaid."""
+        return f" It looks like {' or '.join(self.seen)}." if self.seen else ""
 
     @property
     def words(self) -> str:
@@ -88,15 +93,15 @@ class Chances:
         unknown: dict[str, object] = {"log_odds": self.field, "shown_from": self.shown}
         if self.imitated is not None:
             unknown |= {
-                "instead_of": sorted(self.imitated.replaced), **_seen(self.imitated),
+                "instead_of": sorted(self.imitated.replaced), **_seen(self.imitated.seen),
             }  # fmt: skip
-        elif self.varies is not None:
-            unknown["seen_in"] = self.varies
+        elif self.varies:
+            unknown |= _seen(self.varies)
         if self.doubt is not None:
             unknown["not_excluded"] = {
                 "probability": self.doubt.probability,
                 "instead_of": sorted(self.doubt.replaced),
-                **_seen(self.doubt),
+                **_seen(self.doubt.seen),
             }
         place = {n: k for k, (members, _p) in enumerate(self.classes) for n in members}
         return {
@@ -110,9 +115,9 @@ class Chances:
         }
 
 
-def _seen(field: Imitated) -> dict[str, object]:
-    """What a field changes, the likeliest by itself."""
-    likeliest, *others = field.seen
+def _seen(some: Sequence[Varying]) -> dict[str, object]:
+    """What something unknown changes, the likeliest by itself."""
+    likeliest, *others = some
     return {"seen_in": likeliest, **({"or_in": others} if others else {})}
 
 

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from crosscheck.calibration.alternatives import alternatives, shared
 from crosscheck.calibration.equals import EQUAL
 from crosscheck.calibration.exact import Refit
@@ -26,7 +24,7 @@ from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.set_steps import fit_of, steps_of_set
 from crosscheck.diagnosis.small import share_of
 from crosscheck.diagnosis.steps import OTHER
-from crosscheck.diagnosis.unexplained import where_of
+from crosscheck.diagnosis.unexplained import floor_of, where_of
 from crosscheck.diagnosis.words import (
     agreement_words,
     and_what_is_left,
@@ -38,8 +36,7 @@ from crosscheck.diagnosis.words import (
     words_of,
 )
 from crosscheck.fit.candidates import Candidate
-from crosscheck.fit.prepare import noise_floor
-from crosscheck.fit.problem import KINDS, Rms, rms_by_kind
+from crosscheck.fit.problem import rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.words import rms_words
 
@@ -70,7 +67,7 @@ def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
         missing,
         search,
         before=sought.calibration.before,
-        floor=_floor(sought),
+        floor=floor_of(sought),
         candidates=_not_listed(search, chances, sought.judgement, frozenset().union(*some)),
         notes=(*notes, *_noise_notes(sought), *_size_notes(sought), *([MORE] * more)),
         chances=chances,
@@ -123,22 +120,6 @@ def _rivals(sought: SetSearch, names: Names, name: str) -> list[Rival]:
 def _rival(sought: SetSearch, own: Refit, swapped: Refit, other: str) -> Rival:
     fit = fit_of(sought.calibration.setting, swapped.joint)
     return Rival(other, fit, own.score - swapped.score)
-
-
-def _floor(sought: SetSearch) -> Rms:
-    """The rms errors of the noise at its estimated size.
-
-    Beside something unknown it is no larger than assumed: the estimate takes what is unknown for
-    noise, which would then never be large enough to matter.
-    """
-    floor = noise_floor(sought.calibration.setting.problem, sought.calibration.joint.state)
-    scale = sought.found.best.joint.colour.scale
-    if sought.judgement.verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
-        scale = np.minimum(scale, 1.0)
-    return {
-        kind.key: None if floor[kind.key] is None else float(scale[k]) * (floor[kind.key] or 0.0)
-        for k, kind in enumerate(KINDS)
-    }
 
 
 def _noise_notes(sought: SetSearch) -> list[str]:

@@ -35,10 +35,11 @@ def weighed(found: Diagnosis, problem: Problem, tolerance: Tolerance) -> Diagnos
     assert found.search is not None
     names = " and ".join(effect.effect for effect in found.missing)
     start = f"Missing: {names}. The structure" if names else "The structure"
+    like = "" if found.chances is None else found.chances.looks_like
     return replace(
         found,
         verdict=verdict,
-        sentence=f"{start} that remains is too small to matter: {left.words}.",
+        sentence=f"{start} that remains is too small to matter: {left.words}.{like}",
         measure_next=tuple(measure_next(found.search, found.missing, verdict, found.where)),
     )
 

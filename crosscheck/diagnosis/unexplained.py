@@ -24,7 +24,7 @@ from crosscheck.diagnosis.small import share_of, small_effects_alone, spoils
 from crosscheck.diagnosis.words import and_what_is_left, none_of, words_of
 from crosscheck.fit.possible import is_plausible
 from crosscheck.fit.prepare import noise_floor
-from crosscheck.fit.problem import rms_by_kind
+from crosscheck.fit.problem import KINDS, Rms, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.smooth import beyond_smooth
 
@@ -35,8 +35,13 @@ _LEAST_SHARE, _LEAST_ALONE = 0.5, (2.0 / 3.0, 1.0 / 3.0)
 _MOST_WHERE = 5
 
 
-def unexplained(found: Search, chances: Chances, notes: Sequence[str]) -> Diagnosis:
-    """The diagnosis of a search that leaves structure."""
+def unexplained(found: Search, sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
+    """The diagnosis of a search that leaves structure.
+
+    Args:
+        found: the steps. sought: the compared sets. notes: notes to begin with.
+    """
+    chances = chances_of(sought)
     missing, shown = _warranted(found, chances)
     found = shown if missing else found
     return diagnosis_of(
@@ -45,13 +50,29 @@ def unexplained(found: Search, chances: Chances, notes: Sequence[str]) -> Diagno
         missing,
         found,
         before=rms_by_kind(found.problem, found.steps[0].fit.state.raw),
-        floor=noise_floor(found.problem, found.last.fit.state),
+        floor=floor_of(sought),
         candidates=not_listed(found, [m.effect for m in missing]),
         notes=notes,
         chances=chances,
         shown=shown,
         where=where_of(shown),
     )
+
+
+def floor_of(sought: SetSearch) -> Rms:
+    """The rms errors of the noise at its estimated size.
+
+    Beside something unknown it is no larger than assumed: the estimate takes what is unknown for
+    noise, which would then never be large enough to matter.
+    """
+    floor = noise_floor(sought.calibration.setting.problem, sought.calibration.joint.state)
+    scale = sought.found.best.joint.colour.scale
+    if sought.judgement.verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
+        scale = np.minimum(scale, 1.0)
+    return {
+        kind.key: None if floor[kind.key] is None else float(scale[k]) * (floor[kind.key] or 0.0)
+        for k, kind in enumerate(KINDS)
+    }
 
 
 def beside_imitated(found: Search, sought: SetSearch) -> SetSearch:
@@ -94,7 +115,7 @@ def _is_warranted(found: Search, name: str) -> bool:
 
 
 def _sentence(missing: Sequence[MissingEffect], tried: int, chances: Chances) -> str:
-    like = f" It looks like {' or '.join(chances.seen)}." if chances.seen else ""
+    like = chances.looks_like
     if not missing:
         return f"Structure remains that {none_of(tried)}: an unknown effect is missing.{like}"
     left = "structure remains that no known effect explains"

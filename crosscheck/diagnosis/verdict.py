@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from crosscheck.calibration.judgement import SURE, too_large
 from crosscheck.calibration.search import search_sets
-from crosscheck.diagnosis.chances import PROBABLE, chances_of
+from crosscheck.diagnosis.chances import PROBABLE
 from crosscheck.diagnosis.explained import explained
 from crosscheck.diagnosis.importance import weighed
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
@@ -167,7 +167,7 @@ def _searched(
     said = sought.judgement
     if said.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT or said.imitated is not None:
         return explained(beside_imitated(found, sought), notes)
-    return unexplained(found, chances_of(sought), (*notes, *more))
+    return unexplained(found, sought, (*notes, *more))
 
 
 def is_clear(steps: Diagnosis) -> bool:

@@ -22,7 +22,7 @@ DOUBT = Imitated(4.0, frozenset({"pulley_radius"}), (Varying.POSITION,))
 def by_sets(in_place: Imitated) -> Chances:
     classes = SimpleNamespace(members=(), probability=(), effect={}, further={})
     sought: Any = SimpleNamespace(
-        classes=classes, in_place=in_place, field_odds=None, shown=None, varies=None,
+        classes=classes, in_place=in_place, field_odds=None, shown=None, varies=(),
         calibration=SimpleNamespace(together=None), judgement=SimpleNamespace(imitated=None),
     )  # fmt: skip
     return chances_of(sought)

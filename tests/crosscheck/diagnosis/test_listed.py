@@ -10,11 +10,12 @@ import pytest
 from made_diagnoses import pulleys, unknown
 
 from crosscheck.calibration.equals import SMALL
+from crosscheck.diagnosis import unexplained as module
 from crosscheck.diagnosis.importance import weighed
 from crosscheck.diagnosis.listed import _with_equals, left_out, missing_of, not_listed
 from crosscheck.diagnosis.result import Diagnosis, NotListed
 from crosscheck.diagnosis.search import Search
-from crosscheck.diagnosis.unexplained import unexplained, where_of
+from crosscheck.diagnosis.unexplained import where_of
 from crosscheck.fit.problem import rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.tolerance import Tolerance
@@ -72,10 +73,16 @@ def test_a_step_tells_the_errors_with_its_effect() -> None:
     assert there.stderr == pytest.approx(ratio * effect.stderr)
 
 
-def test_structure_that_nothing_explains_is_said_with_what_it_goes_with() -> None:
-    search, chances = searched(unknown()), unknown().chances
+def test_structure_that_nothing_explains_is_said_with_what_it_goes_with(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    search, chances, floor = searched(unknown()), unknown().chances, unknown().floor
     assert chances is not None
-    found = unexplained(search, chances, ["a note"])
+    monkeypatch.setattr(module, "chances_of", lambda _sought: chances)
+    monkeypatch.setattr(module, "floor_of", lambda _sought: floor)
+    sought: Any = None
+    found = module.unexplained(search, sought, ["a note"])
+    assert found.floor == floor
     assert found.verdict is DiagnosisVerdict.UNKNOWN_EFFECT and "a note" in found.notes
     assert all(len(effect.layout) <= SMALL for effect in found.missing)
     assert [row.p for row in where_of(search)] == sorted(row.p for row in where_of(search))
