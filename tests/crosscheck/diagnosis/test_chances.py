@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 from made_data import COGIRO, measured, term
 
 from crosscheck.calibration.all_effects import JointErrors
+from crosscheck.calibration.varying import Varying
 from crosscheck.diagnosis import nearby
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.nearby import _impossible, _refitted, chances_near
@@ -68,6 +70,11 @@ def test_a_class_has_the_probability_of_all_its_members() -> None:
     assert chances.of("b") == 0.95
     assert chances.of("nobody") == 0.0
     assert chances.as_json()["unknown"] == {"log_odds": -3.0, "shown_from": None}
+    assert chances.looks_like == ""
+    seen = replace(chances, varies=(Varying.LAG, Varying.SESSION))
+    assert seen.looks_like == f" It looks like {Varying.LAG} or {Varying.SESSION}."
+    there = seen.as_json()["unknown"]
+    assert (there["seen_in"], there["or_in"]) == (Varying.LAG, [Varying.SESSION])
 
 
 @pytest.mark.parametrize(("p", "words"), [(0.999, "> 99 %"), (0.001, "< 1 %"), (0.5, "50 %")])
