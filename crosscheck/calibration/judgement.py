@@ -124,8 +124,7 @@ def judge(
         sure = tuple(name for name in carrying_most(found, worth, _MOST) if name in sure)
     if in_place.chance:
         # of several members that stay, some may absorb what others explain
-        # and all of them do where even with the members there is no noise
-        kept = () if not_noise else carrying_most(found, in_place.worth, _ALL)
+        kept = carrying_most(found, in_place.worth, _ALL)
         kept = tuple(name for name in kept if name not in doubted)
         if kept or not unknown:
             return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, kept, undecided, imitated=in_place)

@@ -189,10 +189,6 @@ def test_a_field_in_the_place_of_members_is_something_unknown() -> None:
     far = judge(found, classes, -5.0, 9.0, in_place=replace(here, worth={"a": 20.0}))
     assert (far.verdict, far.sure) == (DiagnosisVerdict.UNKNOWN_EFFECT, ())
     assert far.imitated is None
-    # what the members leave is no noise: those that stay may absorb what the field does not follow
-    loud = judge(found, classes, -5.0, 1.0, not_noise=True, in_place=here)
-    assert (loud.verdict, loud.sure) == (DiagnosisVerdict.UNKNOWN_EFFECT, ())
-    assert loud.imitated is None
 
 
 def test_a_large_set_of_large_groups_is_a_calibration() -> None:
