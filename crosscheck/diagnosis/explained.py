@@ -24,7 +24,7 @@ from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.set_steps import fit_of, steps_of_set
 from crosscheck.diagnosis.small import share_of
 from crosscheck.diagnosis.steps import OTHER
-from crosscheck.diagnosis.unexplained import floor_of, where_of
+from crosscheck.diagnosis.unexplained import estimated_floor, where_of
 from crosscheck.diagnosis.words import (
     agreement_words,
     and_what_is_left,
@@ -67,7 +67,7 @@ def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
         missing,
         search,
         before=sought.calibration.before,
-        floor=floor_of(sought),
+        floor=estimated_floor(sought),
         candidates=_not_listed(search, chances, sought.judgement, frozenset().union(*some)),
         notes=(*notes, *_noise_notes(sought), *_size_notes(sought), *([MORE] * more)),
         chances=chances,

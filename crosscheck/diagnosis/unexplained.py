@@ -50,7 +50,7 @@ def unexplained(found: Search, sought: SetSearch, notes: Sequence[str]) -> Diagn
         missing,
         found,
         before=rms_by_kind(found.problem, found.steps[0].fit.state.raw),
-        floor=floor_of(sought),
+        floor=estimated_floor(sought),
         candidates=not_listed(found, [m.effect for m in missing]),
         notes=notes,
         chances=chances,
@@ -59,7 +59,7 @@ def unexplained(found: Search, sought: SetSearch, notes: Sequence[str]) -> Diagn
     )
 
 
-def floor_of(sought: SetSearch) -> Rms:
+def estimated_floor(sought: SetSearch) -> Rms:
     """The rms errors of the noise at its estimated size.
 
     Beside something unknown it is no larger than assumed: the estimate takes what is unknown for

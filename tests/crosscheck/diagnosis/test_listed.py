@@ -79,7 +79,7 @@ def test_structure_that_nothing_explains_is_said_with_what_it_goes_with(
     search, chances, floor = searched(unknown()), unknown().chances, unknown().floor
     assert chances is not None
     monkeypatch.setattr(module, "chances_of", lambda _sought: chances)
-    monkeypatch.setattr(module, "floor_of", lambda _sought: floor)
+    monkeypatch.setattr(module, "estimated_floor", lambda _sought: floor)
     sought: Any = None
     found = module.unexplained(search, sought, ["a note"])
     assert found.floor == floor
