@@ -142,6 +142,20 @@ def test_what_is_within_its_error_of_nothing_is_not_sure() -> None:
     assert nothing_by_themselves(setting, found.found, none) == frozenset()
 
 
+def test_what_its_set_needs_stays_sure_however_near_nothing_it_seems(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Errors are those of a linear model, which may not hold there."""
+    found = sought([term(ROBOT, "pulley_radius", radius_m=0.006)])
+    both = Judgement(DiagnosisVerdict.EFFECTS_FOUND, ("stiffness", "pulley_radius"), 0.0)
+    near = {"pulley_radius": 0.1, "stiffness": 0.2}
+    monkeypatch.setattr(
+        search, "_near_nothing", lambda _setting, _fit, some: {n: near[n] for n in some}
+    )
+    setting = found.calibration.setting
+    assert nothing_by_themselves(setting, found.found, both) == {"stiffness"}
+
+
 def assert_a_model_by_itself(found: SetSearch) -> None:
     """Of effects that are found alone the values are the best without those not listed."""
     one = Judgement(DiagnosisVerdict.EFFECTS_FOUND, ("gravity_tilt",), 0.0)

@@ -129,6 +129,24 @@ def test_what_changes_from_run_to_run_is_an_offset_of_each() -> None:
     assert unexplained(kinds[Varying.LENGTHS_BY_RUN], signal) > 0.1
 
 
+def test_short_runs_and_many_have_no_offsets_of_their_own() -> None:
+    robot = load_robot(COGIRO)
+    problem = prepare(robot, measured(robot, points=18), Terms()).problem
+    terms = Terms([term(robot, "tracker_scale", factor=1.0)])
+    setting = Setting(problem, problem.noise(problem.experiment.predict(())), chain_of(problem))
+    joint = settle(setting, evaluate(problem, terms, setting.factor), widths_of(terms), WHITE)
+    by_run = {Varying.POSITION_BY_RUN, Varying.LENGTHS_BY_RUN}
+
+    def told(rows_a_run: int) -> bool:
+        run = np.array([f"{k // rows_a_run}" for k in range(problem.data.n_rows)])
+        anew = replace(problem, data=replace(problem.data, run=run))
+        return by_run <= dict(varying_in_time(replace(setting, problem=anew), joint)).keys()
+
+    # 144 rows: 18 runs, 24 runs, and one
+    assert problem.data.n_rows == 144
+    assert told(8) and not told(6) and not told(144)
+
+
 def test_exit_points_that_move_move_the_platform_as_they_do_at_each_place(
     fit: tuple[Setting, JointFit],
 ) -> None:

@@ -10,6 +10,7 @@ import pytest
 from made_diagnoses import pulleys, unknown
 
 from crosscheck.calibration.equals import SMALL
+from crosscheck.calibration.varying import Varying
 from crosscheck.diagnosis import unexplained as module
 from crosscheck.diagnosis.importance import weighed
 from crosscheck.diagnosis.listed import _with_equals, left_out, missing_of, not_listed
@@ -94,6 +95,10 @@ def test_structure_too_small_to_matter_is_no_unknown_effect() -> None:
     small = weighed(found, problem, Tolerance(position_m=1.0, orientation_rad=1.0, tension_N=1e3))
     assert small.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT
     assert "is too small to matter: " in small.sentence and small.left is not None
+    assert found.chances is not None
+    seen = replace(found, chances=replace(found.chances, varies=(Varying.LAG,)))
+    told = weighed(seen, problem, Tolerance(position_m=1.0, orientation_rad=1.0, tension_N=1e3))
+    assert told.sentence == f"{small.sentence} It looks like {Varying.LAG}."
     large = weighed(found, problem, Tolerance(position_m=1e-6))
     assert large.verdict is DiagnosisVerdict.UNKNOWN_EFFECT and large.sentence == found.sentence
 
