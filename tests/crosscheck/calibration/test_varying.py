@@ -129,6 +129,15 @@ def test_what_changes_from_run_to_run_is_an_offset_of_each() -> None:
     assert unexplained(kinds[Varying.LENGTHS_BY_RUN], signal) > 0.1
 
 
+def test_no_reading_lags_behind_another_run(fit: tuple[Setting, JointFit]) -> None:
+    setting, joint = fit
+    lag = rough(setting, joint)[Varying.LAG][:, 0]
+    run = setting.problem.data.run_index
+    first = np.append(True, run[1:] != run[:-1])[setting.problem.row_of]
+    assert first.any() and np.all(lag[first] == 0.0)
+    assert np.mean(lag[~first] != 0.0) > 0.5
+
+
 def test_short_runs_and_many_have_no_offsets_of_their_own() -> None:
     robot = load_robot(COGIRO)
     problem = prepare(robot, measured(robot, points=18), Terms()).problem
