@@ -20,6 +20,8 @@ from crosscheck.measurements.data import Measurements
 from seecr.effects import Terms
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
 
+pytestmark = pytest.mark.slow
+
 ROBOT = soft_cogiro()
 # What looks like something that changes in time, so that the tests do not take long.
 FEW = ["exit_point_error", "cable_length_offset", "tracker_frame", "pulley_radius", "hysteresis"]
