@@ -20,7 +20,13 @@ EFFECTS = {
 
 
 def compile_all() -> None:
-    """Solve, predict and derive a little: each compiled function has one signature."""
+    """Each compiled function has one signature."""
+    compile_rests()
+    compile_margins()
+
+
+def compile_rests() -> None:
+    """Solve, predict and derive a little."""
     robot = seecr.load_robot(seecr.model_path("planar_vertical"))
     poses = np.tile(robot.reference_pose, (2, 1))
     wrench = np.array([0.0, 0.0, 0.0, 0.0, 1e-6, 0.0])
@@ -30,8 +36,13 @@ def compile_all() -> None:
     for name, values in EFFECTS.items():
         terms = seecr.Terms([seecr.Term.of(robot, name, **values)])
         sensitivities(experiment, terms, experiment.predict(terms.effects))
+
+
+def compile_margins() -> None:
+    """Margins and distributions of tensions, which need nothing of the rest."""
     # jointed and free platforms have margins by functions of their own
-    for each in (robot, seecr.load_robot(seecr.model_path("demobot_parallel"))):
-        tension_margin(each, each.reference_pose)
+    for name in ("planar_vertical", "demobot_parallel"):
+        robot = seecr.load_robot(seecr.model_path(name))
+        tension_margin(robot, robot.reference_pose)
     one = np.ones((1, 1))
     distribute(one[None], one, one, 0.0 * one, 2.0 * one)
