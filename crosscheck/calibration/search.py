@@ -12,7 +12,7 @@ from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.colour import Colour
 from crosscheck.calibration.detectable import detectable_size
 from crosscheck.calibration.equals import EQUAL, parameters_counted
-from crosscheck.calibration.exact import Refit
+from crosscheck.calibration.exact import FEW, Refit
 from crosscheck.calibration.imitated import Imitated, field_in_place
 from crosscheck.calibration.joining import layouts
 from crosscheck.calibration.joint import JointFit, Setting
@@ -32,6 +32,7 @@ from crosscheck.calibration.sets import Names
 from crosscheck.calibration.stages import Progress
 from crosscheck.calibration.unknown import unknown_beside
 from crosscheck.calibration.varying import Varying
+from crosscheck.calibration.widened import widened
 from crosscheck.fit.nothing import distance_from_nothing, is_nothing
 from crosscheck.fit.possible import can_be, hardly_happens
 from crosscheck.fit.problem import KINDS, Problem, Rms, kinds_read
@@ -223,9 +224,13 @@ def _classes(
             :func:`crosscheck.calibration.equals.parameters_counted`.
         further: scores of further sets that were fitted.
     """
-    scores, fitted = {**all_scores(found), **further}, {*found.refits, *further}
+    scores = {**all_scores(found), **further}
+    fitted = {names: scores[names] for names in (*found.refits, *further)}
     hints = alike_beyond(found.scores, own, sizes)
-    return probabilities(scores, own, list(sizes), sizes, fitted, hints)
+    classes = probabilities(scores, own, list(sizes), sizes, fitted, hints)
+    # of many effects none is sure because others explain nearly as well: nor are all together
+    few = len(own - found.always) <= FEW
+    return widened(classes, scores, fitted, own) if few else classes
 
 
 def with_equivalents(
