@@ -18,7 +18,7 @@ from crosscheck.calibration.sets import Names
 _NEARLY, _TO = 6.0, 0.97
 
 
-def widened(
+def sure_together(
     classes: Classes, scores: Mapping[Names, float], fitted: Mapping[Names, float], best: Names
 ) -> Classes:
     """The classes, joined by what explains nearly as well where that makes them sure.

@@ -8,7 +8,7 @@ import pytest
 
 from crosscheck.calibration.probability import Classes, probabilities
 from crosscheck.calibration.sets import Names
-from crosscheck.calibration.widened import widened
+from crosscheck.calibration.sure_together import sure_together
 
 # The best set has "a"; "b" to "e" explain less and less in its place.
 ALONE = {frozenset("a"): 0.0, frozenset("b"): -3.2, frozenset("c"): -3.4, frozenset("d"): -3.6}
@@ -17,7 +17,7 @@ ALONE |= {frozenset("e"): -5.0, frozenset(): -20.0}
 
 def wider(scores: Mapping[Names, float], best: str) -> Classes:
     classes = probabilities(scores, frozenset(best), "abcdef")
-    return widened(classes, scores, scores, frozenset(best))
+    return sure_together(classes, scores, scores, frozenset(best))
 
 
 def test_what_explains_nearly_as_well_joins_until_the_class_is_sure() -> None:
