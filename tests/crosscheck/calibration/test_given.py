@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -77,6 +78,27 @@ def test_what_joined_from_elsewhere_stays_where_the_fit_begins_again_from_afar(
     added = [term(ROBOT, "nonlinear_elasticity", quadratic=1.0)]
     found = stages._joined(setting, poor, first, added)
     assert {"cable_weight", "nonlinear_elasticity"} <= set(found.terms.names)
+
+
+@pytest.mark.parametrize(("together", "kept"), [
+    (True, {"drum_eccentricity", "hysteresis", "creep"}), (False, {"hysteresis"}),
+])  # fmt: skip
+def test_what_costs_more_together_joins_one_by_one(
+    monkeypatch: pytest.MonkeyPatch, together: bool, kept: set[str]
+) -> None:
+    """Drums out of round in many numbers had kept out hysteresis, which was there."""
+    some = ["drum_eccentricity", "hysteresis", "creep"]
+    tried: list[list[str]] = []
+
+    def with_more(_setting: object, fit: Any, _first: object, added: list[str]) -> Any:
+        tried.append(added)
+        pays = together if len(added) > 1 else added == ["hysteresis"]
+        return fit | set(added) if pays else fit
+
+    monkeypatch.setattr(stages, "_with_more", with_more)
+    found: Any = stages._joined(None, set(), Terms(), some)  # type: ignore[arg-type]
+    assert found == kept
+    assert tried == [some, *([] if together else [[name] for name in some])]
 
 
 class AllFittedError(Exception):
