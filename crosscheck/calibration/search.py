@@ -3,48 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-import numpy as np
-
-from crosscheck.calibration.all_effects import PLAIN, Calibration, covariance, fit_all_effects
+from crosscheck.calibration.all_effects import PLAIN, Calibration, covariance
 from crosscheck.calibration.catalogue import Catalogue
-from crosscheck.calibration.colour import Colour
+from crosscheck.calibration.compared import all_stated, fit_and_compare
 from crosscheck.calibration.detectable import detectable_size
 from crosscheck.calibration.equals import EQUAL, parameters_counted
-from crosscheck.calibration.exact import Refit
+from crosscheck.calibration.exact import FEW, Refit
 from crosscheck.calibration.imitated import Imitated, field_in_place
-from crosscheck.calibration.joining import layouts
-from crosscheck.calibration.joint import JointFit, Setting
-from crosscheck.calibration.judgement import NOTHING, SURPRISE, Judgement, judge
+from crosscheck.calibration.joint import Setting
+from crosscheck.calibration.judgement import NOTHING, Judgement, judge
 from crosscheck.calibration.linearised import free_of
-from crosscheck.calibration.not_noise import is_not_noise
-from crosscheck.calibration.own_noise import by_own_noise
 from crosscheck.calibration.probability import (
     Classes,
     alike_beyond,
     all_scores,
     probabilities,
 )
-from crosscheck.calibration.refits import ROUNDS, Found, compare_sets
+from crosscheck.calibration.refits import Found
 from crosscheck.calibration.replaceable import Replaced
 from crosscheck.calibration.sets import Names
 from crosscheck.calibration.stages import Progress
+from crosscheck.calibration.sure_together import sure_together
 from crosscheck.calibration.unknown import unknown_beside
 from crosscheck.calibration.varying import Varying
 from crosscheck.fit.nothing import distance_from_nothing, is_nothing
 from crosscheck.fit.possible import can_be, hardly_happens
-from crosscheck.fit.problem import KINDS, Problem, Rms, kinds_read
+from crosscheck.fit.problem import Problem, Rms
 from crosscheck.fit.reasons import DiagnosisVerdict
-from crosscheck.fit.state import State, evaluate
 from crosscheck.measurements.data import Sigma
 from seecr.description.robot import Robot
-from seecr.effects import Term, Terms
+from seecr.effects import Terms
 
-# Sets refitted about one linear model; fewer if something unknown is there, which none explains.
-_REFITTED, _REFITTED_UNKNOWN = 20, 4
-# The noise that fewer effects leave may be so many times what was stated.
-_LOUDER = 1.25
 # Most equivalents that are fitted in place of a listed member.
 _SWAPPED = 6
 
@@ -93,27 +84,19 @@ def search_sets(
         given: sets that were found elsewhere, with their values, the best last; they are compared
             too.
     """
-    first = given[-1] if given else None
-    whole = fit_all_effects(problem, terms, lambda text, part: progress(text, 0.5 * part), first)
-    setting, joint = whole.setting, whole.joint
-    known = [k.name for k in kinds_read(problem) if getattr(stated, k.sigma) is not None]
-    all_stated = len(known) == len(kinds_read(problem))
-    unknown = unknown_beside(setting, joint, all_stated)
-    surprise = float(np.max(whole.held_out.surprise, initial=0.0))
-    odds, smooth = unknown.odds, unknown.is_there or surprise > SURPRISE
-    catalogue = _catalogue(problem, terms, whole)
-    found, not_noise, without = _compared(
-        whole, catalogue, evaluate(problem, terms, setting.factor), progress, given, known, smooth
-    )
+    every = fit_and_compare(problem, stated, terms, progress, given)
+    whole, catalogue, found, unknown = every.whole, every.catalogue, every.found, every.unknown
+    setting, joint, odds, without = whole.setting, whole.joint, unknown.odds, every.without
     effects = [n for n in catalogue.names if n not in terms]
     sizes = {name: parameters_counted(catalogue.start(name).layout) for name in effects}
     best = found.best
     in_place = field_in_place(setting, best.joint, best.widths, found.scores)
     classes = _classes(found, best.names, sizes)
-    beside = unknown_beside(setting, best.joint, all_stated).odds
+    beside = unknown_beside(setting, best.joint, all_stated(problem, stated)).odds
     said = judge(
-        found, classes, odds, surprise, not_noise, _doubted(found), beside, in_place, without
-    )
+        found, classes, odds, every.surprise, every.not_noise, _doubted(found), beside, in_place,
+        without,
+    )  # fmt: skip
     said = said.without(nothing_by_themselves(setting, found, said))
     if said.verdict is DiagnosisVerdict.MANY_EFFECTS and said.sure:
 
@@ -147,71 +130,6 @@ def search_sets(
     return SetSearch(whole, found, catalogue, classes, odds, shown, said, in_place, varies)
 
 
-def _compared(
-    whole: Calibration, catalogue: Catalogue, plain: State, progress: Progress,
-    given: Sequence[Terms], stated: Sequence[str], smooth: bool,
-) -> tuple[Found, bool, Mapping[Names, float]]:  # fmt: skip
-    """The compared sets, whether what the best of them takes for noise is not noise, and how
-    probable it is that groups of its members are noise.
-
-    Args:
-        whole, catalogue, plain: the fit of all effects, their starts, and the model as it stands.
-        progress, given: as in :func:`search_sets`.
-        stated: names of the kinds of reading whose noise was stated.
-        smooth: whether something smooth and unknown is there beside all effects.
-    """
-    setting, tried = whole.setting, 0
-
-    def compared(unknown: bool, *more: Terms, joint: JointFit = whole.joint) -> Found:
-        most, rounds = (_REFITTED_UNKNOWN, 1) if unknown else (_REFITTED, ROUNDS)
-
-        def report(text: str) -> None:
-            nonlocal tried
-            tried += 1
-            progress(f"trying {text}", 0.5 + 0.5 * tried / (tried + most))
-
-        return compare_sets(setting, joint, catalogue, plain, report, most, rounds, [*given, *more])
-
-    structure_beside_all = is_not_noise(setting, whole.joint, stated)
-    found = compared(structure_beside_all or smooth)
-    not_noise = is_not_noise(setting, found.best.joint, stated)
-    if structure_beside_all and not not_noise and not smooth:
-        # what few effects explain, all of them could: their fit ended in a local minimum
-        found = compared(False, found.best.joint.terms)
-        not_noise = is_not_noise(setting, found.best.joint, stated)
-    if not_noise or smooth:
-        return found, not_noise, NOTHING
-
-    def may_be(fit: JointFit) -> bool:
-        return not _louder(fit.colour, stated) and not is_not_noise(setting, fit, stated)
-
-    own = by_own_noise(setting, found, may_be)
-    if own.fewer is not None:
-        joint = replace(whole.joint, colour=own.fewer.colour, weight=own.fewer.weight)
-        again = compared(False, own.fewer.terms, joint=joint)
-        if is_not_noise(setting, again.best.joint, stated):
-            return found, False, NOTHING  # nor is what fewer effects leave
-        found = again
-        own = by_own_noise(setting, found, may_be)
-        if own.fewer is not None:
-            return found, False, NOTHING  # the noise is still another: it says nothing for sure
-    return found, False, own.without
-
-
-def _louder(colour: Colour, stated: Sequence[str]) -> bool:
-    """Whether noise is larger than was stated: something unknown may be taken for noise."""
-    scale = [colour.scale[k] for k, kind in enumerate(KINDS) if kind.name in stated]
-    return max(scale, default=0.0) > _LOUDER
-
-
-def _catalogue(problem: Problem, terms: Terms, whole: Calibration) -> Catalogue:
-    """Every effect with its start: at null, or at the shape that the joint fit found promising."""
-    at_once, _later = layouts(problem)
-    nulls = (Term(a, a.null) for a in at_once if a.name not in terms)
-    here = Terms([*nulls, *(t for t in terms if t.name not in whole.later)])
-    return Catalogue(here, whole.later, whole.prices)
-
-
 def _classes(
     found: Found, own: Names, sizes: Mapping[str, int], further: Mapping[Names, float] = NOTHING
 ) -> Classes:
@@ -223,9 +141,13 @@ def _classes(
             :func:`crosscheck.calibration.equals.parameters_counted`.
         further: scores of further sets that were fitted.
     """
-    scores, fitted = {**all_scores(found), **further}, {*found.refits, *further}
+    scores = {**all_scores(found), **further}
+    fitted = {names: scores[names] for names in (*found.refits, *further)}
     hints = alike_beyond(found.scores, own, sizes)
-    return probabilities(scores, own, list(sizes), sizes, fitted, hints)
+    classes = probabilities(scores, own, list(sizes), sizes, fitted, hints)
+    # of many effects none is sure because others explain nearly as well: nor are all together
+    few = len(own - found.always) <= FEW
+    return sure_together(classes, scores, fitted, own) if few else classes
 
 
 def with_equivalents(

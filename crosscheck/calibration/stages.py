@@ -85,7 +85,8 @@ def fit_everything(
     progress("trying effects with history", 0.6)
     wanted = [a for a in wanted if a.name not in joint.terms]
     looked = promising_beside(frozen, joint, wanted)
-    added = [inside(one.term) for one in looked if one.gain > PAYS]
+    pays = sorted((one for one in looked if one.gain > PAYS), key=lambda one: -one.gain)
+    added = [inside(one.term) for one in pays]
     if added:
         progress(f"also fitting {', '.join(t.name for t in added)}", 0.7)
         joint = _joined(frozen, joint, start.terms, added)
@@ -230,9 +231,22 @@ def from_given(setting: Setting, joint: JointFit, start: State, given: Terms) ->
 
 
 def _joined(setting: Setting, joint: JointFit, first: Terms, added: list[Term]) -> JointFit:
+    """The fit with more effects; one by one, the most promising first, if all together cost more.
+
+    Drums out of round with many numbers and no use had kept hysteresis out, which was there.
+    """
+    best = _with_more(setting, joint, first, added)
+    if best is joint and len(added) > 1:
+        for term in added:
+            best = _with_more(setting, best, first, [term])
+    return best
+
+
+def _with_more(setting: Setting, joint: JointFit, first: Terms, added: list[Term]) -> JointFit:
     """The fit with more effects, from where the others ended and, if that was poor, from null.
 
-    In the latter case, effects that joined before stay in the fit, from null as well.
+    In the latter case, effects that joined before stay in the fit, from null as well. The fit as it
+    was if that with more is worth less.
     """
     starts = [Terms([*joint.terms, *added])]
     if float(np.max(joint.colour.scale)) > _POOR:

@@ -9,7 +9,9 @@ catalogue explains.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from scipy import special
@@ -85,6 +87,20 @@ class _Comparison:
 
     def _odds(self, columns: Array) -> float:
         """ln evidence with columns (N, k) minus that without, averaged over prior widths."""
+        found = self._scores(columns, FIELD_WIDTHS)
+        return float(special.logsumexp(found) - np.log(len(found))) - self._without
+
+    @cached_property
+    def _without(self) -> float:
+        """ln evidence with nothing more."""
+        return self._scores(np.zeros((len(self.about.y), 0)), (1.0,))[0]
+
+    def _scores(self, columns: Array, some: Sequence[float]) -> list[float]:
+        """ln evidence with columns (N, k) of some prior widths.
+
+        With the noise of the fit or as it is estimated beside the columns, whichever explains more:
+        that of the fit may be the noise beside other effects.
+        """
         setting, joint, free = self.setting, self.joint, self.about.width > 0.0
         x, y = np.concatenate([self.about.x[:, free], columns], axis=1), self.about.y
 
@@ -96,9 +112,7 @@ class _Comparison:
             off = np.log(colour.scale[np.unique(setting.chain.kind)])
             return total - (0.5 * float(np.sum((off / _STATED) ** 2)) if self.stated else 0.0)
 
-        without = score(1e-9, joint.colour)
-        tried = [score(width, joint.colour) for width in FIELD_WIDTHS]
-        best = FIELD_WIDTHS[int(np.argmax(tried))]
-        better = estimate(setting.chain, joint.colour, joint.weight, x, y, widths(best))
-        found = [max(score(w, better), t) for w, t in zip(FIELD_WIDTHS, tried, strict=True)]
-        return float(special.logsumexp(found) - np.log(len(found)) - without)
+        tried = [score(width, joint.colour) for width in some]
+        best = some[int(np.argmax(tried))]
+        own = estimate(setting.chain, joint.colour, joint.weight, x, y, widths(best))
+        return [max(score(w, own), t) for w, t in zip(some, tried, strict=True)]

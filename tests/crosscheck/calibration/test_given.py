@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
-from crosscheck.calibration import exact, refits, search, stages
+from crosscheck.calibration import compared, exact, refits, stages
 from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.joining import layouts
@@ -79,7 +80,28 @@ def test_what_joined_from_elsewhere_stays_where_the_fit_begins_again_from_afar(
     assert {"cable_weight", "nonlinear_elasticity"} <= set(found.terms.names)
 
 
-class Compared(Exception):
+@pytest.mark.parametrize(("together", "kept"), [
+    (True, {"drum_eccentricity", "hysteresis", "creep"}), (False, {"hysteresis"}),
+])  # fmt: skip
+def test_what_costs_more_together_joins_one_by_one(
+    monkeypatch: pytest.MonkeyPatch, together: bool, kept: set[str]
+) -> None:
+    """Drums out of round in many numbers had kept out hysteresis, which was there."""
+    some = ["drum_eccentricity", "hysteresis", "creep"]
+    tried: list[list[str]] = []
+
+    def with_more(_setting: object, fit: Any, _first: object, added: list[str]) -> Any:
+        tried.append(added)
+        pays = together if len(added) > 1 else added == ["hysteresis"]
+        return fit | set(added) if pays else fit
+
+    monkeypatch.setattr(stages, "_with_more", with_more)
+    found: Any = stages._joined(None, set(), Terms(), some)  # type: ignore[arg-type]
+    assert found == kept
+    assert tried == [some, *([] if together else [[name] for name in some])]
+
+
+class AllFittedError(Exception):
     """All was fitted at once: sets need not be compared."""
 
 
@@ -99,14 +121,14 @@ def test_the_best_of_what_was_found_elsewhere_is_tried(
         taken_as_given.append(setting.frozen)
         return joint
 
-    def compared(*_args: object) -> None:
-        raise Compared
+    def stop(*_args: object) -> None:
+        raise AllFittedError
 
     monkeypatch.setattr(stages, "from_given", spied)
     monkeypatch.setattr(stages, "with_rows_back", back)
-    monkeypatch.setattr(search, "compare_sets", compared)
+    monkeypatch.setattr(compared, "compare_sets", stop)
     for given in ([HIDDEN.without("cable_weight"), HIDDEN], []):
-        with pytest.raises(Compared):
+        with pytest.raises(AllFittedError):
             search_sets(problem, SIGMA, given=given)
     assert tried == [HIDDEN]
     # what was found elsewhere may have a history, and a walk for each parameter takes minutes

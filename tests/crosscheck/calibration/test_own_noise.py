@@ -9,7 +9,7 @@ import pytest
 from made_data import COGIRO, measured, term
 from score_chances import alike
 
-from crosscheck.calibration import own_noise, search
+from crosscheck.calibration import compared, own_noise, search
 from crosscheck.calibration.all_effects import Calibration, fit_all_effects
 from crosscheck.calibration.colour import Colour
 from crosscheck.calibration.own_noise import OwnNoise
@@ -51,28 +51,29 @@ def test_noise_that_all_effects_followed_is_found_again(monkeypatch: pytest.Monk
         small = Colour(np.array([0.25, 1.0, 1.0]), np.zeros(3))
         return replace(found, joint=replace(found.joint, colour=small))
 
-    monkeypatch.setattr(search, "fit_all_effects", followed)
-    monkeypatch.setattr(search, "is_not_noise", lambda _setting, _joint, _stated: False)
-    monkeypatch.setattr(
-        search, "unknown_beside", lambda _setting, _joint, _stated: UnknownOdds(-5.0)
-    )
+    monkeypatch.setattr(compared, "fit_all_effects", followed)
+    monkeypatch.setattr(compared, "is_not_noise", lambda _setting, _joint, _stated: False)
+    for module in (compared, search):
+        monkeypatch.setattr(
+            module, "unknown_beside", lambda _setting, _joint, _stated: UnknownOdds(-5.0)
+        )
     data = correlated()
     found = sought(data)
     assert found.found.best.names == {"pulley_radius"}
     noise = found.found.best.joint.colour
     assert noise.scale[0] == pytest.approx(0.5, rel=0.3) and noise.rho[0] > 0.6
     with monkeypatch.context() as louder:
-        louder.setattr(search, "_LOUDER", 0.3)  # as if that noise were larger than stated
+        louder.setattr(compared, "_LOUDER", 0.3)  # as if that noise were larger than stated
         assert sought(data).found.best.names > {"pulley_radius"}
     with monkeypatch.context() as structure:
         # as if what the pulley alone leaves were no noise
         structure.setattr(
-            search,
+            compared,
             "is_not_noise",
             lambda _setting, fit, _kinds: fit.terms.names == ("pulley_radius",),
         )
         assert sought(data).found.best.names > {"pulley_radius"}
-    monkeypatch.setattr(search, "by_own_noise", lambda _setting, _found, _may_be: OwnNoise())
+    monkeypatch.setattr(compared, "by_own_noise", lambda _setting, _found, _may_be: OwnNoise())
     assert sought(data).found.best.names > {"pulley_radius"}
 
 
@@ -97,13 +98,13 @@ def test_what_may_be_noise_is_told_as_less_probable_unless_the_noise_is_still_an
     def own(_setting: object, found: Found, _may_be: object) -> OwnNoise:
         return OwnNoise(found.best.joint if again else None, noise)
 
-    monkeypatch.setattr(search, "by_own_noise", own)
+    monkeypatch.setattr(compared, "by_own_noise", own)
     chance = sought(correlated()).classes.of("pulley_radius")
     assert chance > 0.99 if again else chance == pytest.approx(0.4)
 
 
 def test_only_kinds_whose_noise_was_stated_can_be_louder_than_that() -> None:
     colour = Colour(np.array([2.0, 1.2, 1.0]), np.zeros(3))
-    assert search._louder(colour, ["position", "orientation"])
-    assert not search._louder(colour, ["orientation", "tension"])
-    assert not search._louder(colour, [])
+    assert compared._louder(colour, ["position", "orientation"])
+    assert not compared._louder(colour, ["orientation", "tension"])
+    assert not compared._louder(colour, [])

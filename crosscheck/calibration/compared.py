@@ -1,0 +1,175 @@
+"""All effects are fitted at once, and sets of them compared about that fit and its noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from crosscheck.calibration.all_effects import Calibration, fit_all_effects
+from crosscheck.calibration.catalogue import Catalogue
+from crosscheck.calibration.colour import Colour
+from crosscheck.calibration.equals import EQUAL
+from crosscheck.calibration.joining import layouts
+from crosscheck.calibration.joint import JointFit, cost
+from crosscheck.calibration.judgement import SURPRISE
+from crosscheck.calibration.not_noise import is_not_noise
+from crosscheck.calibration.own_noise import by_own_noise
+from crosscheck.calibration.priors import widths_of
+from crosscheck.calibration.refits import ROUNDS, Found, compare_sets
+from crosscheck.calibration.sets import Names
+from crosscheck.calibration.stages import Progress
+from crosscheck.calibration.unknown import UnknownOdds, unknown_beside
+from crosscheck.fit.problem import KINDS, Problem, kinds_read
+from crosscheck.fit.state import evaluate
+from crosscheck.measurements.data import Sigma
+from seecr.effects import Term, Terms
+from seecr.pose import Array
+
+# Sets refitted about one linear model; fewer if something unknown is there, which none explains.
+_REFITTED, _REFITTED_UNKNOWN = 20, 4
+# The noise that fewer effects leave may be so many times what was stated.
+_LOUDER = 1.25
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """The fit of all effects, and the sets that were compared about it.
+
+    Attributes:
+        whole, catalogue: the fit of all effects, and their starts.
+        unknown: something unknown beside all effects.
+        found: the compared sets.
+        not_noise: whether what the best of them takes for noise is not noise.
+        without: how probable it is that groups of its members are noise.
+    """
+
+    whole: Calibration
+    catalogue: Catalogue
+    unknown: UnknownOdds
+    found: Found
+    not_noise: bool = False
+    without: Mapping[Names, float] = field(default_factory=dict)
+
+    @property
+    def surprise(self) -> float:
+        """chi2 per reading of the worst held-out run over what the fit of all expects."""
+        return _surprise(self.whole)
+
+    @property
+    def is_unexplained(self) -> bool:
+        """Whether something unknown is there beside all effects."""
+        return self.unknown.is_there or self.surprise > SURPRISE
+
+    @property
+    def is_a_local_minimum(self) -> bool:
+        """Whether the best set is nearer to the readings than the fit of all effects."""
+        joint, best = self.whole.joint, self.found.best.joint
+
+        def of(one: JointFit, width: Array) -> float:
+            return cost(self.whole.setting, joint.colour, joint.weight, one.state, width)
+
+        return of(best, widths_of(best.terms)) < of(joint, joint.width) - 2.0 * EQUAL
+
+
+def fit_and_compare(
+    problem: Problem, stated: Sigma, terms: Terms, progress: Progress, given: Sequence[Terms]
+) -> Compared:
+    """Fit all effects, then compare sets of them.
+
+    If something unknown is there beside all effects, but some of them alone explain more, the fit
+    of all ended in a local minimum, as it may where the history of rows matters. Then all of it is
+    done again from these.
+
+    Args: as in :func:`crosscheck.calibration.search.search_sets`.
+    """
+
+    def of(first: Terms | None) -> Compared:
+        def report(text: str, part: float) -> None:
+            progress(text, 0.5 * part)
+
+        whole = fit_all_effects(problem, terms, report, first)
+        return _compared(whole, stated, terms, progress, given)
+
+    every = of(given[-1] if given else None)
+    if every.is_unexplained and every.is_a_local_minimum:
+        every = of(every.found.best.joint.terms)
+    return every
+
+
+def all_stated(problem: Problem, stated: Sigma) -> bool:
+    """Whether the noise of every kind of reading was stated."""
+    return len(_stated(problem, stated)) == len(kinds_read(problem))
+
+
+def _stated(problem: Problem, stated: Sigma) -> list[str]:
+    """Names of the kinds of reading whose noise was stated."""
+    return [k.name for k in kinds_read(problem) if getattr(stated, k.sigma) is not None]
+
+
+def _compared(
+    whole: Calibration, stated: Sigma, terms: Terms, progress: Progress, given: Sequence[Terms]
+) -> Compared:
+    """Sets compared about a fit of all effects; the others as in :func:`fit_and_compare`."""
+    setting, tried = whole.setting, 0
+    problem, kinds = setting.problem, _stated(setting.problem, stated)
+    catalogue, plain = _catalogue(problem, terms, whole), evaluate(problem, terms, setting.factor)
+
+    def sets(unknown: bool, *more: Terms, joint: JointFit = whole.joint) -> Found:
+        most, rounds = (_REFITTED_UNKNOWN, 1) if unknown else (_REFITTED, ROUNDS)
+
+        def report(text: str) -> None:
+            nonlocal tried
+            tried += 1
+            progress(f"trying {text}", 0.5 + 0.5 * tried / (tried + most))
+
+        return compare_sets(setting, joint, catalogue, plain, report, most, rounds, [*given, *more])
+
+    def is_structure(fit: JointFit) -> bool:
+        return is_not_noise(setting, fit, kinds)
+
+    def may_be(fit: JointFit) -> bool:
+        return not _louder(fit.colour, kinds) and not is_structure(fit)
+
+    unknown = unknown_beside(setting, whole.joint, all_stated(problem, stated))
+    smooth = unknown.is_there or _surprise(whole) > SURPRISE
+    structure_beside_all = is_structure(whole.joint)
+    found = sets(structure_beside_all or smooth)
+    not_noise = is_structure(found.best.joint)
+    if structure_beside_all and not not_noise and not smooth:
+        # what few effects explain, all of them could: their fit ended in a local minimum
+        found = sets(False, found.best.joint.terms)
+        not_noise = is_structure(found.best.joint)
+    as_found = Compared(whole, catalogue, unknown, found, not_noise)
+    if not_noise or smooth:
+        return as_found
+    own = by_own_noise(setting, found, may_be)
+    if own.fewer is not None:
+        joint = replace(whole.joint, colour=own.fewer.colour, weight=own.fewer.weight)
+        found = sets(False, own.fewer.terms, joint=joint)
+        if is_structure(found.best.joint):
+            return as_found  # nor is what fewer effects leave
+        own = by_own_noise(setting, found, may_be)
+        as_found = replace(as_found, found=found)
+        if own.fewer is not None:
+            return as_found  # the noise is still another: it says nothing for sure
+    return replace(as_found, without=own.without)
+
+
+def _surprise(whole: Calibration) -> float:
+    return float(np.max(whole.held_out.surprise, initial=0.0))
+
+
+def _louder(colour: Colour, stated: Sequence[str]) -> bool:
+    """Whether noise is larger than was stated: something unknown may be taken for noise."""
+    scale = [colour.scale[k] for k, kind in enumerate(KINDS) if kind.name in stated]
+    return max(scale, default=0.0) > _LOUDER
+
+
+def _catalogue(problem: Problem, terms: Terms, whole: Calibration) -> Catalogue:
+    """Every effect with its start: at null, or at the shape that the joint fit found promising."""
+    at_once, _later = layouts(problem)
+    nulls = (Term(a, a.null) for a in at_once if a.name not in terms)
+    here = Terms([*nulls, *(t for t in terms if t.name not in whole.later)])
+    return Catalogue(here, whole.later, whole.prices)
