@@ -41,12 +41,14 @@ class Refit:
         names: the set. joint: its fit.
         widths: prior width of each member.
         score: ln evidence plus ln prior.
+        wished: widths that promise more, but for values far from the fit; None if there are none.
     """
 
     names: Names
     joint: JointFit
     widths: dict[str, float]
     score: float
+    wished: dict[str, float] | None = None
 
 
 @dataclass(eq=False)
@@ -163,7 +165,19 @@ class Exact:
         state = evaluate(self.setting.problem, start, self.setting.factor, self.plain)
         if not state.valid:
             return None
-        found = settle(self.setting, state, width_of(start, widths), self.joint.colour, _STEPS)
+        refit = self._settled(scores, names, state, widths)
+        if refit.wished is None:
+            return refit
+        # what other widths promise is far from a fit with these: it is looked for there
+        wished = refit.widths | refit.wished
+        again = self._settled(scores, names, refit.joint.state, wished)
+        return max(refit, again, key=lambda one: (self.can_be(one), one.score))
+
+    def _settled(
+        self, scores: Scores, names: Names, start: State, widths: dict[str, float]
+    ) -> Refit:
+        width = width_of(start.terms, widths)
+        found = settle(self.setting, start, width, self.joint.colour, _STEPS)
         return scored(self.setting, found, names, widths, scores)
 
 
@@ -209,24 +223,31 @@ def scored(
     gram = own_gram(linear, joint)
     # what moves readings at this fit need not have been in the linear model of the search
     inside = {n: widths.get(n, 1.0) for n in gram.names}
-    better = widths_near(gram, inside, joint.z)
+    better, wished = widths_near(gram, inside, joint.z)
     share = sum(log_shares(joint, linear).values()) + log_absent(setting, joint, linear, better)
     score = averaged(gram, better) + share + scores.log_prior(names)
     score -= 0.5 * (joint.state.log_det + left_to_gain(linear, joint.z))
-    return Refit(names, joint, widths | better, score)
+    return Refit(names, joint, widths | better, score, wished)
 
 
-def widths_near(gram: Gram, fitted: dict[str, float], z: Array) -> dict[str, float]:
-    """The widths that maximise the evidence; the fitted ones if the optimum with these is far off.
+def widths_near(
+    gram: Gram, fitted: dict[str, float], z: Array
+) -> tuple[dict[str, float], dict[str, float] | None]:
+    """The widths that maximise the evidence, if the optimum with these is near the fit.
 
     The linear model holds about the fit. Other widths may promise much for values far from there:
     without its mass and with cables that do not pull, no force would be needed on a platform.
 
     Args:
         gram: normal equations about a fit. fitted: its widths. z: (p,) its values.
+
+    Returns:
+        The widths, and None; or, where the optimum is far off, the fitted ones and the others.
     """
-    better = best_widths(gram, fitted)
-    return fitted if gram.solved(better).left_to_gain(z) > LOCAL_MINIMUM else better
+    best = best_widths(gram, fitted)
+    if gram.solved(best).left_to_gain(z) > LOCAL_MINIMUM:
+        return fitted, best
+    return best, None
 
 
 def own_gram(linear: Linear, joint: JointFit) -> Gram:

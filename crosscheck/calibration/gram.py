@@ -224,9 +224,14 @@ def best_widths(gram: Gram, start: Widths, price: float = 0.0) -> dict[str, floa
 
 
 def averaged(gram: Gram, chosen: Widths) -> float:
-    """ln Z of a set, averaged over the width of each member about the best widths."""
+    """ln Z of a set, averaged over the width of each member about the chosen widths.
+
+    These may be far from the best ones where the linear model does not hold there. Then only the
+    member counts that gains most by others: each of them may gain the same thing.
+    """
     solved = gram.solved(chosen)
-    return solved.log_evidence + sum(averaging(solved, name) for name in chosen)
+    each = [averaging(solved, name) for name in chosen]
+    return solved.log_evidence + sum(min(one, 0.0) for one in each) + max([0.0, *each])
 
 
 def averaging(solved: Solved, name: str) -> float:
