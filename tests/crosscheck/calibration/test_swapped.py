@@ -10,7 +10,7 @@ from made_data import COGIRO, SIGMA, measured, term
 
 from crosscheck.calibration.catalogue import Catalogue, gram_about
 from crosscheck.calibration.colour import WHITE, chain_of
-from crosscheck.calibration.exact import Exact, scored
+from crosscheck.calibration.exact import Exact, Refit, scored
 from crosscheck.calibration.joint import Setting, cost, settle
 from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.refits import swapped
@@ -109,6 +109,33 @@ def test_what_no_robot_can_have_does_not_take_the_place_of_what_one_can(
     monkeypatch.setattr(exact, "_from", lambda *_given: kept)
     exact.take(scores, heavy)
     assert exact.possible == {names: kept}
+
+
+@pytest.mark.parametrize("better", [True, False])
+def test_what_other_widths_promise_is_looked_for_there(
+    monkeypatch: pytest.MonkeyPatch, better: bool
+) -> None:
+    """Once, from where the fit ended; and the fit that explains more is kept."""
+    problem = warmed()
+    factor = problem.noise(problem.experiment.predict(()))
+    setting = Setting(problem, factor, chain_of(problem), frozen=True)
+    moved = Terms([term(ROBOT, "tracker_target", shift_x_m=1e-4)])
+    plain = evaluate(problem, Terms(), factor)
+    joint = settle(setting, evaluate(problem, moved, factor), widths_of(moved), WHITE)
+    exact = Exact(setting, joint, Catalogue(moved, Terms()), plain, lambda _text: None)
+    scores = Scores(gram_about(setting, joint, exact.catalogue), 1, frozenset())
+    name = "tracker_target"
+    narrow = Refit(frozenset({name}), joint, {name: 0.01}, -20.0, {name: 3.0})
+    wide = replace(narrow, widths={name: 3.0}, score=-10.0 if better else -30.0, wished={name: 9.0})
+    fits, asked = iter([narrow, wide]), list[float]()
+
+    def settled(_scores: object, _names: object, _start: object, widths: dict[str, float]) -> Refit:
+        asked.append(widths[name])
+        return next(fits)
+
+    monkeypatch.setattr(exact, "_settled", settled)
+    assert exact.fit(scores, narrow.names) is (wide if better else narrow)
+    assert asked[1:] == [3.0]
 
 
 def test_what_a_fit_did_not_find_is_no_evidence() -> None:
