@@ -30,10 +30,10 @@ def sure_together(
             explains nearly as well in place of another.
         best: the best set.
     """
-    for name in sorted(best):
-        members = next((some for some in classes.members if name in some), ())
-        if classes.of(name) <= SURE and len(best.intersection(members)) == 1:
-            classes = _joined(classes, scores, fitted, best, name)
+    for members in classes.members:
+        own = best.intersection(members)  # what the model has already is in no class
+        if len(own) == 1 and classes.of(min(own)) <= SURE:
+            classes = _joined(classes, scores, fitted, best, min(own))
     return classes
 
 

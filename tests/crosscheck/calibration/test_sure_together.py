@@ -57,3 +57,12 @@ def test_each_member_has_others_in_its_own_place() -> None:
     found = wider(scores, "ab")
     assert set(found.members[:2]) == {("a",), ("b", "c", "d")}
     assert found.of("b") > 0.95 and found.of("e") < 0.1
+
+
+def test_what_the_model_has_already_is_in_no_class() -> None:
+    scores = {names | {"tracker_frame"}: score for names, score in ALONE.items()}
+    best = frozenset({"a", "tracker_frame"})
+    classes = probabilities(scores, best, "abcdef")
+    found = sure_together(classes, scores, scores, best)
+    assert found.members[0] == ("a", "b", "c", "d")
+    assert not any("tracker_frame" in members for members in found.members)
