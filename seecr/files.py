@@ -240,7 +240,12 @@ def check_replaces(
 
 
 @contextmanager
-def staged(out: str | Path, option: str = "--out", sometimes: Iterable[str] = ()) -> Iterator[Path]:
+def staged(
+    out: str | Path,
+    option: str = "--out",
+    sometimes: Iterable[str] = (),
+    read: Iterable[Path | None] = (),
+) -> Iterator[Path]:
     """A temporary folder whose files move into ``out`` if the block ends without an error.
 
     It lies inside ``out``, so that moving is renaming; if the block fails, ``out`` is as it was.
@@ -250,9 +255,11 @@ def staged(out: str | Path, option: str = "--out", sometimes: Iterable[str] = ()
         option: the option that named it, for the error.
         sometimes: names of files that only some results have. If they are not written now they are
             removed, since they belong to an older result; nothing else is.
+        read: files that the results are made from; they are not overwritten.
 
     Raises:
         InputError: the folder cannot be made or written to; this comes before any work is done.
+        InputFileError: a result has the name of a file that was read.
     """
     out = Path(out)
     made = _missing(out)
@@ -270,6 +277,8 @@ def staged(out: str | Path, option: str = "--out", sometimes: Iterable[str] = ()
         yield folder
         written_now = sorted(folder.iterdir())
         for file in written_now:
+            _check_not_read(out / file.name, read, option)
+        for file in written_now:
             file.replace(out / file.name)
         for name in {*sometimes} - {file.name for file in written_now}:
             if (out / name).is_file():
@@ -279,6 +288,15 @@ def staged(out: str | Path, option: str = "--out", sometimes: Iterable[str] = ()
         shutil.rmtree(folder, ignore_errors=True)
         if not done:
             _remove_empty(made)
+
+
+def _check_not_read(path: Path, read: Iterable[Path | None], option: str) -> None:
+    """Check that a file to be written is none of those that were read."""
+    if path.exists() and any(one is not None and path.samefile(one) for one in read):
+        raise InputFileError.at(
+            path,
+            f"would be overwritten, but was read; expected another folder; name one with {option}",
+        )
 
 
 def _missing(path: Path) -> list[Path]:

@@ -17,7 +17,7 @@ from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.worth import log_gain
 from crosscheck.fit.definite import root_beside_one
 from crosscheck.fit.problem import Problem
-from crosscheck.fit.state import derivatives
+from crosscheck.fit.state import derivatives, evaluate
 from seecr.effects import Term, catalogue, layout_of
 from seecr.effects.base import Layout
 from seecr.pose import Array
@@ -80,7 +80,10 @@ def promising_beside(setting: Setting, joint: JointFit, later: Sequence[Layout])
         starts = [layout.start(s) for s in layout.effect.shapes(joint.state.prediction.setup)]
         if not starts:
             continue
-        gains = [beside.gain(Term(layout, start)) for start in starts]
+        gains = [
+            max(beside.gain(one), beside.gain_at_its_size(one))
+            for one in (Term(layout, start) for start in starts)
+        ]
         gain = float(special.logsumexp(gains) - np.log(len(gains)))
         term = Term(layout, starts[int(np.argmax(gains))])
         out.append(Promising(term, gain, max(gains) - gain))
@@ -112,8 +115,28 @@ class _Beside:
 
     def gain(self, term: Term) -> float:
         """ln evidence that an effect's amplitudes at null gain, with all others integrated out."""
-        setting, joint = self.setting, self.joint
-        x = joint.whitened(setting.chain, added_columns(setting, joint, term))
+        return self._gain(term, added_columns(self.setting, self.joint, term))
+
+    def gain_at_its_size(self, term: Term) -> float:
+        """The same by what a plausible size changes, for one amplitude with no shape or history.
+
+        Sag grows with the square of the weight: on a robot that only slides, its derivative at no
+        weight says next to nothing.
+        """
+        setting, state, layout = self.setting, self.joint.state, term.layout
+        if len(layout.names) != 1 or not amplitudes_at_null(term).all():
+            return -np.inf
+        there = term.with_vector(np.clip(layout.null + layout.scale, layout.lower, layout.upper))
+        if setting.problem.experiment.setup([there.effect()]).has_history:
+            return -np.inf
+        moved = evaluate(setting.problem, self.joint.terms.with_term(there), setting.factor, state)
+        if not moved.valid:
+            return -np.inf
+        return self._gain(term, (state.white - moved.white)[:, None])
+
+    def _gain(self, term: Term, columns: Array) -> float:
+        """The ln evidence that columns (N, k) of an effect's amplitudes gain."""
+        x = self.joint.whitened(self.setting.chain, columns)
         cross = linalg.solve_triangular(
             self.root, self.columns.T @ x, lower=True, check_finite=False
         )

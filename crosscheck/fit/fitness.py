@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.measurements.data import Sigma
+from seecr.description.joints import locked
 from seecr.pose import Array
 
 # Data are unfit if more than this part of their rows has no equilibrium.
@@ -40,6 +41,9 @@ def refusal_of(problem: Problem, predicted: Array, stated: Sigma) -> Refusal | N
         return Refusal(Unfit.NO_EQUILIBRIUM, n, lost, readings)
     if readings < _LEAST_READINGS:
         return Refusal(Unfit.FEW_READINGS, n, lost, readings)
+    moves = np.append(~locked(problem.robot), np.ones(problem.data.n_cables, dtype=bool))
+    if not problem.counted[:, moves].any():
+        return Refusal(Unfit.LOCKED_READINGS, n, lost, readings)
     used = np.flatnonzero(problem.use)
     if len(used) > 1 and np.all(np.ptp(commands[used], axis=0) <= _SAME):
         return Refusal(Unfit.CONSTANT_COMMANDS, n, lost, readings)

@@ -122,6 +122,7 @@ class Unfit(Enum):
     )
     CONSTANT_COMMANDS = "all commands are the same, so effects cannot be told apart"
     FROZEN_READINGS = "all readings are the same although the commands differ"
+    LOCKED_READINGS = "the robot's joints lock all parts of the pose that were read"
     CONTRADICTION = (
         "readings contradict each other: lines {lines} have the same command but readings far "
         "apart, and so do others"
@@ -146,6 +147,7 @@ _REMEDIES = {
     Unfit.FEW_POSES: _MORE_POSES,
     Unfit.CONSTANT_COMMANDS: _MORE_POSES,
     Unfit.FROZEN_READINGS: "check that the tracker followed the platform, and read the poses again",
+    Unfit.LOCKED_READINGS: "read parts of the pose that change with the commands, or tensions",
     Unfit.CONTRADICTION: "measure these poses again or remove the wrong rows; if the tracker or "
     "the winches were set up anew in between, put each set-up into a file of its own and use "
     "crosscheck add tracker_frame (or another effect) --per file",

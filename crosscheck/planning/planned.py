@@ -153,11 +153,19 @@ def planned(
         sigma: noise of every kind that is read.
         reads: what will be read.
         terms: effects of the model; by default none.
+
+    Raises:
+        CrosscheckError: the robot's joints lock all that will be read.
     """
     model = Terms() if terms is None else terms
     prediction = Experiment(robot, commands.as_commands(robot)).predict(model.effects)
     full = _as_read(commands, prediction.readings, reads)
     problem = Problem(robot, full, sigma, np.asarray(prediction.solved))
+    if prediction.solved.any() and not problem.measured.any():
+        raise CrosscheckError(
+            f"robot {robot.name}: its joints lock all that would be read "
+            f"({', '.join(reads.kinds)}); expected --reads of what moves, or of tension"
+        )
     factor = problem.noise(prediction)
     return Planned(problem, null_fit(problem, model, factor, refit=False), factor, reads)
 

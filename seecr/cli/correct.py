@@ -121,7 +121,7 @@ def command(
     limits = float("inf") if highest is None else highest
     near = _aim(aim, machine.n_cables)
     commands_of_it = ("corrected.csv", "corrected.toml")
-    with staged(out, sometimes=commands_of_it) as folder:
+    with staged(out, sometimes=commands_of_it, read=[poses]) as folder:
         with progress_share("correcting") as tell:
             found = correct(
                 machine, wanted.commands, effects=own or (), lowest=lowest, highest=limits,

@@ -134,7 +134,8 @@ def command(
     own = model_at(model, machine)
     given = _Commanded(**ways)
     commands, more, said, wanted = _commands(machine, poses, given)
-    with staged(out, sometimes=("sweep.toml", *files_of_pictures("sweep"))) as folder:
+    sometimes = ("sweep.toml", *files_of_pictures("sweep"))
+    with staged(out, sometimes=sometimes, read=[poses]) as folder:
         with progress_bar("solving", len(commands)) as tell:
             solution, search = _solved(machine, commands, own, follow, method)
             if own is not None:

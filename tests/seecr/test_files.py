@@ -19,6 +19,7 @@ from seecr.files import (
     read_bytes,
     read_text,
     read_toml,
+    staged,
     write_text,
     write_texts,
     written,
@@ -148,3 +149,18 @@ def test_json_has_null_for_what_is_not_finite() -> None:
     assert read["3"] == {"colour": "pale_blue", "size": None}
     assert "ä" in json_text(document) and "\n" not in json_text(document, indent=None)
     assert plain(np.array(["a"])) == ["a"]
+
+
+def test_what_was_read_is_not_overwritten(tmp_path: Path) -> None:
+    """A sweep of the commands of sweep.csv, written to its own folder, had lost its readings."""
+    measured, other = tmp_path / "sweep.csv", tmp_path / "other.csv"
+    measured.write_text("readings")
+    refused = pytest.raises(InputFileError, match=r"sweep\.csv: would be overwritten, but was")
+    with refused, staged(tmp_path, read=[None, measured]) as folder:
+        (folder / "other.csv").write_text("new")
+        (folder / "sweep.csv").write_text("new")
+    assert measured.read_text() == "readings" and not other.exists()
+    other.write_text("poses")
+    with staged(tmp_path, read=[other]) as folder:
+        (folder / "sweep.csv").write_text("new")
+    assert measured.read_text() == "new"

@@ -22,6 +22,7 @@ from crosscheck.fit.state import evaluate
 from crosscheck.given import considered
 from crosscheck.measurements.data import Measurements
 from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import Terms
 from seecr.pose import quat_from_rotvec, quat_multiply, quat_rotate
 
@@ -155,3 +156,14 @@ def test_leaving_out_in_a_linear_model_is_refitting_without() -> None:
     assert surprise_of(Linear(x, y, width), rows, np.arange(30) < 3, left[:3]) == pytest.approx(
         left[:3] @ np.linalg.solve(expected[:3, :3], left[:3])
     )
+
+
+def test_what_acts_by_its_square_joins_where_its_derivative_says_nothing() -> None:
+    """On a robot that only slides, the weight of its cables was left out whatever it was."""
+    camera = load_robot(model_path("camera"))
+    weight = 2.0 * term(camera, "cable_weight").layout.scale[0]
+    data = measured(camera, [term(camera, "cable_weight", weight_N_per_m=weight)])
+    found = calibrate(camera, data, only=["cable_weight"])
+    (one,) = found.fitted
+    assert one.term.vector[0] == pytest.approx(weight, rel=0.1)
+    assert not calibrate(camera, measured(camera), only=["cable_weight"]).fitted

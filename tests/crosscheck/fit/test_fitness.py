@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_data import case, refused, run
+from made_data import case, measured, refused, run, term
 from made_diagnoses import SIGMA, readings, robot
 
 from crosscheck.calibration.result import calibrate
@@ -17,7 +17,11 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.reasons import DiagnosisVerdict, Unfit
 from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.planning.design import make_plan
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms
+from seecr.pose import quat_from_rotvec
 
 
 @pytest.fixture(scope="module")
@@ -179,3 +183,20 @@ def test_from_the_command_line(tmp_path: Path) -> None:
     assert "times the noise." in " ".join(done.stdout.split())
     words = refused("calibrate", xml, data, "--model", tmp_path / "m.toml")
     assert "only 4 poses measured" in words and not (tmp_path / "m.toml").exists()
+
+
+def test_readings_of_what_joints_lock_carry_no_verdict() -> None:
+    """Nothing was missing, it said, of a robot of which only locked rotations were read."""
+    camera = load_robot(model_path("camera"))
+    data = measured(camera, [term(camera, "stiffness", factor=0.5)])
+    random = np.random.default_rng(0)
+    turned = 1e-4 * random.standard_normal((data.n_rows, 3))
+    blind = replace(
+        data, position=np.full((data.n_rows, 3), np.nan), quat_wxyz=quat_from_rotvec(turned)
+    )
+    found = diagnose(camera, blind)
+    assert found.verdict is DiagnosisVerdict.NO_VERDICT and found.converged
+    assert "the robot's joints lock all parts of the pose that were read" in found.sentence
+    assert "tensions" in found.measure_next[0]
+    with pytest.raises(CrosscheckError, match=r"its joints lock all that would be read"):
+        make_plan(camera, data, reads=["orientation"])
