@@ -165,9 +165,10 @@ class Correction(Result):
         strains = np.where(self.found, (self.solution.tensions / self.robot.ea).max(axis=1), 0.0)
         beyond = strains > _STRAIN * (1.0 + 1e-6)
         if np.any(beyond):
-            k = int(np.argmax(strains))
+            k, many = int(np.argmax(strains)), int(beyond.sum())
             out.append(
-                f"{int(beyond.sum())} strain a cable by more than {100.0 * _STRAIN:g} %: up to "
+                f"{counted(many, 'pose')} {'strains' if many == 1 else 'strain'} a cable by more "
+                f"than {100.0 * _STRAIN:g} %: up to "
                 f"{100.0 * strains[k]:.3g} % at {self.place(k)}; give a highest tension"
             )
         return out

@@ -249,6 +249,9 @@ def span_lines(spans: Sequence[SlackSpan]) -> Iterator[str]:
     if len(spans) == 1:
         yield f"on the whole way {spans[0].words}"
         return
+    if all(span.slack == () for span in spans):
+        yield f"on all {len(spans)} ways no cable is slack"
+        return
     if len(spans) > _MOST_SPANS:
         yield f"{counted(len(spans), 'zone')} of slack cables, with their widths, in sweep.json"
         return

@@ -131,6 +131,10 @@ def test_row_without_readings_is_kept_and_said(csv_file, robot):
         "Column tension_1_N is empty: not measured.",
         "1 row has a command but no reading: a way point, which is not compared.",
     )
+    more = csv_file(header, "a,0,0,0,1,1,0,0,0,", "a,0,0,0,,,,,,", "a,1,0,0,,,,,,")
+    assert load_measurements(more, robot).notes[-1] == (
+        "2 rows have a command but no reading: way points, which are not compared."
+    )
 
 
 def test_empty_quaternion_columns_are_not_measured(csv_file, robot):

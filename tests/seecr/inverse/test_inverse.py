@@ -322,7 +322,10 @@ def test_without_a_highest_tension_the_nearest_poses_strain_cables_by_5_percent(
     told = "\n".join(found.lines())
     assert "nearest poses are sought with cables strained by at most 5 %" in told
     # a pose that can be held is held, and it is said what that takes
-    assert strains[1] > 0.3 and "1 strain a cable by more than 5 %: up to 30.7 % at pose 1" in told
+    assert (
+        strains[1] > 0.3
+        and "1 pose strains a cable by more than 5 %: up to 30.7 % at pose 1" in told
+    )
     free = correct(robot, poses[:2])
     assert np.array_equal(free.lengths, found.lengths[:2]) and free.strain_limit == 0.05
     assert "nearest" not in "\n".join(free.lines())

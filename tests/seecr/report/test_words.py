@@ -17,8 +17,10 @@ from seecr.report.words import (
     direction_words,
     other_lines,
     pose_lines,
+    span_lines,
     sweep_lines,
 )
+from seecr.workspace.spans import SlackSpan
 
 
 def test_rounding_is_no_turn() -> None:
@@ -134,3 +136,12 @@ def test_a_pose_has_one_kind_of_minus() -> None:
     spread = Spread(off, off, np.full((1, 8), 0.1), np.full((1, 6), 1e-3))
     text = "\n".join(pose_lines(found, spread=spread))
     assert "-" in text and "−" not in text
+
+
+def test_ways_without_slack_cables_are_no_zones_of_them() -> None:
+    """Fifteen zones of slack cables, it said of a grid on which none was slack."""
+    pose = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    ways = [SlackSpan(k, (), (0.0, 0.0), pose, pose, 0.0, 0.0, (0.0, 0.0)) for k in range(15)]
+    assert list(span_lines(ways)) == ["on all 15 ways no cable is slack"]
+    ways[3] = replace(ways[3], slack=("c1",))
+    assert list(span_lines(ways)) == ["15 zones of slack cables, with their widths, in sweep.json"]
