@@ -31,6 +31,7 @@ from seecr.columns.poses import (
 from seecr.columns.table import read_table
 from seecr.columns.times import began, runs, temperatures, times
 from seecr.commands.data import Commands
+from seecr.counted import counted
 from seecr.errors import InputError
 from seecr.files import path_of
 
@@ -203,6 +204,7 @@ def _way_points(data: Measurements) -> list[str]:
     silent = int(np.sum(~data.read))
     if not 0 < silent < data.n_rows:
         return []
+    rows = counted(silent, "row")
     if silent == 1:
-        return ["1 row has a command but no reading: a way point, which is not compared."]
-    return [f"{silent} rows have a command but no reading: way points, which are not compared."]
+        return [f"{rows} has a command but no reading: a way point, which is not compared."]
+    return [f"{rows} have a command but no reading: way points, which are not compared."]
