@@ -139,7 +139,9 @@ def tightness(tables: Tables, rest: Array) -> Array:
     size = np.where(weight > 0.0, weight, 1.0)
     for _ in range(_TIGHTNESS):
         found, slope = loose_rest(tables, size)
-        size = np.maximum(size - (found - rest) / slope, 0.5 * size)
+        # the slope of a cable without a span is zero
+        step = np.divide(found - rest, slope, out=np.zeros_like(size), where=slope != 0.0)
+        size = np.maximum(size - step, 0.5 * size)
     return size
 
 

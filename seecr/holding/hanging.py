@@ -107,4 +107,6 @@ def _rises(tables: Tables) -> Array:
     anchors = tables.cables[..., ANCHOR : ANCHOR + 3] @ np.swapaxes(turn, 1, 2)
     ways = tables.cables[..., EXIT : EXIT + 3] - tables.poses[:, None, :3] - anchors
     up = tables.load[:, None, UP : UP + 3]
-    return np.asarray((ways * up).sum(axis=2) / np.linalg.norm(ways, axis=2))
+    spans = np.linalg.norm(ways, axis=2)
+    # a cable without a span, its anchor point at its exit point, has no direction: it hangs level
+    return np.asarray((ways * up).sum(axis=2) / np.where(spans > 0.0, spans, 1.0))

@@ -39,6 +39,10 @@ from seecr.threads import in_parts
 
 # Most rounds, the round from which steps are halved, and the change that ends them [load].
 _ROUNDS, _HALVED, _ENOUGH = 14, 7, 1e-10
+# A search has ended where it would still change tensions by less than this [load].
+_SETTLED = 1e-6
+# Tensions that seem unlimited, or whose search has not ended, are sought up to so many loads.
+_TIGHT = (30.0, 1000.0)
 # The balance is linearised where each cable pulls at least this part of its share of the load.
 _PULLS = 1e-3
 # Part of the load that may stay unbalanced if the matrix is singular.
@@ -53,6 +57,8 @@ _GAINED = 2.0
 _NEWTON, _EXACT, _OFF = 30, 1e-12, 1e-9
 # Attempts, each with fewer loose cables.
 _AGAIN = 4
+# Loose cables are also sought from these multiples of a cable's weight, or share of the load.
+_STARTS = (1.0, 3.0)
 
 
 @dataclass(eq=False)
@@ -80,6 +86,12 @@ class Inside:
     high: Array
     loose: NDArray[np.bool_]
 
+    def put(self, rows: NDArray[np.intp], other: Inside) -> None:
+        """Overwrite rows with what another search found, but for the limits asked for."""
+        self.margins[rows], self.tensions[rows] = other.margins, other.tensions
+        self.rest[rows], self.loose[rows] = other.rest, other.loose
+        self.matrices[rows], self.loads[rows] = other.matrices, other.loads
+
 
 def limits_of(tables: Tables, low: Array, high: Array) -> tuple[Array, Array]:
     """Limits (n, m) [N] of tensions from the given (m,) or (n, m), raised to what a cable weighs.
@@ -98,8 +110,8 @@ def farthest_inside(tables: Tables, low: Array, high: Array, hopeless: float = n
         tables: of n poses, whose own rest lengths do not matter; at least as many cables as degrees
             of freedom.
         low, high: (m,) or (n, m) [N].
-        hopeless: give up on rows whose margin is below minus this part of the load, from the second
-            round on.
+        hopeless: give up on rows whose margin is below minus this part of the load, if loose
+            cables could not help, from the second round on.
     """
     out = _tightened(tables, *limits_of(tables, low, high), hopeless)
     weighs = least_of_heavy(tables)
@@ -107,8 +119,12 @@ def farthest_inside(tables: Tables, low: Array, high: Array, hopeless: float = n
     lost = (out.margins < 0.0) & (out.margins > -_GAINED * weighs.max(axis=1)) & could.any(axis=1)
     rows = np.flatnonzero(lost)
     if len(rows):
-        asked = [np.array(np.broadcast_to(one, weighs.shape)[rows]) for one in (low, high)]
-        _loosen(out, rows, take(tables, rows), could[rows], asked[0], asked[1])
+        starts = out.rest, *(rest_for(tables, f * first_tensions(tables, weighs)) for f in _STARTS)
+        for first in starts:
+            some = take(tables, rows)
+            asked = [np.array(np.broadcast_to(one, weighs.shape)[rows]) for one in (low, high)]
+            _loosen(out, rows, some, could[rows], asked[0], asked[1], first[rows])
+            rows = rows[~out.loose[rows]]
     return out
 
 
@@ -133,7 +149,45 @@ def balances(
 
 
 def _tightened(tables: Tables, least: Array, most: Array, hopeless: float) -> Inside:
-    """See :func:`farthest_inside`; with limits (n, m), and without loose cables."""
+    """See :func:`farthest_inside`; with limits (n, m), and without loose cables.
+
+    Where pulls bend, a linearised balance may promise tensions that its cables do not have, and
+    unlimited ones where none hold: those are sought again within limits, and only what is found
+    there counts.
+    """
+    out, ended = _linearised_again(tables, least, most, hopeless)
+    promised = out.margins.copy()
+    for tight in _TIGHT:
+        rows = np.flatnonzero((out.margins >= 0.0) & ~ended)
+        if len(rows) == 0:
+            return out
+        end = np.minimum(most[rows], least[rows] + tight * tables.scale[rows, None])
+        found, ended[rows] = _linearised_again(take(tables, rows), least[rows], end, np.inf)
+        out.put(rows, found)
+        endless = rows[np.isposinf(promised[rows]) & (found.margins >= 0.0) & ended[rows]]
+        out.margins[endless] = np.inf
+    rows = np.flatnonzero((out.margins >= 0.0) & ~ended)
+    if len(rows):
+        _nearest_to(out, rows, take(tables, rows), least[rows], most[rows])
+    return out
+
+
+def _nearest_to(
+    out: Inside, rows: NDArray[np.intp], tables: Tables, least: Array, most: Array
+) -> None:
+    """Balanced tensions near those at which searches stopped; their margin is a lower bound."""
+    tight = np.zeros(least.shape, dtype=bool)
+    rest, tension, held = _hang(tables, tight, least, most, out.rest[rows])
+    room = np.minimum(tension - least, most - tension).min(axis=1)
+    held &= room >= -_OFF * tables.scale
+    out.margins[rows] = np.where(held, np.maximum(room, 0.0), -np.inf)
+    out.rest[rows[held]], out.tensions[rows[held]] = rest[held], tension[held]
+
+
+def _linearised_again(
+    tables: Tables, least: Array, most: Array, hopeless: float
+) -> tuple[Inside, NDArray[np.bool_]]:
+    """Sequential linear programming, and (n,) whether tensions have settled."""
     n, m = tables.cables.shape[:2]
     pulls = np.maximum(least, _PULLS * tables.scale[:, None] / m)
     first = rest_for(tables, first_tensions(tables, least))
@@ -143,6 +197,8 @@ def _tightened(tables: Tables, least: Array, most: Array, hopeless: float) -> In
         np.zeros(n, dtype=bool),
     )  # fmt: skip
     rows, bent, start = np.arange(n), bends(tables), here(tables)
+    ended = np.full(n, not bent)
+    beyond = hopeless * tables.scale + _GAINED * least_of_heavy(tables).max(axis=1)
     for k in range(_ROUNDS if bent else 1):
         now = with_rest(take(tables, rows), out.rest[rows])
         at, rates = linearised(now, batch.take_evaluation(start, rows))
@@ -158,15 +214,17 @@ def _tightened(tables: Tables, least: Array, most: Array, hopeless: float) -> In
         wanted = np.where(np.isnan(found), own, np.fmax(found, pulls[rows]))
         wanted = wanted if k < _HALVED else 0.5 * (wanted + own)
         rest = next_rest(now, out.rest[rows], rates.by_length, own, wanted)
-        go = np.abs(wanted - own).max(axis=1) > _ENOUGH * now.scale
+        change = np.abs(wanted - own).max(axis=1)
+        ended[rows] = (change <= _SETTLED * now.scale) & ~np.isnan(found).any(axis=1)
+        go = change > _ENOUGH * now.scale
         go &= np.isfinite(rest).all(axis=1)
         if k > 0:
-            go &= ~(out.margins[rows] < -hopeless * now.scale)
+            go &= ~(out.margins[rows] < -beyond[rows])
         rows = rows[go]
         if len(rows) == 0:
             break
         out.rest[rows] = rest[go]
-    return out
+    return out, ended
 
 
 @dataclass(eq=False)
@@ -216,19 +274,20 @@ def _line_about(tables: Tables, at: batch.Evaluation, rates: Rates, size: Array)
 
 def _loosen(
     out: Inside, rows: NDArray[np.intp], tables: Tables, loose: NDArray[np.bool_], low: Array,
-    high: Array,
+    high: Array, first: Array,
 ) -> None:  # fmt: skip
     """Hold rows with loose cables, if that is possible.
 
-    Newton's method with the least change of all cables starts from the tensions farthest inside.
+    Newton's method with the least change of all cables.
 
     Args:
         out: the results to be filled in.
         rows: (k,) of it; tables: of these.
         loose: (k, m) cables that may be loose. low, high: (k, m) [N] limits asked for.
+        first: (k, m) [m] rest lengths to start from.
     """
     weight = tables.cables[..., WEIGHT] * bridged_lengths(tables)
-    least, first = np.where(loose, _LOOSEST * weight, out.low[rows]), out.rest[rows]
+    least = np.where(loose, _LOOSEST * weight, out.low[rows])
     room, left = _OFF * tables.scale[:, None], np.arange(len(rows))
     for _ in range(_AGAIN):
         part = take(tables, left)

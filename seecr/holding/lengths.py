@@ -46,8 +46,8 @@ _FIRM = 1e-12
 _NONE = 1e-9
 # Fractions from the aim to the tensions farthest inside, with which a pose is tried again.
 _PARTS = (0.0, 0.5, 0.75, 0.9, 1.0)
-# Unlimited tensions are cut off at so many loads; rows this part of the load outside are given up.
-_TIGHT, _HOPELESS = 30.0, 0.1
+# Rows this part of the load outside are given up.
+_HOPELESS = 0.1
 
 
 @dataclass(eq=False)
@@ -152,9 +152,7 @@ def _from_inside(
     The aim is moved towards those tensions, which hold the pose, as far as necessary.
     """
     least, most = limits
-    # unlimited tensions are cut off where every cable is tight
-    end = np.minimum(most, least + _TIGHT * tables.scale[:, None])
-    start = farthest_inside(take(tables, rows), low, end[rows], _HOPELESS)
+    start = farthest_inside(take(tables, rows), low, most[rows], _HOPELESS)
     _put_loose(out, rows[start.loose], take(tables, rows[start.loose]), start)
     held = ~start.loose & (start.margins >= -_NONE * tables.scale[rows])
     some, inside, rest = rows[held], start.tensions[held], start.rest[held]
