@@ -1,7 +1,8 @@
 """Why a pose cannot be held: which tensions would have to be beyond their limits.
 
 The limits in the balance A tau = load are exceeded by as little as possible, in newtons summed over
-the cables: a linear program, whose solution exceeds few limits. With up to two more cables than
+the cables: a linear program, whose solution exceeds few limits. If larger pulls alone would do, no
+cable is said to push. With up to two more cables than
 degrees of freedom all its corners are tried; else HiGHS solves it, by SciPy.
 """
 
@@ -47,7 +48,7 @@ def why_not_held(
         least, most = _newtons(low[k]), _newtons(high[k])
         return f"{_who(names[k])} weighs {least}, more than the {most} it may pull"
     scale = _scale(load, low)
-    outcome, beyond = _least_beyond(matrix, load, low, high, scale)
+    outcome, beyond = _without_pushing(matrix, load, low, high, scale)
     if outcome == _INFEASIBLE:
         return "no pulls of the cables, however large, balance the load there"
     if outcome != _FOUND:
@@ -99,6 +100,23 @@ def _of_cable(name: str, beyond: float, low: float, high: float, of_weight: bool
     return f"{who} would have to push with {_newtons(-pull)}"
 
 
+def _without_pushing(
+    matrix: Array, load: Array, low: Array, high: Array, scale: float
+) -> tuple[int, Array]:
+    """See :func:`_least_beyond`; where only upper limits are in the way, they alone are exceeded.
+
+    If they do not suffice, lower limits are, but down to zero only, as far as that is possible.
+    """
+    outcome, beyond = _least_beyond(matrix, load, low, high, scale)
+    pushes = outcome == _FOUND and np.any(low + beyond < -_ROUNDING * scale)
+    if pushes and np.isfinite(high).any():
+        for floor in (low, np.minimum(low, 0.0)):
+            other, less = _by_program(matrix, load, low, high, scale, floor)
+            if other == _FOUND:
+                return other, less
+    return outcome, beyond
+
+
 def _least_beyond(
     matrix: Array, load: Array, low: Array, high: Array, scale: float
 ) -> tuple[int, Array]:
@@ -114,9 +132,9 @@ def _least_beyond(
 
 
 def _by_program(
-    matrix: Array, load: Array, low: Array, high: Array, scale: float
+    matrix: Array, load: Array, low: Array, high: Array, scale: float, floor: Array | None = None
 ) -> tuple[int, Array]:
-    """The same by HiGHS, for any number of cables."""
+    """The same by HiGHS, for any number of cables; no tension is below ``floor`` (m,) [N]."""
     from scipy.optimize import linprog
 
     m = matrix.shape[1]
@@ -125,13 +143,14 @@ def _by_program(
     # unknowns: tensions, and how far they are below and above the limits
     above = np.concatenate([eye, zero, -eye], axis=1)[bounded]
     below = np.concatenate([-eye, -eye, zero], axis=1)
+    ends = [(None, None)] * m if floor is None else [(one, None) for one in floor / scale]
     found = linprog(
         np.concatenate([np.zeros(m), np.ones(2 * m)]),
         A_ub=np.concatenate([below, above]),
         b_ub=np.concatenate([-low, high[bounded]]) / scale,
         A_eq=np.concatenate([matrix, np.zeros((len(matrix), 2 * m))], axis=1),
         b_eq=load / scale,
-        bounds=[*[(None, None)] * m, *[(0.0, None)] * (2 * m)],
+        bounds=[*ends, *[(0.0, None)] * (2 * m)],
         method="highs",
     )
     if found.status != _FOUND:

@@ -241,6 +241,20 @@ def test_a_load_that_no_pull_can_balance_is_told_as_such() -> None:
     assert large == "cable a would have to pull 10000 N, more than 6000 N"
 
 
+def test_where_only_the_upper_limit_is_in_the_way_no_cable_is_said_to_push() -> None:
+    """Two shallow cables from above and one from below: less is exceeded if the latter pushes."""
+    matrix, load = np.array([[-1.0, 1.0, 0.0], [0.1, 0.1, -1.0]]), np.array([0.0, 50.0])
+    high, names = np.full(3, 60.0), ["a", "b", "c"]
+    said = [
+        why_not_held(matrix, load, np.array([1.0, 1.0, low]), high, names) for low in (0.0, 1.0)
+    ]
+    for one, pull in zip(said, (250, 255), strict=True):
+        parts = [f"cable {k} would have to pull {pull} N, more than 60 N" for k in "ab"]
+        assert sorted(one.split("; ")) == parts
+    above = why_not_held(matrix, np.array([0.0, -50.0]), np.ones(3), np.full(3, 9.0), names)
+    assert "push" not in above and "cable c would have to pull" in above
+
+
 @pytest.mark.parametrize("highest", [np.inf, 50.0])
 def test_without_a_load_it_is_the_lower_limit_that_is_told(highest: float) -> None:
     """Refused once as if no pulls could balance nothing; slack cables do."""
