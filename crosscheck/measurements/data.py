@@ -262,6 +262,9 @@ class Measurements(Result):
         poses = self.command_pose
         if poses is None:
             poses = np.tile(robot.reference_pose, (self.n_rows, 1))
+            if self.wanted is not None:
+                # of several equilibria with these lengths, the one that they are for
+                poses = np.where(np.isfinite(self.wanted), self.wanted, poses)
         return Commands(
             pose=np.asarray(poses, float),
             lengths=self.command_lengths,
