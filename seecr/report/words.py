@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from seecr.compiled.columns import WEIGHT
+from seecr.compiled.columns import FORCE_OF_WEIGHT, WEIGHT
 from seecr.counted import counted
 from seecr.description.robot import Joint, Robot
 from seecr.equilibrium.multiple import elsewhere
@@ -53,6 +53,9 @@ _NO_TURN = 1e-9
 _PART = 0.1
 # Part of the weight that is used to show how soft a pose is.
 _NUDGE = 0.01
+# Cables lighter than this part of the platform hardly change its frequencies: by a third of it, and
+# half of that.
+_LIGHT = 0.03
 # Decimals of millimetres and degrees beyond which a deviation is rounding.
 _DECIMALS = 9
 
@@ -153,6 +156,19 @@ def stiffness_lines(solution: Solution) -> Iterator[str]:
     if known:
         first = direction_words(solution.robot, shapes[:, 0])
         yield f"natural frequencies without damping: {', '.join(known)} Hz; lowest mode: {first}"
+        yield from _massless_lines(solution)
+
+
+def _massless_lines(solution: Solution) -> Iterator[str]:
+    """That frequencies leave out the inertia of cables, where these are not much lighter."""
+    cables = np.sum(solution.tables.cables[0, :, WEIGHT] * solution.rest_lengths[0])
+    weight = solution.tables.load[0, FORCE_OF_WEIGHT : FORCE_OF_WEIGHT + 3]
+    part = float(cables / max(np.linalg.norm(weight), 1e-300))
+    if part > _LIGHT and np.any(weight):
+        yield (
+            f"  of the platform alone: cables weigh {100.0 * part:.3g} % of what it does, and "
+            "lower the frequencies by their inertia"
+        )
 
 
 def _nudged(solution: Solution) -> str:

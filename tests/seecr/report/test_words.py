@@ -9,6 +9,7 @@ import numpy as np
 
 import seecr
 from seecr.description.shipped import model_path
+from seecr.effects import Term
 from seecr.equilibrium.passes import Barrier
 from seecr.prediction.uncertainty import Spread
 from seecr.report.words import (
@@ -145,3 +146,18 @@ def test_ways_without_slack_cables_are_no_zones_of_them() -> None:
     assert list(span_lines(ways)) == ["on all 15 ways no cable is slack"]
     ways[3] = replace(ways[3], slack=("c1",))
     assert list(span_lines(ways)) == ["15 zones of slack cables, with their widths, in sweep.json"]
+
+
+def test_frequencies_say_that_cables_have_no_inertia_where_that_matters() -> None:
+    robot, pose = seecr.load_robot("camera"), [[52.5, 34.0, 10.0, 1, 0, 0, 0]]
+    heavy, light = (
+        seecr.solve(robot, pose, effects=[Term.of(robot, "cable_weight", weight_N_per_m=weight)])
+        for weight in (0.5, 0.005)
+    )
+    cables = 0.5 * float(heavy.rest_lengths.sum()) / robot.weight
+    said = [line for line in pose_lines(heavy) if "of the platform alone" in line]
+    assert said == [
+        f"  of the platform alone: cables weigh {100.0 * cables:.3g} % of what it does, and lower "
+        "the frequencies by their inertia"
+    ]
+    assert not any("of the platform alone" in line for line in pose_lines(light))
