@@ -57,6 +57,8 @@ _GAINED = 2.0
 _NEWTON, _EXACT, _OFF = 30, 1e-12, 1e-9
 # Attempts, each with fewer loose cables.
 _AGAIN = 4
+# For a mere yes or no, rows this part of the load outside are given up.
+_HOPELESS = 0.1
 # Loose cables are also sought from these multiples of a cable's weight, or share of the load.
 _STARTS = (1.0, 3.0)
 
@@ -126,6 +128,12 @@ def farthest_inside(tables: Tables, low: Array, high: Array, hopeless: float = n
             _loosen(out, rows, some, could[rows], asked[0], asked[1], first[rows])
             rows = rows[~out.loose[rows]]
     return out
+
+
+def holds_tightly(tables: Tables, low: Array, high: Array) -> NDArray[np.bool_]:
+    """(n,) whether tensions within limits (m,) hold poses, without loose cables."""
+    found = _tightened(tables, *limits_of(tables, low, high), _HOPELESS)
+    return np.asarray(found.margins >= -_OFF * tables.scale)
 
 
 def balances(

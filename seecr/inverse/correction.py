@@ -15,10 +15,10 @@ from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.errors import InputError
-from seecr.holding.balance import is_straight
+from seecr.holding.balance import bends, is_straight
 from seecr.holding.distribution import tension_limits, wanted_tensions
 from seecr.holding.hanging import least_of_heavy
-from seecr.holding.inside import balances, counted_balance
+from seecr.holding.inside import balances, counted_balance, holds_tightly
 from seecr.holding.lengths import Held, hold, hold_again, holds_firmly
 from seecr.holding.unheld import why_not_held
 from seecr.inverse.aitken import to_their_limit
@@ -411,9 +411,14 @@ class _Search:
             tables = self._tables(replace(self.given.rows(rows[some]), pose=poses))
             return holds_firmly(tables, limits.aim[rows[some]], limits.low, limits.high)
 
+        def holds(poses: Array, some: NDArray[np.intp]) -> NDArray[np.bool_]:
+            tables = self._tables(replace(self.given.rows(rows[some]), pose=poses))
+            return holds_tightly(tables, limits.low, limits.high)
+
         return Reaching.within(
             self.robot, self.given.pose[rows], balance, stays, (limits.low, limits.high),
             scale[rows], fix_position=fix_position, straight=own if straight else None,
+            holds=holds if bends(own) and self.robot.n_cables >= self.robot.n_dof else None,
         )  # fmt: skip
 
     def _nearest(self, rows: NDArray[np.intp], scale: Array, fix_position: bool) -> Nearest:

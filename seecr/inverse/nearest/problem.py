@@ -35,6 +35,8 @@ class Balance(Protocol):
 Stays = Callable[[Array, Rows], NDArray[np.bool_]]
 """Whether the platform is stable at poses (k, 7) of some rows, with the lengths that hold it there.
 """
+Holds = Callable[[Array, Rows], NDArray[np.bool_]]
+"""Whether poses (k, 7) of some rows can be held, by the balance as it is and not linearised."""
 
 # Tensions of a pose this close to the limit still have some margin [load].
 _INSIDE = 1e-6
@@ -62,6 +64,7 @@ class Reaching:
     scale: Array  # (n,) [N] load
     free: Array  # (d,) how far each coordinate may go from its wanted value: 0 or infinity
     straight: Tables | None = None  # (n,) of the wanted poses; None if cables are not straight
+    holds: Holds | None = None  # None if the balance is linear
 
     @classmethod
     def within(
@@ -75,6 +78,7 @@ class Reaching:
         *,
         fix_position: bool = False,
         straight: Tables | None = None,
+        holds: Holds | None = None,
     ) -> Reaching:
         """The problem of wanted poses (n, 7).
 
@@ -83,6 +87,7 @@ class Reaching:
             fix_position: keep the position and change only the orientation.
             straight: of the wanted poses, if they are :func:`seecr.holding.balance.is_straight`:
                 their balance then needs neither ``balance`` nor poses.
+            holds: for a balance that is not linear in the tensions.
         """
         low, high = limits
         inside = _INSIDE * scale[:, None]
@@ -92,7 +97,7 @@ class Reaching:
         free = np.full(robot.n_dof, np.inf)
         if fix_position:
             free[~robot.hinges] = 0.0
-        return cls(robot, wanted, values, balance, stays, least, most, scale, free, straight)
+        return cls(robot, wanted, values, balance, stays, least, most, scale, free, straight, holds)
 
     @property
     def is_in_place(self) -> bool:
@@ -140,12 +145,20 @@ class Reaching:
             return straight_balance(self.straight, rows, away)
         return self.balance(self.placed(away, rows), rows, about)
 
-    def held(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
-        """Whether the poses with these displacements can be held."""
+    def seems_held(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
+        """Whether the poses with these displacements can be held, by the linearised balance."""
         if len(rows) == 0:
             return np.zeros(0, dtype=bool)
         limits = self.least[rows], self.most[rows]
         return can_balance(*self.at(away, rows), *limits, self.scale[rows])
+
+    def held(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
+        """Whether the poses with these displacements can be held."""
+        out = self.seems_held(away, rows)
+        if self.holds is not None and len(some := np.flatnonzero(out)):
+            # level heavy cables seem to hold anything up, if only they are tight enough
+            out[some] = self.holds(self.placed(away[some], rows[some]), rows[some])
+        return out
 
     def firm(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
         """Whether the platform is held and stable at these displacements, checked exactly."""
@@ -236,6 +249,15 @@ class Spots:
 
     def only(self, some: NDArray[np.intp] | NDArray[np.bool_]) -> Spots:
         return Spots(self.away[some], self.rows[some], self.tensions[some], self.left[some])
+
+    def and_more(self, other: Spots) -> Spots:
+        """All points of both."""
+        both = zip(
+            (self.away, self.rows, self.tensions, self.left),
+            (other.away, other.rows, other.tensions, other.left),
+            strict=True,
+        )
+        return Spots(*(np.concatenate(pair) for pair in both))
 
     def only_tight(self, most: float) -> Spots:
         return self.only(self.left <= most)

@@ -12,6 +12,9 @@ from seecr.inverse.nearest.problem import Reaching, Rows, Spots
 from seecr.inverse.nearest.seeds import Candidates
 from seecr.pose import Array
 
+Fine = Callable[[Array, Rows], NDArray[np.bool_]]
+"""Whether displacements (k, d) of rows (k,) are fine."""
+
 # Bisections towards the wanted poses; after some only the nearer half goes on, but no fewer.
 _HALVINGS, _FEWER, _KEPT = 7, (2, 4), 120
 # If few are held, starts are taken from this many times as many with the smallest residuals.
@@ -22,12 +25,24 @@ _APART = (0.7, 0.35, 0.175)
 
 
 def screened(problem: Reaching, candidates: Candidates, most: int) -> Spots:
-    """Held poses as near to the wanted ones as straight lines lead: ``most`` per row."""
-    held = problem.held(candidates.away, candidates.rows)
+    """Held poses as near to the wanted ones as straight lines lead: ``most`` per row.
+
+    Where the balance is not linear, lines end where it really holds, and others where it seems to:
+    from there balance may be found still nearer, or not at all.
+    """
+    spots = _screened(problem, candidates, most, problem.held)
+    if problem.holds is None:
+        return spots
+    return spots.and_more(_screened(problem, candidates, most, problem.seems_held))
+
+
+def _screened(problem: Reaching, candidates: Candidates, most: int, fine: Fine) -> Spots:
+    """The same, with one meaning of held."""
+    held = fine(candidates.away, candidates.rows)
     back = _brought_back(problem, candidates, held, most)
     away = np.concatenate([candidates.away[held], back.away])
     rows = np.concatenate([candidates.rows[held], back.rows])
-    away, rows = toward(problem, away, rows, problem.held)
+    away, rows = toward(problem, away, rows, fine)
     few = spread(problem, away, rows, most)
     return tightened(problem, problem.start(away[few], rows[few]))
 
@@ -57,7 +72,7 @@ def toward(
     problem: Reaching,
     away: Array,
     rows: Rows,
-    fine: Callable[[Array, Rows], NDArray[np.bool_]],
+    fine: Fine,
 ) -> tuple[Array, Rows]:
     """As far on straight lines to the wanted poses as is fine; half of them keep their rotation."""
     inner, outer = np.zeros(len(rows)), np.ones(len(rows))

@@ -48,7 +48,7 @@ def sample(problem: Reaching) -> Array:
     draw = _turned if problem.values is None else _on_joints
     places = draw(problem.robot, random)
     rows = np.zeros(len(places), dtype=np.intp)
-    held = problem.held(problem.to(places, rows), rows)
+    held = problem.seems_held(problem.to(places, rows), rows)
     return np.concatenate([problem.home, places[held]])
 
 

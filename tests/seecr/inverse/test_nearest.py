@@ -71,6 +71,21 @@ def test_with_cables_that_sag_the_platform_rests_there_within_limits() -> None:
     assert np.all(far < 1.1 * least)
 
 
+def test_just_below_the_exit_points_sagging_cables_have_a_nearest_pose_too() -> None:
+    """Once none was found: by a linearised balance, level cables hold anything up."""
+    path = model_path("cogiro_large")
+    robot = load_robot(path)
+    want = np.tile(robot.reference_pose, (2, 1))
+    want[:, :3] = [[-3.72, -0.76, 5.382], [5.01, -1.31, 5.387]]
+    found = correct(robot, want, effects=load_model(path.with_name("sag.toml"), robot))
+    assert not found.held.any() and found.found.all() and found.stays.all()
+    unit, plain = np.repeat([1.0, robot.length], 3), correct(robot, want)
+    far, least = (
+        np.linalg.norm(pose_difference(one.aimed, want) * unit, axis=1) for one in (found, plain)
+    )
+    assert np.all(far < 1.1 * least)
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("few_starts")
 def test_no_answer_with_cables_that_sag_is_farther_than_brute_force_finds() -> None:
