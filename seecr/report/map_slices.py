@@ -115,14 +115,16 @@ class _Cut:
     def inside(self) -> list[Array]:
         """Margins of each slice, for the contour at zero between them.
 
-        An infinite margin does not say where between two poses the contour is; it is replaced by a
-        typical value.
+        An infinite margin does not say where between two poses the contour is, nor does that of
+        cables which hold a pose loosely, zero; both are replaced by a typical value.
         """
         found = self.found
         inside = np.where(found.feasible, np.maximum(found.margin, 0.0), found.margin).ravel()
         known = np.abs(inside[np.isfinite(inside) & (inside != 0.0)])
         far = float(np.median(known)) if len(known) else 1.0
         inside = np.nan_to_num(inside, posinf=far, neginf=-far)
+        if np.any(inside > 0.0):
+            inside = np.where(found.feasible.ravel() & (inside == 0.0), far, inside)
         return [inside[one] for one in self.slices]
 
     def with_dots(self, edge: Array) -> list[NDArray[np.bool_]]:

@@ -78,6 +78,15 @@ def test_the_edge_beside_a_margin_without_end_is_half_way(drawn: Drawn) -> None:
     np.testing.assert_allclose(line.vertices[:, 0], 350.0)
 
 
+def test_the_edge_beside_loosely_held_poses_is_half_way_and_none_leads_through_them(
+    drawn: Drawn,
+) -> None:
+    """It had been at the loosely held poses, whose margin is zero."""
+    one = drawn(a_map(*[-1.0] * 3, *[0.0] * 3, *[1.0] * 3))
+    (line,) = one.axes[0].collections[1].get_paths()
+    np.testing.assert_allclose(line.vertices[:, 0], 350.0)
+
+
 @pytest.mark.parametrize("name", ["demobot_cogiro", "planar_two_cable"])
 def test_margins_without_numbers_are_drawn_as_yes_or_no(drawn: Drawn, name: str) -> None:
     """A bar of newtons from 0 to 1 had stood beside them."""
