@@ -248,6 +248,9 @@ def correct(
     one that can is used instead; without a highest tension, the nearest of those that strain no
     cable by more than 5 %.
 
+    A cable with weight pulls at least about what it weighs. If a pose can only be held with less,
+    it hangs loosely, but is never more than half as long again as its span.
+
     Args:
         robot: as described, or its MJCF.
         poses: (n, 7) wanted, or :class:`seecr.Commands` with runs and times, for effects that
