@@ -97,7 +97,7 @@ def weigh(
         coloured=coloured,
         warnings=(*_warnings(problem.robot, best, fitted, own), *_widened(best, moved, own)),
         notes=tuple(dict.fromkeys(notes)),
-        model=_model(problem, basis, fitted, names, errors, covariance),
+        model=_model(problem, basis, fitted, names, errors, best.with_idle(covariance)),
     )
 
 

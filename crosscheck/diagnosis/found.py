@@ -79,4 +79,5 @@ def found_covariance(found: Diagnosis) -> Array | None:
     best, effects = shown_stages(found)[1].step.fit, found_effects(found)
     every = np.arange(len(best.terms))
     order = np.concatenate([every[best.terms.part(one.term.name)] for one in effects])
-    return np.asarray(_widened(found) ** 2 * best.covariance[np.ix_(order, order)])
+    whole = best.with_idle(_widened(found) ** 2 * best.covariance)
+    return np.asarray(whole[np.ix_(order, order)])

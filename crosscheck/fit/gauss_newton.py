@@ -27,6 +27,9 @@ from seecr.pose import Array
 PRIOR_SIZES = 10.0
 # A direction with a larger standard error than this, in plausible sizes, is not identifiable.
 UNSEEN_SIZES = 100.0
+# A parameter of which a plausible size moves the readings by less than this part of their noise
+# moves none.
+_IDLE = 1e-5
 _ITERATIONS = 40
 _GAIN = 1e-3
 # Most trials of a step, each damped ten times more than the last; longest step, in plausible sizes.
@@ -114,6 +117,17 @@ class Fit:
     def stderr(self) -> Array:
         """(p,) standard errors; inf for a parameter that is not identifiable."""
         return np.sqrt(np.diag(self.covariance))
+
+    def with_idle(self, covariance: Array) -> Array:
+        """A covariance (p, p) in which no value is unknown only because it moves no reading.
+
+        A force across the plane of a planar robot is never seen, nor is it felt. The error of such
+        a value is its plausible size.
+        """
+        out, moves = covariance.copy(), np.linalg.norm(self.jacobian, axis=0)
+        idle = np.isinf(np.diag(out)) & (moves < _IDLE)
+        out[idle, idle] = self.terms.scale[idle] ** 2
+        return out
 
     @property
     def correlation(self) -> Array:

@@ -18,7 +18,7 @@ from crosscheck.terminal.addition import why_not
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms
-from seecr.prediction.uncertainty import covariance_of
+from seecr.prediction.uncertainty import covariance_of, spread_of
 
 
 @pytest.mark.slow
@@ -113,3 +113,21 @@ def test_several_effects_are_added_together() -> None:
         assert abs(one.term.vector[0] - truth.vector[0]) < 4.0 * one.stderr[0]
     with pytest.raises(CrosscheckError, match="expected at least one effect to add, got none"):
         add_effects(robot(), data, [])
+
+
+@pytest.mark.slow
+def test_what_a_planar_robot_cannot_feel_does_not_keep_its_model_from_errors() -> None:
+    """A force across its plane is never seen: the model once kept no covariance for that."""
+    planar = load_robot(model_path("planar_vertical"))
+    pulls = {"force_x_N": 0.3, "force_z_N": -0.2, "moment_y_Nm": 0.004}
+    hidden = Term.of(planar, "external_wrench", **pulls)
+    found = add_effect(planar, measured(planar, [hidden]), "external_wrench")
+    covariance = covariance_of(found.model)
+    assert found.pays and covariance is not None
+    unseen = ~np.isfinite(found.own.stderr)
+    assert unseen.tolist() == [False, True, False, True, False, True]
+    error = np.sqrt(np.diag(covariance))
+    np.testing.assert_allclose(error[unseen], found.own.term.layout.scale[unseen])
+    np.testing.assert_allclose(error[~unseen], found.own.stderr[~unseen], rtol=1e-2)
+    spread = spread_of(planar, planar.reference_pose[None], found.model)
+    assert spread is not None and spread.position.max() < 1e-3
