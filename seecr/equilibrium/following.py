@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from seecr.commands.data import Commands
 from seecr.commands.path import Path, waypoints_of
 from seecr.compiled.outcomes import CONVERGED, SINGULAR
-from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot
 from seecr.effects.setup import Setup
-from seecr.pose import Array, pose_add, pose_difference
+from seecr.equilibrium.coordinates import evaluated, moved, step_between
+from seecr.pose import Array, pose_difference
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics import batch
 from seecr.statics.batch import under_moment
@@ -248,33 +248,6 @@ class _Followed:
         lost = energies[0] - energies[1] if _rests(first) else np.inf
         jumps.append(Jump(trial.poses[0].copy(), pose[0], after, float(lost), same))
         return first
-
-
-def evaluated(robot: Robot, tables: Tables, poses: Array) -> batch.Evaluation:
-    """Gradient, stiffness and energy with the platform at poses (n, 7)."""
-    at = batch.Evaluation.empty(len(poses), tables.cables.shape[1], tables.n_dof)
-    start, values = start_of(robot, tables, poses)
-    at.deviation[:] = start
-    if values is not None:
-        at.values[:] = values
-    return batch.evaluate(tables, at)
-
-
-def moved(robot: Robot, poses: Array, step: Array) -> Array:
-    """Poses (n, 7) after steps (n, d) [m]; rotations in a step are times the robot's length."""
-    change = step * np.where(robot.hinges, 1.0 / robot.length, 1.0)
-    if not robot.joints:
-        return pose_add(poses, change)
-    return pose_of_values(robot, values_of_pose(robot, poses)[0] + change)[0]
-
-
-def step_between(robot: Robot, poses: Array, before: Array) -> Array:
-    """Steps (n, d) [m] from ``before`` to ``poses`` (n, 7), rotations times the robot's length."""
-    unit = np.where(robot.hinges, robot.length, 1.0)
-    if not robot.joints:
-        return pose_difference(poses, before) * unit
-    values = values_of_pose(robot, np.concatenate([poses, before]))[0]
-    return (values[: len(poses)] - values[len(poses) :]) * unit
 
 
 def rest_below(robot: Robot, tables: Tables, pose: Array) -> Array:

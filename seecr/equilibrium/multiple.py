@@ -15,7 +15,7 @@ from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot
 from seecr.effects.edits import setup_with
 from seecr.effects.setup import Setup
-from seecr.equilibrium.following import evaluated, moved, step_between
+from seecr.equilibrium.coordinates import evaluated, moved, step_between
 from seecr.equilibrium.search import solve_setup
 from seecr.errors import InputError
 from seecr.pose import Array, pose_difference

@@ -1,10 +1,9 @@
 """Barriers: the height of the lowest pass between two equilibria of one command.
 
-The path of least energy by the string method (E, Ren and Vanden-Eijnden, J. Chem. Phys. 126,
-164103, 2007), its images moved across the path by Newton's steps; its highest point made exact by
-following the one falling direction (Cerjan and Miller, J. Chem. Phys. 75, 1981). That may lead to
-the saddle between two other equilibria, so what it leads to is checked: it must be the highest
-point of a path from one to the other.
+The path of least energy is that of :mod:`seecr.equilibrium.strings`. Its highest point is made
+exact by following the one falling direction (Cerjan and Miller, J. Chem. Phys. 75, 1981). That may
+lead to the saddle between two other equilibria, so what it leads to is checked: it must be the
+highest point of a path from one to the other.
 """
 
 from __future__ import annotations
@@ -13,12 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seecr.compiled.columns import EXTERNAL_MOMENT
 from seecr.compiled.outcomes import TOLERANCE
-from seecr.description.robot import Robot
-from seecr.equilibrium.following import apart_from, evaluated, moved, rest_below, step_between
+from seecr.equilibrium.coordinates import evaluated, moved, step_between
+from seecr.equilibrium.following import apart_from, rest_below
+from seecr.equilibrium.strings import SOFTEST, strings
 from seecr.errors import InputError
 from seecr.pose import Array, pose_difference
 from seecr.result import COORDINATES, Record, Result, named
@@ -28,14 +27,12 @@ from seecr.units import joules
 
 __all__ = ["Barrier", "barriers"]
 
-# Images on the path, most rounds, and the gradient across the path at which they end [load].
-_IMAGES, _ROUNDS, _ACROSS = 33, 300, 1e-3
 # Longest steps of images [of the gap between them]; each is tried where the one before did not end.
 _PARTS = (0.5, 0.1)
 # Points between images at which the path's energy is computed, first and then about its highest.
 _FINE, _ZOOMS = 8, 3
-# Steps to the saddle at most; the longest, and the softest stiffness, over length and load.
-_STEPS, _LONGEST, _SOFTEST = 200, (0.1, 0.01), 1e-2
+# Steps to the saddle at most, and the longest, over the length.
+_STEPS, _LONGEST = 200, (0.1, 0.01)
 # Energies alike but for rounding [of load times length, and of the energy].
 _ROUNDING = 1e-9
 # First step down from a saddle [of the length].
@@ -193,7 +190,7 @@ def _paths(one: Solution, others: Solution) -> list[_Path]:
     out: list[_Path | None] = [None] * len(others)
     left = list(range(len(others)))
     for part in _PARTS:
-        every, settled = _strings(one, others.rows(left), part)
+        every, settled = strings(one, others.rows(left), part)
         for k, images, done in zip(left, every, settled, strict=True):
             path, before = _closely(one, images), out[k]
             lower = before is None or path.energies.max() < before.energies.max()
@@ -292,85 +289,10 @@ def _among(one: Solution, pose: Array, others: list[Array]) -> bool:
     return any(apart_from(one.robot, pose, other) < _ALIKE * one.robot.length for other in others)
 
 
-def _strings(one: Solution, others: Solution, longest: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Images (b, k, 7) on the paths of least energy from one equilibrium to b others.
-
-    Args:
-        one, others: the equilibria.
-        longest: step of an image [of the gap between two].
-
-    Returns:
-        the images, with the equilibria at their ends, and (b,) whether they settled.
-    """
-    robot, count = one.robot, len(others)
-    whole = step_between(robot, others.pose, np.repeat(one.pose, count, axis=0))
-    parts = np.linspace(0.0, 1.0, _IMAGES)[:, None] * whole[:, None]
-    every = np.broadcast_to(one.pose, (count, _IMAGES, 7))
-    every, settled = _moved(robot, every, parts), np.zeros(count, dtype=bool)
-    for _ in range(_ROUNDS):
-        left = np.flatnonzero(~settled)
-        if len(left) == 0:
-            break
-        new, settled[left] = _round(one, every[left], longest)
-        every[left] = new
-    return every, settled
-
-
-def _round(one: Solution, images: Array, longest: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Images (b, k, 7) after a step across their paths, and which of these needed none."""
-    robot, (b, k) = one.robot, images.shape[:2]
-    many = take(one.tables, np.zeros(b * k, int))
-    softest = _SOFTEST * float(many.scale[0]) / robot.length
-    at = evaluated(robot, many, images.reshape(-1, 7))
-    gradient = at.gradient.reshape(b, k, -1)[:, 1:-1]
-    hessian = at.hessian.reshape(b, k, *at.hessian.shape[1:])[:, 1:-1]
-    along = _steps(robot, images[:, 2:], images[:, :-2])
-    along /= np.linalg.norm(along, axis=2, keepdims=True)
-    across = np.eye(robot.n_dof) - along[..., :, None] * along[..., None, :]
-    slope = np.einsum("bnij,bnj->bni", across, gradient)
-    settled = np.linalg.norm(slope, axis=2).max(axis=1) < _ACROSS * many.scale[0]
-    values, vectors = np.linalg.eigh(across @ hessian @ across)
-    parts_of = np.einsum("bnij,bni->bnj", vectors, slope) / np.maximum(np.abs(values), softest)
-    step = -np.einsum("bnij,bnj->bni", vectors, parts_of)
-    gaps = np.linalg.norm(_steps(robot, images[:, 1:], images[:, :-1]), axis=2)
-    size = np.linalg.norm(step, axis=2, keepdims=True)
-    most = longest * gaps.mean(axis=1)[:, None, None]
-    step *= np.minimum(1.0, most / np.maximum(size, 1e-300))
-    out = images.copy()
-    out[:, 1:-1] = _moved(robot, images[:, 1:-1], step)
-    return np.where(settled[:, None, None], images, _evenly(robot, out)), settled
-
-
-def _evenly(robot: Robot, images: Array) -> Array:
-    """The same paths (b, k, 7) with evenly spaced images."""
-    steps = _steps(robot, images[:, 1:], images[:, :-1])
-    along = np.pad(np.cumsum(np.linalg.norm(steps, axis=2), axis=1), ((0, 0), (1, 0)))
-    aim = np.linspace(0.0, along[:, -1], images.shape[1], axis=1)[:, 1:-1]
-    at = np.sum(along[:, None, :] <= aim[:, :, None], axis=2) - 1
-    at = np.clip(at, 0, steps.shape[1] - 1)
-    row = np.arange(len(images))[:, None]
-    part = (aim - along[row, at]) / np.maximum(along[row, at + 1] - along[row, at], 1e-300)
-    out = images.copy()
-    out[:, 1:-1] = _moved(robot, images[row, at], part[..., None] * steps[row, at])
-    return out
-
-
-def _moved(robot: Robot, poses: Array, steps: Array) -> Array:
-    """:func:`moved` for poses (b, k, 7) and steps (b, k, d)."""
-    out = moved(robot, poses.reshape(-1, 7), steps.reshape(-1, steps.shape[2]))
-    return out.reshape(poses.shape)
-
-
-def _steps(robot: Robot, poses: Array, before: Array) -> Array:
-    """:func:`step_between` for poses (b, k, 7): (b, k, d)."""
-    steps = step_between(robot, poses.reshape(-1, 7), before.reshape(-1, 7))
-    return steps.reshape(*poses.shape[:2], -1)
-
-
 def _saddle(one: Solution, tables: Tables, pose: Array, longest: float) -> tuple[Array, bool]:
     """The saddle (1, 7) that is reached from near it: up the softest direction, down all others."""
     robot = one.robot
-    softest = _SOFTEST * float(tables.scale[0]) / robot.length
+    softest = SOFTEST * float(tables.scale[0]) / robot.length
     for _ in range(_STEPS):
         at = evaluated(robot, tables, pose)
         if not np.isfinite(at.hessian).all():

@@ -14,7 +14,7 @@ import numpy as np
 from seecr.arguments import finite
 from seecr.commands.data import Commands
 from seecr.effects.edits import setup_with
-from seecr.equilibrium.following import moved, step_between
+from seecr.equilibrium.coordinates import moved, step_between
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import Array

@@ -12,7 +12,7 @@ from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term
-from seecr.equilibrium.following import moved
+from seecr.equilibrium.coordinates import moved
 from seecr.equilibrium.multiple import _spread, elsewhere, equilibria
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError

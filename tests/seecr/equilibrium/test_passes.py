@@ -11,7 +11,8 @@ from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term, effect_named, layout_of
 from seecr.equilibrium import passes
-from seecr.equilibrium.following import _stepped, evaluated, moved
+from seecr.equilibrium.coordinates import evaluated, moved
+from seecr.equilibrium.following import _stepped
 from seecr.equilibrium.multiple import elsewhere, equilibria
 from seecr.equilibrium.passes import Barrier, barriers
 from seecr.equilibrium.solving import solve
@@ -101,7 +102,7 @@ def test_where_there_is_no_energy_no_way_is_looked_for(monkeypatch: pytest.Monke
     pose[3:] /= np.linalg.norm(pose[3:])
     own, every = solve(robot, pose), equilibria(robot, pose)
     other = every.rows(elsewhere(own, every))
-    monkeypatch.setattr(passes, "_strings", pytest.fail)
+    monkeypatch.setattr(passes, "strings", pytest.fail)
     for energy in (own, other):
         energy.energy[:] = np.nan
         (way,) = barriers(own, other)

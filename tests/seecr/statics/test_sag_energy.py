@@ -13,7 +13,7 @@ from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term
-from seecr.equilibrium.following import evaluated, moved, step_between
+from seecr.equilibrium.coordinates import evaluated, moved, step_between
 from seecr.equilibrium.multiple import equilibria
 from seecr.equilibrium.passes import barriers
 from seecr.equilibrium.solving import solve
