@@ -73,7 +73,7 @@ def users_poses(folder, way_points=True):
 def test_a_user_s_own_poses_are_measured_with_their_loads_and_way_points(tmp_path):
     path = users_poses(tmp_path)
     sigma = Sigma(position_m=1e-6, tension_N=0.05)
-    hide = ["hysteresis", "platform_mass"]
+    hide = ["backlash", "platform_mass"]
     twin = make_twin(COGIRO, 5, effects=hide, poses=path, sigma=sigma, out=tmp_path / "case")
     data = load_measurements(tmp_path / "case" / "measured.csv", twin.robot)
     assert data.n_rows == 12 and data.stands.all()
