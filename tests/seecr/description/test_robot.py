@@ -148,6 +148,6 @@ def test_a_pose_off_the_joints_is_named() -> None:
         values_of_pose(robot, np.array([[0.4, 0, 0.1, 1, 0, 0, 0], [0.4, 0.1, 0.1, 1, 0, 0, 0]]))
     turned = np.array([[0.4, 0, 0.1, np.cos(0.1), np.sin(0.1), 0, 0]])
     with pytest.raises(
-        InputError, match=r"cannot reach commanded pose 0, it is off by 0.2 rad in x"
+        InputError, match=r"cannot reach the commanded pose, it is off by 0.2 rad in x"
     ):
         values_of_pose(robot, turned)
