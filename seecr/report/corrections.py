@@ -69,7 +69,8 @@ def chance_lines(found: Correction, kept: Array | None, minimum: bool = False) -
         f"tensions stay within the limits with a probability {least}, "
         f"lowest at {found.place(worst)}; below {_LIKELY:g} at {many} of {len(found.wanted)}"
     )
-    if minimum and many:
+    # without more cables than degrees of freedom there is nothing to distribute
+    if minimum and many and found.robot.n_cables > found.robot.n_dof:
         yield (
             "  --aim minimum puts a cable at its lowest tension, where it stays within the limits "
             "with about 0.5; --aim middle keeps away from them"
