@@ -177,15 +177,20 @@ def _holds_none(found: Workspace, lowest: float, highest: float) -> Exception:
     """That no pose of the grid can be held."""
     from seecr import InputError
     from seecr.counted import counted
+    from seecr.description.robot import ITS_A_POINT
 
     by_place = found.robot.n_cables < found.robot.n_dof
     what, stays = (
         ("in no orientation do ", " so that the platform stays") if by_place else ("no ", "")
     )
+    cure = (
+        f": {ITS_A_POINT}"
+        if found.robot.is_point
+        else ("; expected another grid, orientation or wider limits")
+    )
     return InputError(
         f"no pose of the grid can be held: {what}tensions from {lowest:g} to {highest:g} N balance "
-        f"the load{stays} at any of {counted(found.margin.size, 'pose')}; expected another grid, "
-        "orientation or wider limits"
+        f"the load{stays} at any of {counted(found.margin.size, 'pose')}{cure}"
     )
 
 

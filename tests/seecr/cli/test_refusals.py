@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from seecr.cli import main
+from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 
 CSV = "run,cmd_x_m,cmd_y_m,cmd_z_m\na,0.4,0.25,0.1\n"
@@ -188,3 +189,17 @@ def test_a_grid_may_begin_below_zero(verb: str, tmp_path: Path) -> None:
     assert result.exit_code == 0 and "4" in result.stdout, result.output
     wrong = CliRunner().invoke(main, [verb, "cogiro_large", "-x:1:2", *quiet])
     assert wrong.exit_code == 2 and "No such option '-x:1:2'" in wrong.output
+
+
+@pytest.mark.slow
+def test_a_map_of_a_point_mass_on_a_free_joint_names_the_cure(tmp_path: Path) -> None:
+    text = model_path("camera").read_text()
+    loose = re.sub(r'(<joint [^>]*type="slide"[^>]*/>\s*)+', "<freejoint/>", text)
+    assert loose.count("<freejoint/>") == 1 and "slide" not in loose.split("<body", 1)[1]
+    (tmp_path / "loose.xml").write_text(loose)
+    x, y, z = map(str, load_robot(tmp_path / "loose.xml").reference_pose[:3])
+    words = ["map", str(tmp_path / "loose.xml"), "--grid", x, y, z, "--no-elastic"]
+    result = CliRunner().invoke(main, [*words, "--out", str(tmp_path / "o")])
+    assert result.exit_code == 2 and result.stderr.count("\n") == 1, result.output
+    assert "give it three slide joints instead of the free joint" in result.stderr
+    assert "wider limits" not in result.stderr

@@ -151,3 +151,16 @@ def test_a_pose_off_the_joints_is_named() -> None:
         InputError, match=r"cannot reach the commanded pose, it is off by 0.2 rad in x"
     ):
         values_of_pose(robot, turned)
+
+
+def test_a_point_mass_on_a_free_joint_is_told_its_cure() -> None:
+    """It is free to turn at every pose; without joints that turn it is none of these."""
+    camera = load_robot("camera")
+    loose = replace(camera, joints=())
+    assert not camera.is_point and camera.notes == ()
+    assert loose.is_point
+    (note,) = loose.notes
+    assert "anchored at one point" in note and "three slide joints instead of the free" in note
+    apart = loose.anchor_points.copy()
+    apart[0, 0] += 0.05
+    assert not replace(loose, anchor_points=apart).is_point
