@@ -117,6 +117,7 @@ def command(
     import numpy as np
 
     from seecr import boundary, default_axes, workspace_map
+    from seecr.equilibrium.strained import strained
     from seecr.files import json_text, staged, write_text
     from seecr.report.map_slices import map_figure
     from seecr.report.maps import beyond_line, write_arrays
@@ -142,7 +143,7 @@ def command(
             inside = found.feasible if at_least is None else found.likely(at_least)
             pairs = found.crossings(inside)
             places = boundary(machine, *pairs, tolerance=edge, at_least=at_least, **asked)
-        notes = [*machine.notes]
+        notes = [*machine.notes, *strained(machine)]
         if own is not None:
             notes += [*own.notes, *beyond_line(found, own.reach)]
         status = 3 if found.elastic and not np.any(found.rests) else 0
