@@ -11,7 +11,7 @@ import re
 from collections.abc import Sequence
 
 from crosscheck.errors import CrosscheckError
-from seecr.units import UNITS, short, with_error
+from seecr.units import UNITS, short, significant, with_error, without_rounding
 
 __all__ = [
     "EXAMPLE",
@@ -26,6 +26,7 @@ __all__ = [
     "parse_quantity",
     "short",
     "with_error",
+    "without_rounding",
 ]
 
 SI = {"position": "m", "orientation": "rad", "tension": "N", "length": "m"}
@@ -98,7 +99,7 @@ def parse_kind(
 
 def chance(p: float) -> str:
     """A probability."""
-    return "< 1e-12" if p < 1e-12 else short(p, 2)
+    return "< 1e-12" if p < 1e-12 else significant(p, 2)
 
 
 def parameter_name(name: str, unit: str) -> str:

@@ -9,7 +9,10 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["between", "counted", "plural", "rows_words", "some"]
+__all__ = ["between", "counted", "figures", "plural", "rows_words", "some"]
+
+# An end of a range that is smaller than this part of the other one is what rounding leaves of 0.
+_ROUNDING = 1e-12
 
 
 def counted(number: int, noun: str, form: str = "d") -> str:
@@ -28,8 +31,15 @@ def plural(number: int, noun: str) -> str:
 
 def between(low: float, high: float, form: str = ".4g", lead: str = "") -> str:
     """A range such as "0 to 3", after ``lead``; if both ends read the same, only that number."""
-    first, last = f"{low:{form}}", f"{high:{form}}"
+    least = _ROUNDING * max(abs(low), abs(high))
+    first, last = (figures(0 if abs(end) < least else end, form) for end in (low, high))
     return first if first == last else f"{lead}{first} to {last}"
+
+
+def figures(number: float, form: str) -> str:
+    """A number in a format, where nothing of it is left without its minus: 0.000, never -0.000."""
+    text = f"{number:{form}}"
+    return text if float(text) else f"{0:{form}}"
 
 
 def some(words: Sequence[str], most: int = 4, mark: str = ", ") -> str:

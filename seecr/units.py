@@ -11,14 +11,25 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from seecr.counted import figures
 from seecr.pose import Array
 
-__all__ = ["UNITS", "Unit", "joules", "millimetres", "of_columns", "short", "with_error"]
+__all__ = [
+    "UNITS",
+    "Unit",
+    "joules",
+    "millimetres",
+    "of_columns",
+    "short",
+    "significant",
+    "with_error",
+    "without_rounding",
+]
 
 Numbers = TypeVar("Numbers", float, Array)
 
-# Larger numbers are written with an exponent.
-_MOST_DIGITS = 6
+# Digits before the point from which on numbers have an exponent, and those with an error.
+_MOST_DIGITS, _MOST_KNOWN = 6, 9
 # Numbers in units of people that are no larger are what rounding leaves.
 _ROUNDING = 1e-9
 
@@ -81,8 +92,18 @@ def of_columns(si: str) -> dict[str, Unit]:
     return {unit.suffix: unit for unit in UNITS if unit.si == si and unit.column}
 
 
+def without_rounding(value: float) -> float:
+    """A number in a unit of people, or 0 where it is no more than what rounding leaves of that."""
+    return 0.0 if abs(value) <= _ROUNDING else value
+
+
 def short(value: float | None, digits: int = 3) -> str:
-    """A number with so many digits, without an exponent if that is readable.
+    """A number in a unit of people with so many digits; what rounding leaves of 0 is 0."""
+    return significant(None if value is None else without_rounding(value), digits)
+
+
+def significant(value: float | None, digits: int = 3) -> str:
+    """A number with so many digits, however small, without an exponent if that is readable.
 
     Its minus sign is a hyphen, as in every text that the programs print: people copy numbers.
     """
@@ -100,7 +121,7 @@ def short(value: float | None, digits: int = 3) -> str:
 
 def millimetres(length: float | np.floating[Any], digits: int = 4) -> str:
     """A length [m] in mm with so many digits, and no exponent however many metres it is."""
-    value = 1e3 * float(length)
+    value = without_rounding(1e3 * float(length))
     form = ".0f" if abs(value) >= 10.0**digits - 0.5 else f".{digits}g"
     return f"{value:{form}} mm"
 
@@ -115,13 +136,14 @@ def with_error(value: float, error: float, digits: int = 2) -> tuple[str, str]:
 
     Without an error, what only rounding leaves of a value is 0.
     """
-    known = value if abs(value) > _ROUNDING else 0.0
     if not np.isfinite(error):
-        return short(known), "undetermined"
+        return short(value), "undetermined"
+    large = abs(value) >= 10.0**_MOST_DIGITS
+    endless = abs(value) >= 10.0**_MOST_KNOWN
     if error <= 0.0:
-        return short(known, 6), "0"
+        return (f"{value:.0f}" if large and not endless else short(value, 6)), "0"
     decimals = digits - 1 - int(np.floor(np.log10(error)))
-    if decimals > 9 or abs(value) >= 10.0**_MOST_DIGITS:
-        return short(value, 6), short(error, 2)
+    if decimals > 9 or endless:
+        return significant(value, 6), significant(error, 2)
     decimals = max(decimals, 0)
-    return f"{value:.{decimals}f}", f"{error:.{decimals}f}"
+    return figures(value, f".{decimals}f"), f"{error:.{decimals}f}"

@@ -72,6 +72,7 @@ def command(
     from crosscheck.report import write_page
     from seecr import load_model, load_robot
     from seecr.files import json_text, staged, write_text
+    from seecr.workspace.maps import with_history
 
     limits = with_options(load_limits(limits_file) if limits_file else Limits(), options)
     machine = load_robot(robot)
@@ -113,5 +114,7 @@ def command(
     for note in own.notes if own else ():
         click.echo(f"note: {note}")
     print_comparison(found, exceeded, limits != Limits(), out)
-    click.echo(after_comparison(found, Given.with_data(measured, robot, data, model, sigmas)))
+    history = own is not None and bool(with_history(machine, own))
+    given = Given.with_data(measured, robot, data, model, sigmas, history)
+    click.echo(after_comparison(found, given))
     return status

@@ -85,6 +85,7 @@ def command(
     from seecr import load_model, load_robot, new_model
     from seecr.description.fingerprint import fingerprint
     from seecr.files import json_text, staged, write_text
+    from seecr.workspace.maps import with_history
 
     gates = [DiagnosisVerdict.named(word) for word in fail_on]
     tolerance = Tolerance.parsed(tolerances)
@@ -120,7 +121,8 @@ def command(
     if note:
         click.echo(note, err=as_json)
     if not as_json:
-        given = Given.with_data(measured, robot, data, model, sigmas)
+        history = bool(with_history(machine, own))
+        given = Given.with_data(measured, robot, data, model, sigmas, history)
         click.echo(after_diagnosis(found, given, model_out, out, moved))
     if found.verdict in gates:
         return 1

@@ -24,6 +24,7 @@ class Given:
     Attributes:
         robot, data, model: the files. sigmas: of ``--sigma``.
         lengths: whether the data are commanded in lengths, which no pose is known of.
+        history: whether rows of the model depend on the rows before, so that no map knows it.
     """
 
     robot: Path
@@ -31,14 +32,15 @@ class Given:
     model: Path | None = None
     sigmas: Sequence[str] = ()
     lengths: bool = False
+    history: bool = False
 
     @classmethod
     def with_data(
         cls, measured: Measurements, robot: Path, data: Sequence[Path], model: Path | None,
-        sigmas: Sequence[str],
+        sigmas: Sequence[str], history: bool = False,
     ) -> Given:  # fmt: skip
         """The same of files that were read."""
-        return cls(robot, data, model, sigmas, measured.command_lengths is not None)
+        return cls(robot, data, model, sigmas, measured.command_lengths is not None, history)
 
     @property
     def options(self) -> Words:
@@ -94,7 +96,12 @@ def after_diagnosis(
 
 
 def _using(given: Given, model: Path) -> str:
-    """Telling the winches what brings the platform to poses; a map, where none are known."""
+    """Telling the winches what brings the platform to poses; a map, where none are known.
+
+    What a map would refuse is swept instead.
+    """
+    if given.lengths and given.history:
+        return following("seecr", "sweep", given.robot, given.data[0], "--model", model)
     if given.lengths:
         return following("seecr", "map", given.robot, "--model", model)
     line = following("seecr", "correct", given.robot, given.data[0], "--model", model)

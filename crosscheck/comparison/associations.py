@@ -28,6 +28,7 @@ from crosscheck.comparison.quantities import (
 from crosscheck.comparison.travel import Travel, travel
 from crosscheck.fit.noise import as_table
 from crosscheck.fit.problem import Problem
+from seecr.counted import between
 from seecr.pose import Array
 from seecr.prediction.experiment import Prediction
 
@@ -232,8 +233,7 @@ def _binned(quantity: Abscissa, some: NDArray[np.bool_]) -> tuple[NDArray[np.int
 
 
 def _labelled(low: float, high: float, unit: str) -> str:
-    text = f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
-    return f"{text} {unit}".strip()
+    return f"{between(low, high)} {unit}".strip()
 
 
 def _bins(index: Any, labels: list[str], white: Array, raw: Array) -> tuple[Bin, ...]:

@@ -15,6 +15,8 @@ AXES = ("x", "y", "z", "rx", "ry", "rz")
 STILL = "still"
 # An axis is not divided if the commands spread along it by less than this part of the widest one.
 _FLAT = 0.05
+# Speeds this near to each other, relative to their size, are one; coarse times may ask for more.
+_SAME_SPEED, _MOST_COARSE = 1e-9, 1e-3
 # A position this near to the middle of an axis, relative to the spread, is on it.
 _ROUNDING = 1e-9
 
@@ -29,7 +31,7 @@ class Travel:
         direction: (n,) sign and axis of the largest component of the step, rotations multiplied by
             the robot's length; "still" if nothing moves.
         speed: (n,) [m/s], rotations multiplied by the robot's length; NaN for the first row of a
-            run and without times.
+            run and without times. Those that differ by rounding alone are equal.
     """
 
     pose: Array
@@ -56,8 +58,26 @@ def travel(problem: Problem, prediction: Prediction) -> Travel:
     if time is not None:
         apart = np.concatenate([[0.0], np.diff(time)])
         known = ~commands.starts & (apart > 0)
-        speed[known] = np.linalg.norm(weighed[known], axis=1) / apart[known]
+        speed[known] = _levelled(
+            np.linalg.norm(weighed[known], axis=1) / apart[known], _rounding(time, apart[known])
+        )
     return Travel(pose, step, direction, speed)
+
+
+def _rounding(time: Array, apart: Array) -> float:
+    """What speeds may differ by, relative to their size: times since 1970 are coarse."""
+    coarse = 4.0 * np.spacing(np.abs(time).max())
+    return float(np.clip(coarse / apart.min(initial=np.inf), _SAME_SPEED, _MOST_COARSE))
+
+
+def _levelled(speed: Array, rounding: float) -> Array:
+    """Speeds (n,), each group of those that differ by rounding as the smallest of them."""
+    order = np.argsort(speed)
+    rising = speed[order]
+    begins = np.diff(rising, prepend=-1.0) > rounding * rising
+    out = np.empty_like(speed)
+    out[order] = rising[begins][np.cumsum(begins) - 1]
+    return out
 
 
 def regions_of(problem: Problem, pose: Array) -> Names:

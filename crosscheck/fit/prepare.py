@@ -21,6 +21,7 @@ from crosscheck.fit.unstated import estimate_sigma, oversized
 from crosscheck.measurements.data import Measurements
 from seecr.description.robot import Robot
 from seecr.effects import Terms, catalogue
+from seecr.equilibrium.strained import strained
 from seecr.prediction.experiment import Prediction
 
 Progress = Callable[[str, float], None]
@@ -96,6 +97,7 @@ def prepare(
     ]
     notes = (
         *robot.notes,
+        *strained(robot),
         *data.notes,
         *_filled_in(problem),
         *odd,

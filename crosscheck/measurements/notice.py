@@ -26,6 +26,9 @@ _OTHER_UNIT, _LEAST_ROWS = 100.0, 4
 _TURNED_AT_LEAST, _FOLLOWS, _RATE_OFF = np.radians(0.5), 0.9, 0.25
 # Commands that spread over this part of the frame along an axis are meant to move along it.
 _MOVED = 0.02
+# Readings that follow the negated commands so closely, and about as far, are of a mirrored axis;
+# platforms that hang on few cables do not move as far as they are told.
+_AGAINST, _AS_FAR = 0.95, 0.5
 # Quaternions this far [rad] from where they should be, but near it in another order.
 _TURNED, _UNTURNED = np.radians(90.0), np.radians(45.0)
 # Positions whose usual distance from the commands exceeds these parts of the commands' spread and
@@ -47,7 +50,7 @@ def notice(columns: Columns, robot: Robot, data: Measurements) -> list[str]:
     _refuse_zeros(columns, robot, data)
     return [
         *_far(robot, data),
-        *_elsewhere(robot, data),
+        *(_mirrored(columns, robot, data) or _elsewhere(robot, data)),
         *_degrees(columns, data),
         *_other_order(columns, robot, data),
         *twice(data),
@@ -149,6 +152,38 @@ def _refuse_zeros(columns: Columns, robot: Robot, data: Measurements) -> None:
             f"{off[row]:.3g} m from it; leave the cells empty where nothing was read"
         ),
     )
+
+
+def _mirrored(columns: Columns, robot: Robot, data: Measurements) -> list[str]:
+    """A note about positions that run against the commands, along one axis or several."""
+    if data.command_pose is None or "tracker_frame" in data.free:
+        return []
+    against = [k for k in range(3) if data.position_mask[k] and _runs_against(robot, data, k)]
+    if not against:
+        return []
+    names = " ".join(columns.known[f"meas_{POSITION[k]}"].name for k in against)
+    told = " and ".join("xyz"[k] for k in against)
+    if len(against) == 1:
+        said = f"Column {names} goes against the commands along {told}: is its sign"
+    else:
+        said = f"Columns {names} go against the commands along {told}: are their signs"
+    return [
+        f"{said} the other way round, or has the tracker's frame other axes than the robot's "
+        "(crosscheck import aligns turned ones, not mirrored ones)?"
+    ]
+
+
+def _runs_against(robot: Robot, data: Measurements, k: int) -> bool:
+    """Whether positions along an axis follow the negated commands over a part of the frame."""
+    assert data.command_pose is not None
+    seen = np.isfinite(data.position[:, k])
+    read, told = data.position[seen, k], data.command_pose[seen, k]
+    if _mean_spread(told) <= _MOVED * robot.reach or _mean_spread(read) == 0.0:
+        return False
+    read, told = read - read.mean(), told - told.mean()
+    rate = float(read @ told / (told @ told))
+    follows = rate * np.sqrt((told @ told) / (read @ read))
+    return bool(follows < -_AGAINST and abs(rate + 1.0) < _AS_FAR)
 
 
 def _elsewhere(robot: Robot, data: Measurements) -> list[str]:

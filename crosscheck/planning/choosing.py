@@ -21,7 +21,7 @@ from crosscheck.planning.visibility import EXACT, Signal, signal_left, signals
 from seecr.arguments import whole
 from seecr.counted import counted
 from seecr.description.joints import pose_of_values
-from seecr.description.robot import Robot
+from seecr.description.robot import ITS_A_POINT, Robot
 from seecr.pose import Array
 
 # Candidates along x, y, z; number of random ones for joints; most candidates that are evaluated.
@@ -80,10 +80,10 @@ def choose_poses(
         plan = _usable(robot, tried, full, channels, limits)
         found = 0 if plan is None else plan.problem.data.n_rows
     if plan is None or found < rows:
+        cure = "ask for fewer --rows, a wider range of tensions, or another --box"
         raise CrosscheckError(
             f"robot {robot.name} can be held at {found} of {counted(len(tried), 'pose')} that "
-            f"were tried; expected {rows} or more; ask for fewer --rows, a wider range of "
-            "tensions, or another --box"
+            f"were tried; expected {rows} or more; {ITS_A_POINT if robot.is_point else cure}"
         )
     progress("sensitivities", 0.2)
     there = signals(plan)[0]

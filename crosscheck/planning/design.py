@@ -28,6 +28,7 @@ from crosscheck.planning.result import Plan, Visible
 from crosscheck.planning.sight import all_visible
 from crosscheck.planning.visibility import Signal, signals, signals_like
 from seecr.effects import Term, Terms, layout_of
+from seecr.equilibrium.strained import strained
 from seecr.pose import Array
 
 
@@ -64,7 +65,7 @@ def make_plan(
     full, assumed = expected_sigma(robot, stated, kinds)
     free = [layout_of(name, robot) for name in commands.free]
     plan = planned(robot, commands, full, read, Terms(Term(one, one.null) for one in free))
-    notes = [*robot.notes, *commands.notes, *assumed, *_unsolved(plan)]
+    notes = [*robot.notes, *strained(robot), *commands.notes, *assumed, *_unsolved(plan)]
     if not plan.problem.use.any():
         return Plan(plan, (), {}, ((), np.zeros((0, 0))), (), (), tuple(notes))
     progress("sensitivities", 0.1)

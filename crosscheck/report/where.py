@@ -83,6 +83,7 @@ def _draw(
         bar = figure.colorbar(
             dots, ax=panels.ravel().tolist(), shrink=0.7, pad=0.01, aspect=28,
             extend="max" if beyond else "neither",
+            panchor=False,  # panels stay at the left, where narrow ones have room for a title
         )  # fmt: skip
         bar.set_label(f"{kind.name} error [{kind.unit}]")
         bar.outline.set_visible(False)

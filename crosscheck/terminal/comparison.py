@@ -14,7 +14,7 @@ from crosscheck.comparison.limits import Exceeded
 from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.comparison.result import Comparison, Group
 from crosscheck.fit.problem import KINDS, Kind, Rms
-from crosscheck.terminal.lines import cell, console_for, heading, say, table_of
+from crosscheck.terminal.lines import cell, console_for, four_digits, heading, say, table_of
 from crosscheck.units import in_unit
 from seecr.counted import counted
 
@@ -56,7 +56,7 @@ def _coordinates(found: Comparison) -> Table:
     table = table_of(["measured minus predicted", "bias", "rms", "max", "unit", "at line", "rows"])
     for row in found.coordinates:
         factor, unit = in_unit(row.unit)
-        numbers = [f"{factor * value:.4g}" for value in (row.bias, row.rms, row.max)]
+        numbers = [four_digits(factor * value) for value in (row.bias, row.rms, row.max)]
         table.add_row(row.name, *numbers, unit, found.problem.data.place(row.row), str(row.rows))
     return table
 
@@ -119,7 +119,7 @@ def _print_worst(console: Console, found: Comparison) -> None:
         for kind in KINDS:
             size = found.errors_of(kind.name)[row.row]
             if np.isfinite(size):
-                parts.append(f"{kind.factor * size:.4g} {kind.unit}")
+                parts.append(f"{four_digits(kind.factor * size)} {kind.unit}")
         say(
             console,
             f"worst: line {row.line}, run {row.run}, {found.place(row.row)}: {', '.join(parts)} "

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from crosscheck.fit.problem import KINDS, Kind, Rms
 from crosscheck.fit.words import value_lines
+from crosscheck.units import without_rounding
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
@@ -26,7 +27,12 @@ def heading(kind: Kind) -> str:
 def cell(kind: Kind, rms: Rms) -> str:
     """Its rms error in the unit of the heading, or a dash."""
     value = rms.get(kind.key)
-    return "-" if value is None else f"{kind.factor * value:.4g}"
+    return "-" if value is None else four_digits(kind.factor * value)
+
+
+def four_digits(value: float) -> str:
+    """A number in a unit of people; what rounding leaves of 0 is 0."""
+    return f"{without_rounding(value):.4g}"
 
 
 def console_for(console: Console | None, notes: Iterable[str] = ()) -> Console:

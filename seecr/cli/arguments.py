@@ -175,8 +175,10 @@ def model_at(given: Path | None, robot: Robot) -> Model | None:
 
 def notes_of(model: Model | None, solution: Solution) -> tuple[str, ...]:
     """What is to be told of a robot, of commands, of a model, and of answers beyond its data."""
+    from seecr.equilibrium.strained import strained
+
     robot = solution.robot
-    said = (*robot.notes, *outside(robot, solution.command))
+    said = (*robot.notes, *strained(robot), *outside(robot, solution.command))
     return said if model is None else (*said, *model.notes, *model.beyond(solution))
 
 

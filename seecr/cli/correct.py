@@ -16,7 +16,7 @@ from seecr.cli.arguments import (
     robot_at,
     robot_options,
 )
-from seecr.cli.following import following, given_with
+from seecr.cli.following import following, given_with, mapping
 from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
 
 if TYPE_CHECKING:
@@ -146,9 +146,9 @@ def command(
     if as_json:
         click.echo(json_text(document))
         return status
-    given = given_with(cable, model)
-    then = following("seecr", "map", robot, *given)  # where there is something to hold
+    then = mapping(machine, robot, cable, own)  # where there is something to hold
     if found.found.any():
+        given = given_with(cable, model)
         then = following("seecr", "sweep", robot, out / "corrected.csv", *given)
     for line in [
         *notes,

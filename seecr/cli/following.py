@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from seecr import Commands, Solution
+    from seecr import Commands, Model, Robot, Solution
 
 Words = tuple[object, ...]
 
@@ -38,21 +38,42 @@ def given_with(cable: str | None, model: Path | None) -> Words:
     return cables if model is None else (*cables, "--model", model)
 
 
-def after_pose(solution: Solution, robot: Path, turned: Sequence[float], options: Words) -> str:
+def mapping(machine: Robot, robot: Path, cable: str | None, model: Model | None) -> str:
+    """The workspace with a model; with one that has a history what maps know of it."""
+    from seecr.workspace.maps import with_history
+
+    file = None if model is None else model.path
+    if model is None or not with_history(machine, model):
+        return following("seecr", "map", robot, *given_with(cable, file))
+    if machine.n_cables < machine.n_dof:  # each pose is solved for, whatever is asked for
+        line = following("seecr", "map", robot, *given_with(cable, None))
+        return f"{line}  # without the model: a map knows no history"
+    return following("seecr", "map", robot, *given_with(cable, file), "--no-elastic")
+
+
+def after_pose(
+    solution: Solution, robot: Path, turned: Sequence[float], cable: str | None,
+    model: Model | None,
+) -> str:  # fmt: skip
     """The way there from the reference pose; the workspace, where there is none or no rest."""
     machine, command = solution.robot, solution.command[0]
     start, end = (_numbers(pose[:3]) for pose in (machine.reference_pose, command))
     if start == end or not solution.converged.all():
-        return following("seecr", "map", robot, *options)
+        return mapping(machine, robot, cable, model)
     way = ("--turned", *_numbers(turned)) if turned else ()
+    options = given_with(cable, None if model is None else model.path)
     return following("seecr", "sweep", robot, "--line", *start, *end, *way, *options)
 
 
-def after_sweep(commands: Commands, robot: Path, poses: Path | None, options: Words) -> str:
+def after_sweep(
+    solution: Solution, commands: Commands, robot: Path, poses: Path | None, cable: str | None,
+    model: Model | None,
+) -> str:  # fmt: skip
     """Correcting the poses of a file; what measuring told lengths would show; the workspace."""
     if poses is None:
-        return following("seecr", "map", robot, *options)
+        return mapping(solution.robot, robot, cable, model)
     if commands.lengths is None:
+        options = given_with(cable, None if model is None else model.path)
         return following("seecr", "correct", robot, poses, *options)
     return following("crosscheck", "plan", robot, poses)
 

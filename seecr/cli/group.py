@@ -49,9 +49,11 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command and its words, none of which is empty."""
+        """The command and its words, none of them empty; no option for one file has two."""
         name, command, words = super().resolve_command(ctx, args)
         _refuse_empty(words, ctx)
+        if command is not None:
+            _refuse_repeated(words, command, click.Context(command, ctx, name))
         return name, command, words
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -152,6 +154,28 @@ def _refuse_empty(words: list[str], ctx: click.Context) -> None:
         if not word.strip():
             where = f"{before}: " if before.startswith("-") else ""
             raise click.UsageError(f"{where}expected a value, got an empty one; leave it out", ctx)
+
+
+def _refuse_repeated(words: list[str], command: click.Command, ctx: click.Context) -> None:
+    """Refuse several files where one is expected: click would take the last, and say nothing.
+
+    Numbers may be repeated, as an alias of a shell and what is typed after it do.
+    """
+    ctx.ignore_unknown_options = True  # such as negative numbers
+    try:
+        _values, _rest, order = command.make_parser(ctx).parse_args(list(words))
+    except click.UsageError:
+        return  # the command itself refuses it, in the order of its own checks
+    for option in command.get_params(ctx):
+        times = sum(given is option for given in order)
+        if isinstance(option, click.Option) and _is_one_file(option) and times > 1:
+            raise click.UsageError(
+                f"{option.opts[0]}: expected once, got {times} times; leave out all but one", ctx
+            )
+
+
+def _is_one_file(option: click.Option) -> bool:
+    return isinstance(option.type, click.Path) and not option.multiple
 
 
 def _usage_text(error: click.ClickException) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from seecr.cli.arguments import NumbersCommand, model_at, notes_of, pose_of, robot_at, robot_options
-from seecr.cli.following import after_pose, given_with
+from seecr.cli.following import after_pose
 from seecr.cli.options import FILE, json_option, made_by, progress_share
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def command(
         *midline_lines(solution),
         *bar_lines(*bars),
         *other_lines(solution, others, passes),
-        after_pose(solution, robot, coordinates[3:], given_with(cable, model)),
+        after_pose(solution, robot, coordinates[3:], cable, own),
     ]
     for line in [*notes, *lines]:
         click.echo(line)

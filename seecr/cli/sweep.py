@@ -24,7 +24,7 @@ from seecr.cli.arguments import (
     robot_options,
     turned_option,
 )
-from seecr.cli.following import after_sweep, given_with
+from seecr.cli.following import after_sweep
 from seecr.cli.options import FILE, json_option, made_by, out_option, progress_bar
 
 if TYPE_CHECKING:
@@ -186,7 +186,7 @@ def command(
     ]  # fmt: skip
     if search is not None:
         lines.append(search.words)
-    then = after_sweep(commands, robot, poses, given_with(cable, model))
+    then = after_sweep(solution, commands, robot, poses, cable, own)
     for line in [*notes, *lines, f"Results in {out}/", then]:
         click.echo(line)
     return status

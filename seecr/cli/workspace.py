@@ -117,6 +117,7 @@ def command(
     import numpy as np
 
     from seecr import boundary, default_axes, workspace_map
+    from seecr.equilibrium.strained import strained
     from seecr.files import json_text, staged, write_text
     from seecr.report.map_slices import map_figure
     from seecr.report.maps import beyond_line, write_arrays
@@ -142,7 +143,7 @@ def command(
             inside = found.feasible if at_least is None else found.likely(at_least)
             pairs = found.crossings(inside)
             places = boundary(machine, *pairs, tolerance=edge, at_least=at_least, **asked)
-        notes = [*machine.notes]
+        notes = [*machine.notes, *strained(machine)]
         if own is not None:
             notes += [*own.notes, *beyond_line(found, own.reach)]
         status = 3 if found.elastic and not np.any(found.rests) else 0
@@ -177,15 +178,20 @@ def _holds_none(found: Workspace, lowest: float, highest: float) -> Exception:
     """That no pose of the grid can be held."""
     from seecr import InputError
     from seecr.counted import counted
+    from seecr.description.robot import ITS_A_POINT
 
     by_place = found.robot.n_cables < found.robot.n_dof
     what, stays = (
         ("in no orientation do ", " so that the platform stays") if by_place else ("no ", "")
     )
+    cure = (
+        f": {ITS_A_POINT}"
+        if found.robot.is_point
+        else ("; expected another grid, orientation or wider limits")
+    )
     return InputError(
         f"no pose of the grid can be held: {what}tensions from {lowest:g} to {highest:g} N balance "
-        f"the load{stays} at any of {counted(found.margin.size, 'pose')}; expected another grid, "
-        "orientation or wider limits"
+        f"the load{stays} at any of {counted(found.margin.size, 'pose')}{cure}"
     )
 
 

@@ -73,8 +73,9 @@ def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:
     values, reached, screws = _nearest(robot, poses)
     off = _off_joints(robot, poses, reached)
     if off is not None:
+        which = f"commanded pose {off[0]}" if len(poses) > 1 else "the commanded pose"
         raise InputError(
-            f"robot {robot.name}: its joints cannot reach commanded pose {off[0]}, it is off by "
+            f"robot {robot.name}: its joints cannot reach {which}, it is off by "
             f"{off[1]}; expected a pose that they can reach"
         )
     return values, screws

@@ -12,8 +12,19 @@ from numpy.typing import NDArray
 from seecr.errors import InputError, RobotError
 from seecr.pose import LARGEST, Array, all_finite, quat_rotate, transform_points
 
+__all__ = ["ABSURD", "IDENTITY_POSE", "ITS_A_POINT", "Joint", "Robot"]
+
 ABSURD = 10.0
 """Commands and rest lengths beyond this many times the frame's reach are in another unit."""
+
+ITS_A_POINT = (
+    "all cables are anchored at one point of the platform, about which nothing keeps it from "
+    "turning; if it is to be a point mass, give it three slide joints instead of the free joint"
+)
+"""The cause of much that fails for a robot that :attr:`Robot.is_point`, and its cure."""
+
+# Anchor points are one if they are no farther apart than this part of the robot's length.
+_ONE_POINT = 1e-6
 
 # What every cable has one of.
 _OF_CABLES = ("exit_points", "anchor_points", "ea", "rest_lengths")
@@ -143,7 +154,11 @@ class Robot:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a user of the robot's file should know: a sentence about :attr:`left_out`."""
+        """What a user of the robot's file should know: on :attr:`left_out`, :attr:`is_point`."""
+        point = (f"{self.source or self.name}: {ITS_A_POINT}",) if self.is_point else ()
+        return (*point, *self._left_out_words())
+
+    def _left_out_words(self) -> tuple[str, ...]:
         if not self.left_out:
             return ()
         *others, last = self.left_out
@@ -152,6 +167,12 @@ class Robot:
             f"{self.source or self.name} has {names}: left out here, where nothing but its cables "
             "holds the platform",
         )
+
+    @property
+    def is_point(self) -> bool:
+        """Whether a free platform has all its cables at one point, about which it can turn."""
+        wide = np.ptp(self.anchor_points, axis=0).max()
+        return not self.joints and bool(wide <= _ONE_POINT * self.length)
 
     @property
     def n_cables(self) -> int:

@@ -30,7 +30,7 @@ from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics.solution import Solution
 from seecr.statics.starts import Commanded, commands_from
 from seecr.statics.tables import Tables, assemble, take
-from seecr.units import millimetres
+from seecr.units import millimetres, without_rounding
 
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects
@@ -111,8 +111,8 @@ class Correction(Result):
         out = [f"{self.robot.name}: {int(at.sum())} of {counted(n, 'pose')} reached"]
         if np.any(at):
             out.append(
-                f"remaining error: at most {1e3 * np.linalg.norm(left[at, :3], axis=1).max():.2g} "
-                f"mm and {_degrees(left[at, 3:]):.2g} deg"
+                f"remaining error: at most {millimetres(_largest(left[at, :3]), 2)} and "
+                f"{without_rounding(_degrees(left[at, 3:])):.2g} deg"
             )
             pulls = self.solution.tensions[at]
             out.append(f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N")

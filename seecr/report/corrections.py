@@ -18,6 +18,8 @@ __all__ = ["chance_lines", "corrected_csv", "corrected_toml", "joint_lines"]
 _WANT = [f"want_{name}" for name in COORDINATES]
 # A probability below this deserves attention.
 _LIKELY = 0.95
+# The largest one with two digits that is not certain.
+_SURE = 0.99
 
 
 def corrected_csv(found: Correction, wanted: CommandFile) -> str:
@@ -61,11 +63,14 @@ def chance_lines(found: Correction, kept: Array | None, minimum: bool = False) -
         return
     worst = int(np.nanargmin(kept))
     many = int(np.sum(kept[np.isfinite(kept)] < _LIKELY))
+    # as 1.00 it would read as certain
+    least = f"above {_SURE:g}" if kept[worst] > _SURE + 0.005 else f"of at least {kept[worst]:.2f}"
     yield (
-        f"tensions stay within the limits with a probability of at least {np.nanmin(kept):.2f}, "
+        f"tensions stay within the limits with a probability {least}, "
         f"lowest at {found.place(worst)}; below {_LIKELY:g} at {many} of {len(found.wanted)}"
     )
-    if minimum and many:
+    # without more cables than degrees of freedom there is nothing to distribute
+    if minimum and many and found.robot.n_cables > found.robot.n_dof:
         yield (
             "  --aim minimum puts a cable at its lowest tension, where it stays within the limits "
             "with about 0.5; --aim middle keeps away from them"

@@ -72,7 +72,8 @@ def map_figure(
     with figure(path, len(panels), n, sharex=True, sharey=True, figsize=size) as axes:
         for row, panel in zip(axes, panels, strict=True):
             shown = panel(cut, row)
-            row[0].figure.colorbar(shown, ax=list(row), **_bar_of(panel, found))
+            # at the left of their places panels leave room for their labels, however wide they get
+            row[0].figure.colorbar(shown, ax=list(row), panchor=False, **_bar_of(panel, found))
             row[0].set_ylabel(f"{'xyz'[cut.high]} [{cut.unit}]")
         if edge is not None:
             _dots(axes, cut, edge, at_least)
@@ -292,7 +293,7 @@ def _colours(
         )  # fmt: skip
         if _has_edge(inside):
             ax.contour(x, y, inside.T, levels=[0.0], colors=_EDGE, linewidths=1.2)
-        ax.set_aspect("equal")
+        ax.set_aspect("equal", anchor="W")
         ax.grid(False)
     return shown
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from seecr.compiled.columns import FORCE_OF_WEIGHT, WEIGHT
-from seecr.counted import counted
+from seecr.counted import counted, figures
 from seecr.description.robot import Joint, Robot
 from seecr.equilibrium.multiple import elsewhere
 from seecr.equilibrium.passes import TWISTED, Barrier
@@ -80,7 +80,7 @@ def pose_lines(solution: Solution, spread: Spread | None = None) -> Iterator[str
     yield f"rests at x y z {at} mm, turned rx ry rz {turned} deg"
     if spread is not None:
         yield from _spread_lines(spread)
-    yield "  quaternion " + " ".join(f"{q + 0.0:.7f}" for q in np.round(pose[3:], 9))
+    yield "  quaternion " + " ".join(figures(q, ".7f") for q in np.round(pose[3:], 9))
     yield (
         f"off its command by {_three(1e3 * away[:3], '+.4f')} mm "
         f"({millimetres(1e-3 * np.round(1e3 * np.linalg.norm(away[:3]), _DECIMALS))}), turned by "
@@ -360,7 +360,7 @@ def sweep_lines(
 
 
 def _three(values: Array, form: str) -> str:
-    return ", ".join(f"{value + 0.0:{form}}" for value in np.round(values, 6))
+    return ", ".join(figures(value, form) for value in np.round(values, 6))
 
 
 def at_rest(solution: Solution) -> bool:

@@ -30,7 +30,7 @@ from seecr.workspace.margins import margins_at, read_once
 Progress = Callable[[int], None]
 """Called with the number of poses done since the last call."""
 
-__all__ = ["default_axes", "evenly", "workspace_map"]
+__all__ = ["default_axes", "evenly", "with_history", "workspace_map"]
 
 # Poses per part.
 _PART = 5_000
@@ -170,15 +170,19 @@ def workspace_map(
 
 def _refuse_memory(robot: Robot, effects: GivenEffects) -> None:
     """Refuse effects with history: their results would depend on the order of the grid."""
-    home = Commands(robot.reference_pose[None])
-    acting = effects_of(effects, robot)
-    if Experiment(robot, home).setup(acting).has_history:
-        names = [one.name for one in acting if Experiment(robot, home).setup([one]).has_history]
+    names = with_history(robot, effects)
+    if names:
         raise InputError(
             f"a map's poses are in no order, and {', '.join(names)} would depend on the rows "
             "before; expected a model without them, or no elastic map (only which poses can "
             "be held: --no-elastic, elastic=False)"
         )
+
+
+def with_history(robot: Robot, effects: GivenEffects) -> list[str]:
+    """Names of the effects by which a row depends on the rows before it."""
+    at_home = Experiment(robot, Commands(robot.reference_pose[None]))
+    return [one.name for one in effects_of(effects, robot) if at_home.setup([one]).has_history]
 
 
 def _run_telling(

@@ -84,7 +84,8 @@ def test_a_unit_of_another_kind_is_refused() -> None:
 @pytest.mark.parametrize(
     ("value", "text"),
     [(0.0, "0"), (0.0296, "0.0296"), (-4.274, "-4.27"), (123456.0, "123456"),
-     (1.234e-7, "1.23e-7"), (9.9e9, "9.90e9"), (np.nan, "–"), (None, "–")],
+     (1.234e-7, "1.23e-7"), (3e-11, "0"), (-3e-11, "0"),
+     (9.9e9, "9.90e9"), (np.nan, "–"), (None, "–")],
 )  # fmt: skip
 def test_short_numbers(value: float | None, text: str) -> None:
     assert short(value) == text
@@ -93,7 +94,8 @@ def test_short_numbers(value: float | None, text: str) -> None:
 @pytest.mark.parametrize(
     ("length", "digits", "text"),
     [(0.0, 4, "0 mm"), (0.035039, 4, "35.04 mm"), (9.9994, 4, "9999 mm"), (9.9996, 4, "10000 mm"),
-     (124.9981, 4, "124998 mm"), (7.76012, 3, "7760 mm"), (-0.0123456, 3, "-12.3 mm")],
+     (124.9981, 4, "124998 mm"), (7.76012, 3, "7760 mm"), (-0.0123456, 3, "-12.3 mm"),
+     (3e-14, 4, "0 mm"), (-3e-14, 4, "0 mm"), (2e-12, 4, "2e-09 mm")],
 )  # fmt: skip
 def test_lengths_of_many_metres_have_no_exponent(length: float, digits: int, text: str) -> None:
     assert millimetres(length, digits) == text
@@ -103,7 +105,10 @@ def test_lengths_of_many_metres_have_no_exponent(length: float, digits: int, tex
 @pytest.mark.parametrize(
     ("value", "error", "texts"),
     [(10.00238, 0.005576, ("10.0024", "0.0056")), (1.3988, np.inf, ("1.40", "undetermined")),
-     (-1437.0, 210.0, ("-1437", "210")), (1.5, 0.0, ("1.50000", "0"))],
+     (-1437.0, 210.0, ("-1437", "210")), (1.5, 0.0, ("1.50000", "0")),
+     (4.53e6, 0.0, ("4530000", "0")), (4.5312e6, 23456.0, ("4531200", "23456")),
+     (-1234567.89, 0.31, ("-1234567.89", "0.31")), (4.5e9, 2e5, ("4.50000e9", "200000")),
+     (-0.004, 0.31, ("0.00", "0.31"))],
 )  # fmt: skip
 def test_values_show_two_digits_of_their_error(
     value: float, error: float, texts: tuple[str, str]
@@ -120,3 +125,4 @@ def test_what_rounding_leaves_of_a_value_without_an_error_is_nothing() -> None:
 def test_names_and_chances() -> None:
     assert parameter_name("radius_m", "m") == "radius" and parameter_name("gain", "") == "gain"
     assert chance(1e-20) == "< 1e-12" and chance(0.25) == "0.25"
+    assert chance(3e-11) == "3.0e-11"

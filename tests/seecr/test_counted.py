@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from seecr.counted import between, counted, plural, some
+from seecr.counted import between, counted, figures, plural, some
 
 ROOT = Path(__file__).resolve().parents[2]
 NOUNS = "row|pose|run|cable|line|effect|parameter|file|column|cell|command|case|step|reading"
@@ -31,6 +31,14 @@ def test_one_number_is_no_range() -> None:
     assert between(0, 0, "d") == "0" and between(0, 3, "d") == "0 to 3"
     assert between(1.00001, 1.00002, lead="from ") == "1"
     assert between(1.0, 2.5, lead="from ") == "from 1 to 2.5"
+
+
+def test_nothing_has_no_sign() -> None:
+    assert between(-0.0, 3.0) == "0 to 3" and between(-1e-17, 3.0) == "0 to 3"
+    assert between(-2.0, 1e-16, ".2f", "from ") == "from -2.00 to 0.00"
+    assert between(-1e-17, -2e-18) == "-1e-17 to -2e-18"
+    assert figures(-0.0004, ".3f") == "0.000" and figures(-0.0006, ".3f") == "-0.001"
+    assert figures(-0.00001, "+.4f") == "+0.0000" and figures(float("nan"), ".1f") == "nan"
 
 
 def test_of_a_long_list_the_first_few_and_how_many_more() -> None:

@@ -108,6 +108,8 @@ def test_a_model_that_agrees_is_used_on_poses_or_mapped_where_none_are_known():
     assert "any CSV of wanted poses will do" in line
     line = after_comparison(noise, Given(*files, lengths=True))
     assert line == "next: seecr map r.xml --model m.toml"
+    line = after_comparison(noise, Given(*files, lengths=True, history=True))
+    assert line == "next: seecr sweep r.xml a.csv --model m.toml"  # a map would refuse it
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ import seecr.cli
 from crosscheck.cli.compare import command as compare_command
 from crosscheck.comparison.limits import RULES, option
 from seecr.cli import options
+from seecr.cli.group import LazyGroup
 from seecr.cli.options import json_option, out_option, progress_bar, progress_share
 
 
@@ -69,3 +70,31 @@ def test_short_work_says_nothing_without_a_terminal(capsys: pytest.CaptureFixtur
         tell("done", 1.0)
     captured = capsys.readouterr()
     assert captured.out == "" and captured.err == ""
+
+
+@pytest.mark.parametrize("group", [crosscheck.cli.main, seecr.cli.main])
+def test_of_an_option_for_one_file_several_are_refused(group: LazyGroup) -> None:
+    """Of two models the last was taken, and nothing said."""
+    refused = []
+    ctx = click.Context(group)
+    for name in group.table:
+        command = group.get_command(ctx, name)
+        assert command is not None
+        for param in command.params:
+            if (
+                isinstance(param, click.Option)
+                and isinstance(param.type, click.Path)
+                and not param.multiple
+            ):
+                words = [param.opts[0], "file"]
+                said = CliRunner().invoke(group, [name, *words, *words], prog_name="it")
+                assert said.exit_code == 2 and said.stdout == ""
+                assert f"{param.opts[0]}: expected once, got 2 times" in said.stderr
+                assert f"(see it {name} --help)" in said.stderr
+                refused.append(param.opts[0])
+    assert {"--model", "--out"} <= set(refused)
+
+
+def test_other_options_may_be_repeated() -> None:
+    repeated = ["diagnose", "robot.xml", "data.csv", "--only", "a", "--only", "b", "--figures", "f"]
+    assert "expected once" not in CliRunner().invoke(crosscheck.cli.main, repeated).stderr

@@ -9,7 +9,7 @@ import pytest
 from made_data import SIGMA, measured, soft_cogiro, term
 from scipy import stats
 
-from crosscheck.comparison.associations import SIGNIFICANT, _p
+from crosscheck.comparison.associations import SIGNIFICANT, _labelled, _p
 from crosscheck.comparison.cable_space import cable_errors, independent_part
 from crosscheck.comparison.limits import Limits, check, load_limits, parse_limit, with_options
 from crosscheck.comparison.quantities import EVERYWHERE
@@ -332,3 +332,8 @@ def test_p_values_of_associations_are_those_of_the_f_distribution() -> None:
     assert p == pytest.approx([*expected, 1.0, 1.0])
     # rows that are identical vary within no bin
     assert _p(between[:1], won[:1], 0.0 * within[:1], lost[:1]) == 0.0
+
+
+def test_groups_of_numbers_have_no_sign_at_zero() -> None:
+    assert _labelled(-0.0, 0.25, "m") == "0 to 0.25 m"
+    assert _labelled(0.4, 0.4, "m") == "0.4 m" and _labelled(2.0, 2.0, "") == "2"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_data import measured, soft_cogiro
@@ -32,6 +34,24 @@ def test_direction_and_speed_are_those_of_the_commands(case: tuple[Problem, Pred
     assert way.step[k, :3] == pytest.approx(step[k - 1], abs=1e-15)
     assert np.isnan(way.speed[starts]).all()
     assert way.direction[k] == STILL or way.direction[k][0] in "+-"
+
+
+@pytest.mark.parametrize("zero", [0.0, 1.7e9])
+def test_speeds_that_differ_by_rounding_are_one(
+    case: tuple[Problem, Prediction], zero: float
+) -> None:
+    """They were in several bins, each labelled 0.03704 m/s: times since 1970 are coarse."""
+    problem, prediction = case
+    way = travel(problem, prediction)
+    size = np.linalg.norm(way.step * np.repeat([1.0, problem.robot.length], 3), axis=1)
+    speeds = np.where(np.arange(len(size)) % 2, 0.03703703705, 0.05)
+    known = np.isfinite(way.speed) & (size > 0.0)
+    data = replace(problem.data, t_s=zero + np.cumsum(np.where(known, size / speeds, 1.0)))
+    steady = Problem(problem.robot, data, problem.sigma, problem.use)
+    found = travel(steady, prediction).speed
+    there = known & np.isfinite(found)
+    assert there.sum() > 10 and len(np.unique(found[there])) == 2
+    assert found[there] == pytest.approx(speeds[there], rel=1e-5)
 
 
 def test_regions_are_halves_of_what_was_used(case: tuple[Problem, Prediction]) -> None:

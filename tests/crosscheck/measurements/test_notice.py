@@ -40,6 +40,37 @@ def positions(unit: str = "m") -> Columns:
     return columns_of(",".join(f"meas_{c}_{unit}" for c in "xyz"), *["0,0,0"] * 5, n_cables=4)
 
 
+def test_readings_that_run_against_the_commands_are_of_a_mirrored_axis() -> None:
+    told = poses(x=WAY, y=WAY[[2, 0, 4, 1, 3]])
+    mirrored = told[:, :3] * [1.0, -1.0, 1.0]
+    (note,) = notice._mirrored(positions("mm"), RECTANGLE, data_of(told, position=mirrored))
+    assert note.startswith("Column meas_y_mm goes against the commands along y: is its sign the")
+    turned = told[:, :3] * [-1.0, -1.0, 1.0] + [0.3, 0.0, 0.0]
+    (note,) = notice._mirrored(positions(), RECTANGLE, data_of(told, position=turned))
+    assert note.startswith(
+        "Columns meas_x_m meas_y_m go against the commands along x and y: are their "
+    )
+    for read in (
+        told[:, :3],  # as it should be
+        told[:, :3] * [1.0, -0.4, 1.0],  # not as far
+        mirrored + np.outer([0.1, -0.1, 0.0, -0.1, 0.1], [0.0, 1.0, 0.0]),  # hardly so
+    ):
+        assert notice._mirrored(positions(), RECTANGLE, data_of(told, position=read)) == []
+    still = poses(x=WAY, y=0.01 * WAY)
+    read = still[:, :3] * [1.0, -1.0, 1.0]
+    assert notice._mirrored(positions(), RECTANGLE, data_of(still, position=read)) == []
+    free = data_of(told, position=mirrored, free=("tracker_frame",))
+    assert notice._mirrored(positions(), RECTANGLE, free) == []
+
+
+def test_a_mirrored_axis_is_noted_when_a_file_is_read(tmp_path: Path) -> None:
+    rows = [f"{x},{y},0.15,{x},{-y},0.15" for x in (0.3, 0.4, 0.5) for y in (0.2, 0.25, 0.3)]
+    head = "cmd_x_m,cmd_y_m,cmd_z_m,meas_x_m,meas_y_m,meas_z_m"
+    (tmp_path / "a.csv").write_text("\n".join([head, *rows]))
+    notes = load_measurements(tmp_path / "a.csv", load_robot("demobot_cogiro")).notes
+    assert sum("meas_y_m goes against the commands along y" in note for note in notes) == 1
+
+
 @pytest.mark.parametrize(("power", "unit"), [(1, "mm"), (-1, "m")])
 def test_readings_that_spread_a_hundred_times_as_far_are_in_another_unit(
     power: int, unit: str

@@ -10,6 +10,7 @@ from made_data import SIGMA, measured, soft_cogiro, term
 from three_cables import THREE
 
 import crosscheck
+from crosscheck.errors import CrosscheckError
 from crosscheck.fit.candidates import null_fit
 from crosscheck.fit.prepare import prepare
 from crosscheck.measurements.data import Sigma
@@ -164,3 +165,12 @@ def test_a_robot_that_holds_nowhere_is_told_and_a_box_keeps_poses_in(cogiro):
 def test_a_robot_that_holds_few_poses_is_planned_where_it_rests():
     """With no more cables than freedoms it comes near the others: they were refused once."""
     assert feasible(THREE, choose_poses(THREE, 18).command_pose).sum() < 18
+
+
+def test_a_point_mass_on_a_free_joint_is_told_its_cure() -> None:
+    """Neither fewer rows nor another box would help."""
+    loose = replace(load_robot("camera"), joints=())
+    with pytest.raises(
+        CrosscheckError, match="expected 10 or more; all cables are anchored at one"
+    ):
+        choose_poses(loose, 10)

@@ -251,6 +251,32 @@ def test_the_scale_of_a_map_goes_on_where_errors_do(monkeypatch: pytest.MonkeyPa
     assert extends == ["max", "neither"]
 
 
+@pytest.mark.parametrize("spread", [(0.01, 0.01, 1.0), (1.0, 0.01, 0.01), (1.0, 0.01, 1.0)])
+def test_the_title_above_a_narrow_map_is_whole(
+    spread: tuple[float, float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of poses one above the other the panel stood at the right, and its title beyond the edge."""
+    kept: list[Figure] = []
+    monkeypatch.setattr(where, "image", lambda figure, _words: kept.append(figure))
+    found = diagnosis("pulleys")
+    assert found.search is not None
+    before, after = shown_stages(found)
+    for stage in (before, after):
+        pose = stage.state.prediction.pose.copy()
+        pose[:, :3] = np.random.default_rng(1).uniform(size=(len(pose), 3)) * spread
+        monkeypatch.setitem(stage.state.prediction.kept, "pose", pose)
+    failure_map(found.search.problem, before, after)
+    failure_map(found.search.problem, before, before)
+    for figure in kept:
+        figure.draw_without_rendering()
+        figure.draw_without_rendering()  # as a page and its picture do
+        for axes in figure.axes:
+            for text in (axes.xaxis.label, axes.yaxis.label, axes._left_title):
+                box = text.get_window_extent()
+                assert box.x0 >= 0.0 and box.x1 <= figure.bbox.width, text
+                assert box.y0 >= 0.0 and box.y1 <= figure.bbox.height, text
+
+
 def test_partial_data_show_what_they_have() -> None:
     position = text_of(page("position_only"))
     assert "rms position error [mm]" in position

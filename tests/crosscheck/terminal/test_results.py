@@ -26,6 +26,7 @@ from crosscheck.terminal.calibration import print_calibration
 from crosscheck.terminal.comparison import print_comparison
 from crosscheck.terminal.diagnosis import print_diagnosis
 from seecr.description.mjcf import load_robot
+from seecr.prediction.experiment import predict
 
 
 def console() -> tuple[Console, StringIO]:
@@ -62,6 +63,18 @@ def test_of_several_files_it_is_told_which_the_largest_errors_are_in() -> None:
     row = next(line.split() for line in out.getvalue().splitlines() if line.startswith("z "))
     z = next(c for c in both.coordinates if c.name == "z")
     assert row[-3:-1] == both.problem.data.place(z.row).split() and row[-3] in ("1.csv", "2.csv")
+
+
+def test_what_rounding_leaves_of_an_error_is_nothing() -> None:
+    """The readings are those of the model: errors were told as 3e-11 mm."""
+    robot = soft_cogiro()
+    data = measured(robot)
+    told = predict(robot, data).readings
+    exact = replace(data, position=told.position + 3e-14, quat_wxyz=told.quat_wxyz)
+    screen, out = console()
+    print_comparison(compare(robot, exact), [], False, Path("here"), screen)
+    row = next(line.split() for line in out.getvalue().splitlines() if line.startswith("x "))
+    assert row[1:5] == ["0", "0", "0", "mm"]
 
 
 def test_a_limit_that_is_exceeded_is_said(found: Comparison) -> None:

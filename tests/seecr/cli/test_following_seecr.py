@@ -14,6 +14,7 @@ from click.testing import CliRunner, Result
 from crosscheck.cli import main as crosscheck_main
 from seecr.cli import main as seecr_main
 from seecr.cli.following import following as next_line
+from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 
 QUIET = ("--figure", "none", "--no-recording")
@@ -29,7 +30,7 @@ def following(result: Result) -> list[str]:
     assert result.exit_code == 0, result.output
     line = result.stdout.splitlines()[-1]
     assert line.startswith("next: "), result.stdout
-    return shlex.split(line)[1:]
+    return shlex.split(line, comments=True)[1:]
 
 
 def test_programs_of_an_environment_that_is_not_active_are_named_by_their_path(
@@ -66,6 +67,37 @@ def test_from_a_pose_to_a_workspace_to_a_plan(
     grid = ("--grid", "0.4", "0.25", "0.1:0.15:2", "--no-elastic", "--highest", "40")
     told = following(run(*told, *grid, *QUIET))
     assert told == ["crosscheck", "plan", "demobot_cogiro", "--rows", "40", "--highest", "40"]
+
+
+PLAY = """format = 1
+[[effect]]
+name = "backlash"
+[effect.parameters]
+gap_m = 0.002
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("robot", "place", "told"),
+    [
+        ("demobot_cogiro", ("0.4", "0.25", "0.15"), ["--model", "m.toml", "--no-elastic"]),
+        ("planar_two_cable", ("0.5", "0", "0.5"), []),  # without the model
+    ],
+)
+def test_a_model_with_history_is_mapped_as_far_as_a_map_knows_it(
+    robot: str, place: tuple[str, ...], told: list[str], tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """A map refuses to solve its poses, which are in no order; it was proposed all the same."""
+    monkeypatch.chdir(tmp_path)
+    Path("m.toml").write_text(PLAY)
+    at, model = load_robot(robot).reference_pose[:3].tolist(), ("--model", "m.toml")
+    for words in (("pose", robot, *at), ("sweep", robot, "--line", *at, *at, *QUIET)):
+        said = following(run("seecr", *words, *model))
+        assert said == ["seecr", "map", robot, *told]
+    grid = ("--grid", *place)
+    assert run(*said, *grid, *QUIET).exit_code == 0
 
 
 def test_from_wanted_poses_to_what_is_told_and_back(

@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from seecr.cli import main
+from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 
 CSV = "run,cmd_x_m,cmd_y_m,cmd_z_m\na,0.4,0.25,0.1\n"
@@ -76,6 +77,9 @@ ROBOT = "planar_vertical"
          "metres, of the size of the frame, 0.834 m across"),
         ("pose stiff.xml 0.4 0.25 0.1",
          "stiffness x rest length of cable1 holds a number that is not finite, or beyond 1e+30"),
+        ("pose demobot_parallel 0.4 0.25 0.1 --model a.toml --model=b.toml",
+         "--model: expected once, got 2 times; leave out all but one (see seecr pose --help)"),
+        ("sweep demobot_parallel told.csv --out o --out p --out q", "--out: expected once, got 3 "),
         ("export demobot_parallel out.csv",
          "out.csv: expected the name of an MJCF file to write, such as out.xml"),
         ("export own.xml own.xml",
@@ -185,3 +189,17 @@ def test_a_grid_may_begin_below_zero(verb: str, tmp_path: Path) -> None:
     assert result.exit_code == 0 and "4" in result.stdout, result.output
     wrong = CliRunner().invoke(main, [verb, "cogiro_large", "-x:1:2", *quiet])
     assert wrong.exit_code == 2 and "No such option '-x:1:2'" in wrong.output
+
+
+@pytest.mark.slow
+def test_a_map_of_a_point_mass_on_a_free_joint_names_the_cure(tmp_path: Path) -> None:
+    text = model_path("camera").read_text()
+    loose = re.sub(r'(<joint [^>]*type="slide"[^>]*/>\s*)+', "<freejoint/>", text)
+    assert loose.count("<freejoint/>") == 1 and "slide" not in loose.split("<body", 1)[1]
+    (tmp_path / "loose.xml").write_text(loose)
+    x, y, z = map(str, load_robot(tmp_path / "loose.xml").reference_pose[:3])
+    words = ["map", str(tmp_path / "loose.xml"), "--grid", x, y, z, "--no-elastic"]
+    result = CliRunner().invoke(main, [*words, "--out", str(tmp_path / "o")])
+    assert result.exit_code == 2 and result.stderr.count("\n") == 1, result.output
+    assert "give it three slide joints instead of the free joint" in result.stderr
+    assert "wider limits" not in result.stderr

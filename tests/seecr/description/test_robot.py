@@ -148,6 +148,19 @@ def test_a_pose_off_the_joints_is_named() -> None:
         values_of_pose(robot, np.array([[0.4, 0, 0.1, 1, 0, 0, 0], [0.4, 0.1, 0.1, 1, 0, 0, 0]]))
     turned = np.array([[0.4, 0, 0.1, np.cos(0.1), np.sin(0.1), 0, 0]])
     with pytest.raises(
-        InputError, match=r"cannot reach commanded pose 0, it is off by 0.2 rad in x"
+        InputError, match=r"cannot reach the commanded pose, it is off by 0.2 rad in x"
     ):
         values_of_pose(robot, turned)
+
+
+def test_a_point_mass_on_a_free_joint_is_told_its_cure() -> None:
+    """It is free to turn at every pose; without joints that turn it is none of these."""
+    camera = load_robot("camera")
+    loose = replace(camera, joints=())
+    assert not camera.is_point and camera.notes == ()
+    assert loose.is_point
+    (note,) = loose.notes
+    assert "anchored at one point" in note and "three slide joints instead of the free" in note
+    apart = loose.anchor_points.copy()
+    apart[0, 0] += 0.05
+    assert not replace(loose, anchor_points=apart).is_point

@@ -230,7 +230,7 @@ def test_a_pose_so_far_away_that_rounding_is_longer_than_the_robot_has_a_nearest
 
 def test_numbers_that_are_none_are_refused_and_no_singular_values_are_sought() -> None:
     robot = load_robot(model_path("planar_vertical"))
-    with pytest.raises(InputError, match=r"cannot reach commanded pose 0, it is off by"):
+    with pytest.raises(InputError, match=r"cannot reach the commanded pose, it is off by"):
         values_of_pose(robot, np.where(np.arange(7) < 3, np.nan, robot.reference_pose)[None])
 
 

@@ -127,6 +127,19 @@ def test_the_edge_with_a_probability_is_told_from_that_without(drawn: Drawn) -> 
     assert "dots" not in title(drawn(found, edge=elsewhere, at_least=0.95))
 
 
+def test_labels_of_a_wall_are_whole(drawn: Drawn) -> None:
+    """Panels that a first layout made narrow had no room beside them when a second made them wide;
+    "z [mm]" was cut off.
+    """
+    x, z = np.linspace(0.0861, 0.5719, 5), np.linspace(-0.0431, 0.3351, 4)
+    one = drawn(workspace_map(load_robot("planar_vertical"), x, 0.0, z))
+    labels = [text for ax in one.axes for text in (ax.xaxis.label, ax.yaxis.label, ax.title)]
+    for text in (one._suptitle, *labels):
+        box = text.get_window_extent(one.canvas.get_renderer())
+        assert min(box.x0, box.y0) >= 0.0, text
+        assert box.x1 <= one.bbox.width and box.y1 <= one.bbox.height, text
+
+
 def test_a_map_says_whose_it_is(drawn: Drawn) -> None:
     assert drawn(a_map(*[1.0] * 9)).get_suptitle() == "demobot_cogiro"
 

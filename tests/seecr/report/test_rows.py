@@ -67,7 +67,12 @@ def test_rows_of_a_file_are_told_by_their_lines(tmp_path: Path) -> None:
     assert "with a probability of at least 0.20, lowest at line 5" in said
     least = list(chance_lines(wanted, np.array([0.9, 0.2, 0.7]), minimum=True))
     assert least[0] == said and "--aim middle" in least[1]
-    assert len(list(chance_lines(wanted, np.ones(3), minimum=True))) == 1
+    hung = replace(wanted, robot=replace(robot, joints=()))  # four cables, six degrees of freedom
+    assert len(list(chance_lines(hung, np.array([0.9, 0.2, 0.7]), minimum=True))) == 1
+    (sure,) = chance_lines(wanted, np.array([1.0, 0.9951, 1.0]), minimum=True)
+    assert "with a probability above 0.99, lowest at line 5; below 0.95 at 0 of 3" in sure
+    (nearly,) = chance_lines(wanted, np.array([1.0, 0.9949, 1.0]))
+    assert "of at least 0.99, lowest" in nearly  # never 1.00, which reads as certain
     assert [row["line"] for row in wanted.as_json()["rows"]] == [3, 5, 6]
     assert [row["line"] for row in SweepRows(found).as_json()] == [3, 5, 6]
     # without a file they count as they do in Python

@@ -32,6 +32,13 @@ def test_rounding_is_no_turn() -> None:
     assert re.search(r"\(0\.2 mm\), turned by 0 deg \(", text), text
 
 
+def test_angles_that_are_nothing_have_no_sign() -> None:
+    """A platform on stiff cables was turned by "-0.000 deg"."""
+    robot = replace(seecr.load_robot("demobot_cogiro"), ea=np.full(8, 1e7))
+    lines = list(pose_lines(seecr.solve(robot, [0.4, 0.25, 0.2, 1.0, 0.0, 0.0, 0.0])))
+    assert not re.search(r"-0\.0*(?![0-9])", "\n".join(lines))
+
+
 def test_a_large_robot_off_by_many_metres_has_no_exponent() -> None:
     found = seecr.solve(seecr.load_robot("camera"), [[200.0, 30.0, 10.0, 1, 0, 0, 0]])
     text = "\n".join([*pose_lines(found), str(found)])
