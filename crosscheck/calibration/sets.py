@@ -55,6 +55,11 @@ class Scores:
     solved: dict[Names, tuple[float, dict[str, float]]] = field(default_factory=dict)
     near: dict[Names, float] = field(default_factory=dict)
 
+    @property
+    def every(self) -> dict[Names, float]:
+        """Scores of all sets met so far; those that were not solved are approximate."""
+        return self.near | {names: score for names, (score, _widths) in self.solved.items()}
+
     def score(self, names: Names, start: dict[str, float] | None = None) -> float:
         """ln evidence plus ln prior of a set."""
         if names not in self.solved:
@@ -113,7 +118,7 @@ class Scores:
 
     def best(self, count: int, within: float) -> list[Names]:
         """The best sets met so far, at most ``within`` worse in score than the best of all."""
-        scores = self.near | {names: s for names, (s, _w) in self.solved.items()}
+        scores = self.every
         order = sorted(scores, key=lambda names: -scores[names])
         # at huge scores the difference is lost in rounding: the best is among them all the same
         return [n for n in order if scores[n] >= scores[order[0]] - within][:count]

@@ -6,11 +6,12 @@ Which effects are equivalent is known from refits (:mod:`crosscheck.diagnosis.ri
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from crosscheck.calibration.catalogue import Catalogue, catalogue_columns, gram_with
+from crosscheck.calibration.challenge import excluding
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.detectable import detectable_size
 from crosscheck.calibration.equals import parameters_counted
@@ -32,6 +33,8 @@ from seecr.pose import Array
 
 # Gauss-Newton steps that fit the final model with plausible sizes as priors.
 _STEPS = 4
+# Moves of a search for what could replace a member: as many effects may be needed for that.
+_MOVES = 6
 
 
 def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
@@ -53,7 +56,9 @@ def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
     prices = prices_about(setting, joint, catalogue)
     scores = Scores(gram, len(effects), always, prices=prices)
     explore(scores, [always, names])
-    every = scores.near | {n: s for n, (s, _w) in scores.solved.items()}
+    every = scores.every
+    for name in sorted(names - always):
+        every |= _without(scores, names, {name, *alike.get(name, ())})
     every |= _refitted(found, scores, names)
     none = _impossible(found)
     every = {some: score for some, score in every.items() if not some & none}
@@ -62,6 +67,17 @@ def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
     hints = alike_beyond(scores, names, sizes)
     in_place = field_in_place(setting, joint, scores.widths(names), scores)
     return _with_equals(every, effects, alike, hints, shown, in_place)
+
+
+def _without(scores: Scores, names: Names, barred: Iterable[str]) -> dict[Names, float]:
+    """Scores of sets that do without a member and its equivalents.
+
+    Two effects may do together what one does, such as a heavier platform off its centre for a force
+    and moment; no exchange of a single effect leads there.
+    """
+    others = excluding(scores, frozenset(barred))
+    explore(others, [names - frozenset(barred)], _MOVES)
+    return others.every
 
 
 def _impossible(found: Search) -> Names:

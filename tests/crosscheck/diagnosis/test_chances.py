@@ -7,14 +7,18 @@ from types import SimpleNamespace
 from typing import Any
 
 import made_diagnoses
+import numpy as np
 import pytest
 from made_data import COGIRO, measured, term
 
 from crosscheck.calibration.all_effects import JointErrors
+from crosscheck.calibration.gram import ColumnGroup, gram_of
+from crosscheck.calibration.probability import probabilities
+from crosscheck.calibration.sets import Scores, explore
 from crosscheck.calibration.varying import Varying
 from crosscheck.diagnosis import nearby
 from crosscheck.diagnosis.chances import Chances
-from crosscheck.diagnosis.nearby import _impossible, _refitted, chances_near
+from crosscheck.diagnosis.nearby import _impossible, _refitted, _without, chances_near
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.stepwise import by_steps
 from crosscheck.fit.candidates import null_fit
@@ -126,6 +130,27 @@ def test_what_no_robot_can_have_wherever_it_was_fitted_is_out_of_the_question() 
     found: Any = SimpleNamespace(steps=steps, last=steps[-1])
     # a tilt is possible beside the mass, and the mass is in the model
     assert _impossible(found) == {"law"}
+
+
+def test_what_two_do_together_one_of_many_parameters_is_not_sure_of() -> None:
+    """A heavier platform off its centre was once a force and moment, for certain."""
+    rng = np.random.default_rng(5)
+    two, rest = rng.normal(size=(200, 2)), rng.normal(size=(200, 4))
+    near = two + 1e-3 * rng.normal(size=(200, 2))
+    columns = {"mass": two[:, :1], "centre": two[:, 1:], "wrench": np.hstack([near, rest])}
+    ends = np.cumsum([0, 1, 1, 6])
+    groups = {
+        name: ColumnGroup(np.arange(*ends[k : k + 2]), np.array([0.1, 0.3, 1.0, 3.0, 10.0]))
+        for k, name in enumerate(columns)
+    }
+    read = two @ [2.0, 2.0] + rng.normal(size=200)
+    scores = Scores(gram_of(np.hstack(list(columns.values())), read, groups), 25)
+    found = frozenset({"wrench"})
+    explore(scores, [frozenset(), found])
+    assert probabilities(scores.every, found, list(columns)).of("wrench") > 0.97
+    every = scores.every | _without(scores, found, found)
+    assert frozenset({"mass", "centre"}) in every
+    assert probabilities(every, found, list(columns)).of("wrench") < 0.1
 
 
 @pytest.mark.slow
