@@ -31,7 +31,7 @@ from crosscheck.units import LEAST
 from seecr.columns.written import table_text
 from seecr.counted import counted
 from seecr.description.robot import Robot
-from seecr.errors import InputError
+from seecr.errors import InputError, InputFileError
 from seecr.files import check_replaces, json_text, staged, write_text
 from seecr.made import Made
 from seecr.pose import Array
@@ -221,10 +221,22 @@ def _frames(robot: Robot, takes: Sequence[Take], choices: ImportChoices) -> Fram
 
 
 def _place(export: Logged, name: str) -> Array:
-    """A marker's mean position (3,) [m], or the coordinates given in its place."""
+    """A marker's mean position (3,) [m], or the coordinates given in its place.
+
+    Raises:
+        InputFileError: the marker is never seen.
+    """
     if name not in export.markers and name.count(",") == 2:
         return numbers_of("--point", name)
-    return np.asarray(np.nanmean(export.marker(name), axis=0))
+    every = export.marker(name)
+    seen = every[np.isfinite(every).all(axis=1)]
+    if len(seen) == 0:
+        raise InputFileError.at(
+            export.path,
+            f"never sees marker {name}; expected its position in at least one row; name another "
+            "with --point",
+        )
+    return np.asarray(seen.mean(axis=0))
 
 
 def _measured(take: Take, frames: Frames) -> tuple[Measurements, Array]:
