@@ -37,6 +37,7 @@ __all__ = [
     "read_text",
     "read_toml",
     "staged",
+    "with_toml",
     "write_text",
     "write_texts",
     "written",
@@ -255,13 +256,16 @@ def staged(
         option: the option that named it, for the error.
         sometimes: names of files that only some results have. If they are not written now they are
             removed, since they belong to an older result; nothing else is.
-        read: files that the results are made from; they are not overwritten.
+        read: files that the results are made from; they are neither overwritten nor removed.
 
     Raises:
         InputError: the folder cannot be made or written to; this comes before any work is done.
-        InputFileError: a result has the name of a file that was read.
+        InputFileError: a result has the name of a file that was read; for ``sometimes`` this, too,
+            comes before any work is done.
     """
-    out = Path(out)
+    out, sometimes, read = Path(out), {*sometimes}, [*read]
+    for name in sorted(sometimes):
+        _check_not_read(out / name, read, option)
     made = _missing(out)
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -280,7 +284,7 @@ def staged(
             _check_not_read(out / file.name, read, option)
         for file in written_now:
             file.replace(out / file.name)
-        for name in {*sometimes} - {file.name for file in written_now}:
+        for name in sometimes - {file.name for file in written_now}:
             if (out / name).is_file():
                 (out / name).unlink()
         done = True
@@ -291,12 +295,18 @@ def staged(
 
 
 def _check_not_read(path: Path, read: Iterable[Path | None], option: str) -> None:
-    """Check that a file to be written is none of those that were read."""
-    if path.exists() and any(one is not None and path.samefile(one) for one in read):
+    """Check that a file to be written or removed is none of those that were read."""
+    there = [one for one in read if one is not None and one.exists()]
+    if path.exists() and any(path.samefile(one) for one in there):
         raise InputFileError.at(
             path,
             f"would be overwritten, but was read; expected another folder; name one with {option}",
         )
+
+
+def with_toml(path: Path | None) -> list[Path]:
+    """A file of commands and the TOML beside it, which is read with it; empty without a file."""
+    return [] if path is None else [path, path.with_suffix(".toml")]
 
 
 def _missing(path: Path) -> list[Path]:

@@ -5,11 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from crosscheck.comparison.coloured import Coloured
+from crosscheck.fit.evidence import FALSE_ALARM
 from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.problem import Rms
 from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
 from crosscheck.model.fitted import Fitted
+from crosscheck.units import with_error
 from seecr.effects import Terms
 from seecr.prediction.model import Model
 from seecr.result import Record, Result
@@ -64,6 +68,32 @@ class Addition(Result):
         return self.predicts and not self.is_nothing
 
     @property
+    def why_not(self) -> str:
+        """What speaks against adding the effects if they are not worth it, one sentence."""
+        if self.is_nothing:
+            return self._nothing()
+        if self.p >= FALSE_ALARM:
+            return f"what {self.name} explains is not significant (p = {self.p:.2g})"
+        return (
+            f"{self.name} does not improve the prediction of held-out runs (chi2 of a block falls "
+            f"by {' ± '.join(with_error(*self.fall))})"
+        )
+
+    def _nothing(self) -> str:
+        """That the values are nothing: not seen, nothing itself, or within their errors of it."""
+        own = [one for one in self.fitted if one.term.name in self.names]
+        errors = np.concatenate([one.stderr[~one.term.layout.shape] for one in own])
+        if not (np.isfinite(errors) & (errors > 0.0)).any():
+            return f"{self.name} is not determined by these data: any value fits them equally well"
+        if self.from_nothing == 0.0:
+            return f"{self.name} comes out at its null values"
+        together = ", all values together" if len(errors) > 1 else ""
+        return (
+            f"{self.name} differs from null by no more than its standard errors "
+            f"({self.from_nothing:.2g} of them{together})"
+        )
+
+    @property
     def is_noise(self) -> bool:
         """Whether the residuals are noise, white or coloured."""
         return self.whiteness.is_noise or self.coloured is not None
@@ -75,12 +105,14 @@ class Addition(Result):
 
     def lines(self) -> list[str]:
         """Errors without and with the effects, the values, and what speaks against them."""
-        worth = "improves the prediction" if self.pays else "does not improve the prediction"
+        worth = "improves the prediction" if self.predicts else "does not improve the prediction"
         left = rms_words(self.held_out_before), rms_words(self.held_out)
         out = [
             f"{self.name} {worth} of held-out runs: {left[0]} before, {left[1]} with it",
             f"on all rows: {rms_words(self.before)} before, {rms_words(self.after)} with it",
         ]
+        if self.is_nothing:  # it may predict better all the same
+            out.append(f"{self.why_not}: it is not worth adding")
         out += fitted_lines(self.fitted)
         out += [f"warning: {warning}" for warning in self.warnings]
         return [*out, *(f"note: {note}" for note in self.notes)]

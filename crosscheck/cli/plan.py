@@ -100,10 +100,11 @@ def command(
     from crosscheck import Sigma, choose_poses, load_commands, make_plan, write_plan
     from crosscheck.measurements.stated import stated
     from crosscheck.planning import box_of
+    from crosscheck.planning.write import NAME, sometimes_written
     from crosscheck.report import write_page
     from crosscheck.terminal import print_plan
     from seecr import load_robot
-    from seecr.files import json_text, staged, write_text
+    from seecr.files import json_text, staged, with_toml, write_text
 
     machine = load_robot(robot)
     room = box_of(box) if box else None
@@ -112,7 +113,8 @@ def command(
     limits = (lowest, highest)
     given = None if poses is None else load_commands(poses, machine)
     sigma = stated(Sigma() if given is None else given.sigma, sigmas)
-    with staged(out) as folder:
+    sometimes = sometimes_written(out, poses)
+    with staged(out, sometimes=sometimes, read=with_toml(poses)) as folder:
         with progress_share("planning") as progress:
             commands = given or choose_poses(
                 machine, rows or 0, sigma=sigma, reads=reads, limits=limits, progress=progress,
@@ -121,11 +123,13 @@ def command(
             plan = make_plan(machine, commands, sigma, progress, reads=reads, limits=limits)
         made = made_by(machine.source, poses)
         status = 0 if plan.converged else 3
-        text = json_text({"made": made, "exit_status": status, **plan.as_json()})
-        write_text(folder / "plan.json", text + "\n")
+        files = write_plan(plan, folder, own=given is None)
+        text = json_text(
+            {"made": made, "exit_status": status, **plan.as_json(), "files": list(files)}
+        )
+        write_text(folder / NAME, text + "\n")
         with figures_in(figures):
             write_page(plan, folder / "plan.html", made)
-        files = write_plan(plan, folder, own=given is None)
     if as_json:
         click.echo(text)
     else:

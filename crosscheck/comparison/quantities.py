@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from crosscheck.comparison.cable_space import cable_lengths
 from crosscheck.comparison.periodogram import periodogram
-from crosscheck.comparison.travel import AXES, Travel
+from crosscheck.comparison.travel import AXES, STILL, Travel
 from crosscheck.fit.problem import Problem
 from seecr.pose import Array, rotvec_from_quat
 from seecr.prediction.experiment import Prediction
@@ -97,11 +97,10 @@ def of_cables(problem: Problem, prediction: Prediction, way: Travel) -> tuple[Ab
     """Quantities that change from cable to cable, with (n m,) values, row by row."""
     robot, n = problem.robot, problem.data.n_rows
     lengths = cable_lengths(problem, prediction)
-    first = problem.experiment.commands.starts
-    home = robot.nominal_lengths(robot.reference_pose[None])
     nominal = robot.nominal_lengths(way.pose)
-    before = np.where(first[:, None], home, np.concatenate([home, nominal[:-1]]))
-    motion = np.where(nominal > before, "paid out", "reeled in")
+    home = robot.nominal_lengths(robot.reference_pose[None])[0]
+    paid = nominal - problem.experiment.commands.before(nominal, home)
+    motion = np.select([paid > 0.0, paid < 0.0], ["paid out", "reeled in"], STILL)
     return (
         Abscissa(QuantityKind.CABLE, "the cable", np.tile(np.array(robot.cable_names), n)),
         Abscissa(QuantityKind.CABLE, "the cable's length", lengths.ravel(), "m"),

@@ -25,6 +25,8 @@ _ROUNDING = 1e-9
 class Travel:
     """Commanded motion to each row, from the row before or, in a new run, from the reference pose.
 
+    A run that starts at its first row has no motion to that.
+
     Attributes:
         pose: (n, 7) commanded poses; if lengths are commanded, the predicted ones.
         step: (n, 6) displacement [m] and rotation vector [rad].
@@ -44,9 +46,7 @@ def travel(problem: Problem, prediction: Prediction) -> Travel:
     """The commanded motion, never the measured one."""
     commands = problem.experiment.commands
     pose = commands.pose if commands.lengths is None else prediction.pose
-    before = np.concatenate([pose[:1], pose[:-1]])
-    before = np.where(commands.starts[:, None], problem.robot.reference_pose, before)
-    step = pose_difference(pose, before)
+    step = pose_difference(pose, commands.before(pose, problem.robot.reference_pose))
     weighed = step * np.repeat([1.0, problem.robot.length], 3)
     axis = np.argmax(np.abs(weighed), axis=1)
     most = weighed[np.arange(len(step)), axis]

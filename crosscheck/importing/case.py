@@ -28,9 +28,10 @@ from crosscheck.measurements.read import load_commands
 from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
 from crosscheck.units import LEAST
+from seecr.columns.written import table_text
 from seecr.counted import counted
 from seecr.description.robot import Robot
-from seecr.errors import InputError
+from seecr.errors import InputError, InputFileError
 from seecr.files import check_replaces, json_text, staged, write_text
 from seecr.made import Made
 from seecr.pose import Array
@@ -40,6 +41,8 @@ from seecr.result import Record, Result
 # written and no noise. From q / 2 on, the mean of numbers rounded to q is off by 0.002 q at most:
 # q exp(-2 (pi / 2)^2) / pi, the first term of the Fourier series of the rounding error.
 _DIGITS = 0.5
+# Significant digits of numbers about dwells.
+_WRITTEN = 6
 # Time between consecutive recordings [s].
 _BETWEEN = 60.0
 NAME = "import.json"
@@ -186,13 +189,9 @@ def write_case(found: Imported, robot_path: Path, out: Path, made: Made | None =
         write_measurements(folder / "measured.csv", found.measured)
         copy_robot(robot_path, folder / "robot.xml")
         rows = found.records()
-        lines = [",".join(rows[0])] + [",".join(_cell(v) for v in row.values()) for row in rows]
-        write_text(folder / "dwells.csv", "\n".join(lines) + "\n")
+        columns = {name: [row[name] for row in rows] for name in rows[0]}
+        write_text(folder / "dwells.csv", table_text(columns, _WRITTEN))
         write_text(folder / NAME, json_text({**said, **found.as_json()}) + "\n")
-
-
-def _cell(value: object) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value).replace(",", " ")
 
 
 def _frames(robot: Robot, takes: Sequence[Take], choices: ImportChoices) -> Frames:
@@ -222,10 +221,22 @@ def _frames(robot: Robot, takes: Sequence[Take], choices: ImportChoices) -> Fram
 
 
 def _place(export: Logged, name: str) -> Array:
-    """A marker's mean position (3,) [m], or the coordinates given in its place."""
+    """A marker's mean position (3,) [m], or the coordinates given in its place.
+
+    Raises:
+        InputFileError: the marker is never seen.
+    """
     if name not in export.markers and name.count(",") == 2:
         return numbers_of("--point", name)
-    return np.asarray(np.nanmean(export.marker(name), axis=0))
+    every = export.marker(name)
+    seen = every[np.isfinite(every).all(axis=1)]
+    if len(seen) == 0:
+        raise InputFileError.at(
+            export.path,
+            f"never sees marker {name}; expected its position in at least one row; name another "
+            "with --point",
+        )
+    return np.asarray(seen.mean(axis=0))
 
 
 def _measured(take: Take, frames: Frames) -> tuple[Measurements, Array]:

@@ -62,9 +62,9 @@ def held_commands(log: Measurements, rest_for: float, clock: float, end: float) 
     """
     command = log.command_pose if log.command_lengths is None else log.command_lengths
     assert command is not None
-    carried = np.zeros((log.n_rows, 1)) if log.loads is None else log.loads.mass[:, None]
-    told = np.concatenate([command, carried], axis=1)
-    changes = np.any(np.abs(np.diff(told, axis=0)) > 1e-9, axis=1)
+    changes = np.any(np.abs(np.diff(command, axis=0)) > 1e-9, axis=1)
+    if log.loads is not None:  # another load at the same command is another rest
+        changes |= log.loads.changes[1:]
     if log.t_s is None:  # a command given twice in succession rests only once
         return HeldCommands(log, np.concatenate([[0], 1 + np.flatnonzero(changes)]), None, None, 0)
     changes |= log.run[1:] != log.run[:-1]

@@ -6,8 +6,12 @@ import json
 from pathlib import Path
 
 from crosscheck.measurements.data import Measurements
+from seecr.columns.written import table_text
 from seecr.errors import InputError
 from seecr.files import write_texts
+
+# More than any sensor reads.
+_DIGITS = 9
 
 
 def write_measurements(path: str | Path, data: Measurements, remark: str = "") -> None:
@@ -27,26 +31,10 @@ def write_measurements(path: str | Path, data: Measurements, remark: str = "") -
     if not isinstance(data, Measurements):
         raise InputError(f"expected measurements, got {type(data).__name__}")
     path = Path(path)
-    columns = dict(data.columns())
-    rows = (",".join(map(_cell, row)) for row in zip(*columns.values(), strict=True))
-    said = [f"# {remark}"] if remark else []
-    text = "\n".join([*said, ",".join(columns), *rows]) + "\n"
+    said = f"# {remark}\n" if remark else ""
+    text = said + table_text(dict(data.columns()), _DIGITS)
     # The CSV last: a TOML without it is no measurement.
     write_texts({path.with_suffix(".toml"): _toml(data), path: text})
-
-
-def _cell(value: str | float | None) -> str:
-    if isinstance(value, str):
-        return _quoted(value)
-    # Adding zero turns -0.0 into 0.0.
-    return "" if value is None else f"{value + 0.0:.9g}"
-
-
-def _quoted(name: str) -> str:
-    """A run's name as a CSV cell; a leading # would make the line a comment."""
-    if any(mark in name for mark in ',"\n\r') or name.startswith("#"):
-        return '"' + name.replace('"', '""') + '"'
-    return name
 
 
 def _toml(data: Measurements) -> str:

@@ -79,8 +79,7 @@ def _beyond(plan: Planned, data: Measurements) -> Array | None:
     if data.command_pose is None or robot.joints:
         return None
     pose = data.command_pose
-    starts = data.as_commands(robot).starts
-    before = np.where(starts[:, None], robot.reference_pose, np.roll(pose, 1, axis=0))
+    before = data.as_commands(robot).before(pose, robot.reference_pose)
     beyond = pose.copy()
     beyond[:, :3] += _BEYOND_POSE * (pose - before)[:, :3]
     beyond = np.where(feasible(robot, beyond)[:, None], beyond, pose)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,12 +12,16 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.given import numbers_of
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.write import write_measurements
+from crosscheck.planning.adding import Adding
 from crosscheck.planning.result import Plan
 from seecr.errors import InputError
 from seecr.files import check_writable
 from seecr.pose import Array
 
-__all__ = ["box_of", "write_plan"]
+__all__ = ["NAME", "box_of", "sometimes_written", "write_plan"]
+
+NAME = "plan.json"
+_OWN = "poses.csv"
 
 
 def write_plan(plan: Plan, folder: str | Path, own: bool = True) -> tuple[str, ...]:
@@ -37,15 +42,48 @@ def write_plan(plan: Plan, folder: str | Path, own: bool = True) -> tuple[str, .
     if not isinstance(plan, Plan):
         raise InputError(f"expected a plan, as make_plan returns it, got {type(plan).__name__}")
     folder = Path(folder)
-    files = {"poses.csv": plan.planned.problem.data} if own else {}
+    files = {_OWN: plan.planned.problem.data} if own else {}
     for item in plan.suggestions:
         if item.reached and item.commands is not None:
-            files[f"add-{item.kind.value}.csv"] = item.commands
+            files[_addition(item.kind)] = item.commands
     for name, commands in files.items():
         check_writable(folder / name)
         folder.mkdir(parents=True, exist_ok=True)
         write_measurements(folder / name, _unread(commands), remark_of(commands))
     return tuple(files)
+
+
+def sometimes_written(out: Path, read: Path | None) -> list[str]:
+    """Names of the files that only some plans have, for :func:`seecr.files.staged`.
+
+    Users call their own commands ``poses.csv``, too. It is an older plan's only if that plan says
+    that it wrote it, and stays if it is what is planned now.
+
+    Args:
+        out: the folder of the plan, perhaps with an older one.
+        read: the commands that are planned, if they are a file.
+    """
+    own = [_OWN] if _OWN in _wrote(out) and not _same(out / _OWN, read) else []
+    names = [Path(name) for name in (*own, *map(_addition, Adding))]
+    return [str(one) for name in names for one in (name, name.with_suffix(".toml"))]
+
+
+def _wrote(out: Path) -> list[object]:
+    """``files`` of the older plan in a folder; nothing if there is none that can be read."""
+    try:
+        older = json.loads((out / NAME).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return []
+    files = older.get("files") if isinstance(older, dict) else None
+    return files if isinstance(files, list) else []
+
+
+def _same(path: Path, other: Path | None) -> bool:
+    return other is not None and path.resolve() == other.resolve()
+
+
+def _addition(kind: Adding) -> str:
+    return f"add-{kind.value}.csv"
 
 
 def remark_of(commands: Measurements) -> str:

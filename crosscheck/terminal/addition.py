@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
 from crosscheck.add import Addition
-from crosscheck.fit.evidence import FALSE_ALARM
 from crosscheck.model.fitted import Fitted
 from crosscheck.terminal.lines import console_for, print_parameters, rms_table, say
-from crosscheck.units import with_error
 
 _MOST = 12
 
@@ -36,33 +33,8 @@ def print_addition(
 
 def why_not(found: Addition, forced: bool = False) -> str:
     """Why an effect is not worth adding, and that --force adds it, or has added it."""
-    mean, error = found.fall
-    if found.is_nothing:
-        reason = _nothing(found)
-    elif found.p >= FALSE_ALARM:
-        reason = f"what {found.name} explains is not significant (p = {found.p:.2g})"
-    else:
-        reason = (
-            f"{found.name} does not improve the prediction of held-out runs (chi2 of a block "
-            f"falls by {' ± '.join(with_error(mean, error))})"
-        )
     then = "added because of --force" if forced else "--force adds it anyway"
-    return f"{reason}: it is not worth adding; {then}"
-
-
-def _nothing(found: Addition) -> str:
-    """That the values are nothing: not seen, nothing itself, or within their errors of it."""
-    own = [one for one in found.fitted if one.term.name in found.names]
-    errors = np.concatenate([one.stderr[~one.term.layout.shape] for one in own])
-    if not (np.isfinite(errors) & (errors > 0.0)).any():
-        return f"{found.name} is not determined by these data: any value fits them equally well"
-    if found.from_nothing == 0.0:
-        return f"{found.name} comes out at its null values"
-    together = ", all values together" if len(errors) > 1 else ""
-    return (
-        f"{found.name} differs from null by no more than its standard errors "
-        f"({found.from_nothing:.2g} of them{together})"
-    )
+    return f"{found.why_not}: it is not worth adding; {then}"
 
 
 def _left(found: Addition) -> str:

@@ -124,7 +124,7 @@ def command(
     is free to move.
     """
     from seecr import midline_points, spread_of
-    from seecr.files import json_text, staged, write_text
+    from seecr.files import json_text, staged, with_toml, write_text
     from seecr.report.commanded import toml_beside
     from seecr.report.rows import SweepRows
     from seecr.report.sweep_panels import sweep_figure
@@ -135,7 +135,7 @@ def command(
     given = _Commanded(**ways)
     commands, more, said, wanted = _commands(machine, poses, given)
     sometimes = ("sweep.toml", *files_of_pictures("sweep"))
-    with staged(out, sometimes=sometimes, read=[poses]) as folder:
+    with staged(out, sometimes=sometimes, read=with_toml(poses)) as folder:
         with progress_bar("solving", len(commands)) as tell:
             solution, search = _solved(machine, commands, own, follow, method)
             if own is not None:

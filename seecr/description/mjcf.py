@@ -299,6 +299,11 @@ def _read_joints(model: mujoco.MjModel, body: int, path: Path) -> tuple[Joint, .
     position, quat = model.body_pos[body], model.body_quat[body]
     for j in range(first, first + count):
         name = model.joint(j).name or f"joint{j - first + 1}"
+        # a free joint may have a spring, too, and a spring may have no linear part
+        if model.jnt_stiffness[j] != 0 or np.any(model.jnt_stiffnesspoly[j]):
+            raise RobotError(
+                f"{path}: joint {name} has a spring; expected cables to carry the load"
+            )
         kind = kinds.get(int(model.jnt_type[j]))
         if kind is None:
             if count == 1 and model.jnt_type[j] == 0:
@@ -306,10 +311,6 @@ def _read_joints(model: mujoco.MjModel, body: int, path: Path) -> tuple[Joint, .
             raise RobotError(
                 f"{path}: joint {name} is a ball joint or a free joint beside others; expected "
                 "one free joint, or slide and hinge joints"
-            )
-        if model.jnt_stiffness[j] != 0:
-            raise RobotError(
-                f"{path}: joint {name} has a spring; expected cables to carry the load"
             )
         joints.append(
             Joint(

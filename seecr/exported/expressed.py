@@ -24,6 +24,7 @@ _LENGTHS = frozenset(name for name, item in QUANTITIES.items() if item.paid_out)
 _PAST = frozenset(name for name, item in QUANTITIES.items() if item.history is not History.NONE)
 
 PAST = "it depends on the motion before"
+WARM = "it depends on the temperature, which no MJCF states"
 SENSED = "it changes what sensors read, not where the platform rests"
 LAW = "it has its own law for the cables"
 SOFT = (
@@ -62,6 +63,8 @@ def expressed(robot: Robot, effects: Sequence[Effect]) -> Expressed:
             nowhere.append((effect, LAW))
         elif edits & _PAST:
             nowhere.append((effect, PAST))
+        elif edits and "temperature" in effect.needs:
+            nowhere.append((effect, WARM))
         elif edits & _BODIES:
             bodies.append(effect)
         elif edits & _PLAIN:

@@ -165,7 +165,7 @@ class Model(Result):
         term = self.terms[name]
         own = {} if term.own is None else term.own.values
         tables = [(of, one.vector, one.stderr) for of, one in own.items()]
-        return [("", term.vector, self.stderr[name]), *tables]
+        return [("", term.vector, self.errors_of(name)), *tables]
 
 
 def _shown(term: Term, stderr: Array, most: int = 3) -> str:

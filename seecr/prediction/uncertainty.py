@@ -98,7 +98,7 @@ def covariance_of(model: Model) -> Array | None:
     The correlations of ``[fit]``, or else of ``[calibration]``, are multiplied by the standard
     errors stated with the values. These are used with all digits where ``[fit]`` or
     ``[calibration]`` has them. Values that were added to the model later are uncorrelated with the
-    others.
+    others, and count as exact if nobody knows their errors.
 
     Raises:
         InputFileError: the table holds no valid correlations.
@@ -110,7 +110,7 @@ def covariance_of(model: Model) -> Array | None:
     labels = [f"{effect}.{key}" for effect, key in model.terms.labels]
     names = _names(model, title, table.get(PARAMETERS, []))
     kept = _correlations(model, names, table[CORRELATION])
-    stderr = np.concatenate([model.stderr[name] for name in model.terms.names])
+    stderr = np.concatenate([model.errors_of(name) for name in model.terms.names])
     out = np.eye(len(labels))
     both = [(labels.index(name), k) for k, name in enumerate(names) if name in labels]
     here, there = np.array(both, dtype=int).reshape(-1, 2).T

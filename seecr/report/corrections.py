@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
 from seecr.columns.command_file import CommandFile
+from seecr.columns.written import table_text
 from seecr.inverse.correction import Correction
 from seecr.pose import Array, pose_difference
 from seecr.report.commanded import load_columns, toml_beside
@@ -31,7 +31,7 @@ def corrected_csv(found: Correction, wanted: CommandFile) -> str:
         found: the correction.
         wanted: the list that it is for, whose runs, times, temperatures and loads are kept.
     """
-    given, n = wanted.commands, len(wanted.commands)
+    given = wanted.commands
     columns: dict[str, Sequence[object] | Array] = {}
     if len(set(wanted.run)) > 1:
         columns["run"] = wanted.run
@@ -42,8 +42,8 @@ def corrected_csv(found: Correction, wanted: CommandFile) -> str:
     columns |= dict(zip(_WANT, found.wanted.T, strict=True))
     columns |= {f"length_{k + 1}_m": one for k, one in enumerate(found.lengths.T)}
     columns |= load_columns(given.loads)
-    rows = [",".join(_cell(one[i]) for one in columns.values()) for i in range(n) if found.found[i]]
-    return "\n".join([",".join(columns), *rows]) + "\n"
+    kept = np.flatnonzero(found.found).tolist()
+    return table_text({name: [one[i] for i in kept] for name, one in columns.items()})
 
 
 def corrected_toml(wanted: CommandFile) -> str:
@@ -88,10 +88,3 @@ def joint_lines(wanted: Array, read: Array, seen: float) -> Iterator[str]:
             f"the joints allow readings no nearer than {1e3 * off[0]:.3g} mm and "
             f"{np.degrees(off[1]):.3g} deg along single axes"
         )
-
-
-def _cell(value: Any) -> str:
-    if isinstance(value, str):
-        quoted = '"' + value.replace('"', '""') + '"'
-        return quoted if any(mark in value for mark in ',"#') else value
-    return "" if np.isnan(value) else repr(float(value) + 0.0)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from seecr.columns.written import table_text
 from seecr.commands.loads import Loads
 from seecr.pose import Array
 from seecr.prediction.uncertainty import Spread
@@ -113,11 +112,7 @@ class SweepRows:
             columns |= _named("midlines_{}_m", "xyz", met.points)
             columns["beside_weight_m"] = met.beside.tolist()
         columns |= self._tilts()
-        out = io.StringIO()
-        writer = csv.writer(out, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(map(_cell, row) for row in zip(*columns.values(), strict=True))
-        return out.getvalue()
+        return table_text(columns)
 
     def _tilts(self) -> dict[str, list[float]]:
         """Of a bar on two cables, beside those of the manifold."""
@@ -135,10 +130,3 @@ def _named(pattern: str, names: Sequence[str], values: Array) -> dict[str, Seque
     """Columns of a table (n, k), with names from the pattern."""
     columns = zip(names, values.T.tolist(), strict=True)
     return {pattern.format(name): column for name, column in columns}
-
-
-def _cell(value: Any) -> str:
-    if isinstance(value, float):
-        # adding zero turns -0.0 into 0.0
-        return repr(value + 0.0) if np.isfinite(value) else ""
-    return str(value)

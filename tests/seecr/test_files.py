@@ -20,6 +20,7 @@ from seecr.files import (
     read_text,
     read_toml,
     staged,
+    with_toml,
     write_text,
     write_texts,
     written,
@@ -164,3 +165,20 @@ def test_what_was_read_is_not_overwritten(tmp_path: Path) -> None:
     with staged(tmp_path, read=[other]) as folder:
         (folder / "sweep.csv").write_text("new")
     assert measured.read_text() == "new"
+
+
+def test_what_was_read_is_not_removed(tmp_path: Path) -> None:
+    """`correct` had removed its own input, which only some of its results would have replaced."""
+    wanted = tmp_path / "corrected.csv"
+    wanted.write_text("poses")
+    worked = False
+    refused = pytest.raises(InputFileError, match=r"corrected\.csv: would be overwritten, but was")
+    read = [None, tmp_path / "no.toml", wanted]
+    with refused, staged(tmp_path, sometimes=["corrected.csv"], read=read):
+        worked = True
+    assert not worked and [file.name for file in tmp_path.iterdir()] == ["corrected.csv"]
+
+
+def test_commands_are_read_with_the_toml_beside_them() -> None:
+    assert with_toml(None) == []
+    assert with_toml(Path("a/poses.csv")) == [Path("a/poses.csv"), Path("a/poses.toml")]

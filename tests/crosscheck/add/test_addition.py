@@ -44,8 +44,11 @@ def addition(**changes: Any) -> Addition:
 def test_what_predicts_better_pays_unless_it_is_nothing(predicts: bool, is_nothing: bool) -> None:
     found = addition(predicts=predicts, is_nothing=is_nothing)
     assert found.pays == (predicts and not is_nothing)
-    worth = "improves" if found.pays else "does not improve"
+    worth = "improves" if predicts else "does not improve"
     assert found.lines()[0].startswith(f"stiffness + creep {worth} the prediction of held-out runs")
+    nothing = "stiffness + creep differs from null by no more than its standard errors (9 of them)"
+    assert (f"{nothing}: it is not worth adding" in found.lines()) == is_nothing
+    assert found.why_not.startswith(nothing if is_nothing else "what stiffness + creep explains")
 
 
 def test_the_added_effect_is_found_by_its_name_and_the_model_has_all() -> None:

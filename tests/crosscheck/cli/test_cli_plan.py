@@ -98,3 +98,21 @@ def test_what_is_asked_of_a_plan_wrongly_is_said(poses, tmp_path):
     assert (
         "can be held at 0 of" in text and "ask for fewer --rows, a wider range of tensions" in text
     )
+
+
+def test_a_plan_replaces_an_older_one_but_not_what_it_reads(tmp_path):
+    """The user's commands were overwritten, and files of the older plan stayed beside the new."""
+    xml = model_path("planar_vertical")
+    out, given = tmp_path / "p", ("--reads", "position", "--sigma", "position=0.1mm")
+    assert run("plan", xml, "--rows", 8, *given, "--out", out).exit_code == 0
+    written = {file.name: file.read_bytes() for file in out.iterdir()}
+    assert "add-payload.csv" in written
+    text = refused("plan", xml, out / "add-payload.csv", *given, "--out", out)
+    assert "add-payload.csv: would be overwritten, but was read" in text
+    assert {file.name: file.read_bytes() for file in out.iterdir()} == written
+    # what is planned is not stale, though the older plan wrote it
+    (out / "add-tensions.csv").write_text("of a plan that had an addition more")
+    assert run("plan", xml, out / "poses.csv", *given, "--out", out).exit_code == 0
+    assert (out / "poses.csv").read_bytes() == written["poses.csv"]
+    files = json.loads((out / "plan.json").read_text())["files"]
+    assert {file.name for file in out.glob("*.csv")} == {"poses.csv", *files}

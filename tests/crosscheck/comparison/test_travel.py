@@ -36,6 +36,23 @@ def test_direction_and_speed_are_those_of_the_commands(case: tuple[Problem, Pred
     assert way.direction[k] == STILL or way.direction[k][0] in "+-"
 
 
+def test_a_run_that_starts_at_its_first_row_has_no_motion_to_it(
+    case: tuple[Problem, Prediction],
+) -> None:
+    """It had one from the reference pose, where such a run never was."""
+    problem, prediction = case
+    data, m = problem.data, problem.robot.n_cables
+    standing = replace(data, stands=data.run == data.runs[0])
+    there = Problem(problem.robot, standing, problem.sigma, problem.use)
+    way, before = travel(there, prediction), travel(problem, prediction)
+    first, second, *_ = np.flatnonzero(there.experiment.commands.starts)
+    assert way.direction[first] == STILL != before.direction[first] and not way.step[first].any()
+    assert np.delete(way.step, first, axis=0) == pytest.approx(np.delete(before.step, first, 0))
+    cables = {q.name: q for q in of_cables(there, prediction, way)}
+    moved = cables["whether the cable was paid out or reeled in"].values.reshape(-1, m)
+    assert set(moved[first]) == {STILL} and STILL not in moved[second]
+
+
 @pytest.mark.parametrize("zero", [0.0, 1.7e9])
 def test_speeds_that_differ_by_rounding_are_one(
     case: tuple[Problem, Prediction], zero: float

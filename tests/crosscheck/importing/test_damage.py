@@ -241,6 +241,19 @@ def test_files_of_different_robots(files, tmp_path):
         import_case("motive", takes, ROBOT, logs)
 
 
+def test_a_named_point_that_is_never_seen(made, tmp_path, files):
+    """Its position was no number, and the frames' alignment ended in another library's error."""
+    lost = made.markers.copy()
+    lost[:, 2] = np.nan
+    vicon = made_of.vicon_csv(tmp_path / "trial.csv", replace(made, markers=lost))
+    points = dict(zip(POINTS, np.eye(3), strict=True))
+    message = wrong({**files, "vicon": vicon}, "vicon", rotation="vector", points=points)
+    assert message == (
+        f"{vicon}: never sees marker {POINTS[2]}; expected its position in at least one row; name "
+        "another with --point"
+    )
+
+
 def test_bodies_and_markers_that_are_not_there(files):
     assert "has no rigid body 'drone'; expected one of" in wrong(files, "motive", body="drone")
     message = wrong(files, "vicon", markers=("platform:points1", "pl:1", "x"))

@@ -116,6 +116,21 @@ def test_way_points_and_payloads_aside_are_proposed(cogiro, tmp_path):
     assert np.all(aside.mass > 0) and np.ptp(aside.centre[0] - cogiro.centre_of_mass) > 0.01
 
 
+def test_a_run_that_starts_at_its_first_row_has_nothing_beyond_that(cogiro):
+    """Its way point lay beyond the way from the reference pose, on which the run never was."""
+    data = measured(cogiro, points=3)
+    standing = replace(data, stands=np.ones(data.n_rows, dtype=bool))
+    starts = data.as_commands(cogiro).starts
+
+    def moved(one):
+        plan = planned(cogiro, one, SIGMA, Reads.whole(cogiro.n_cables))
+        found = {item.kind: item.plan.problem.data for item in detours(plan)}
+        return found[Adding.WAY_POINTS].command_pose[::2, :3] - one.command_pose[:, :3]
+
+    assert np.all(moved(standing)[starts] == 0.0) and np.any(moved(data)[starts] != 0.0)
+    assert np.array_equal(moved(standing)[~starts], moved(data)[~starts])
+
+
 def sight(robot, data):
     ready = prepare(robot, data, Terms())
     factor = ready.problem.noise(ready.problem.experiment.predict(ready.terms.effects))

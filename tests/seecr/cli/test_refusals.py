@@ -203,3 +203,22 @@ def test_a_map_of_a_point_mass_on_a_free_joint_names_the_cure(tmp_path: Path) ->
     assert result.exit_code == 2 and result.stderr.count("\n") == 1, result.output
     assert "give it three slide joints instead of the free joint" in result.stderr
     assert "wider limits" not in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "read", "lost"),
+    [
+        ("correct planar_vertical {} --highest 0.01", "corrected.csv", "corrected.csv"),
+        ("correct planar_vertical {}", "corrected.txt", "corrected.toml"),
+        ("sweep planar_vertical {}", "sweep.txt", "sweep.toml"),
+    ],
+)
+def test_no_command_removes_what_it_reads(tmp_path: Path, words: str, read: str, lost: str) -> None:
+    """Files that only some results have were removed, though the user's commands were in them."""
+    poses = tmp_path / read
+    poses.write_text("cmd_x_m,cmd_z_m\n0.4,0.3\n")
+    poses.with_suffix(".toml").write_text('start = "first_row"\n')
+    before = sorted(tmp_path.iterdir())
+    got = CliRunner().invoke(main, [*words.format(poses).split(), "--out", str(tmp_path)])
+    assert got.exit_code == 2 and f"{lost}: would be overwritten, but was read" in got.output
+    assert sorted(tmp_path.iterdir()) == before

@@ -246,6 +246,14 @@ CURVED = 'stiffness="200 30"'
         ({"joint": BALL}, "joint knee is a ball joint or a free joint beside others; expected one"),
         ({"joint": SLIDE + BALL}, "joint knee is a ball joint"),
         ({"joint": SLIDE.replace("axis", 'stiffness="5" axis')}, "joint rail has a spring; expec"),
+        (
+            {"joint": SLIDE.replace("axis", 'stiffness="0 500" axis')},
+            "joint rail has a spring; expected cables to carry the load",
+        ),
+        (
+            {"joint": '<joint name="loose" type="free" stiffness="5"/>'},
+            "joint loose has a spring; expected cables to carry the load",
+        ),
         ({"joint": SEVEN}, "MuJoCo cannot read this as MJCF: Error: more than 6 dofs in body"),
         (
             {"extra": '<body name="box"><geom size="0.1"/></body>'},

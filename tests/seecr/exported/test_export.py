@@ -228,9 +228,9 @@ def test_what_mjcf_cannot_say_is_said() -> None:
     ).lines("robot.xml")
     assert lines == [
         "robot.xml contains stiffness",
-        "only in the rest lengths of the reference pose: drum_gain, "
-        "drum_eccentricity, thermal_expansion; at other poses use the rest lengths that seecr "
-        "computes",
+        "only in the rest lengths of the reference pose: drum_gain, drum_eccentricity; at other "
+        "poses use the rest lengths that seecr computes",
+        "not in any file: thermal_expansion; it depends on the temperature, which no MJCF states",
         "not in any file: backlash; it depends on the motion before",
         "not in any file: hysteresis; it depends on the motion before",
         "not in any file: tracker_target; it changes what sensors read, not where the platform "

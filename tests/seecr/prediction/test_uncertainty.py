@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from calibrated import POSES, ROBOT, model_of
 
-from seecr.effects import Terms
+from seecr.effects import Term, Terms
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputFileError
 from seecr.files import json_text
@@ -50,6 +50,21 @@ def test_the_covariance_is_put_together_by_name(tmp_path: Path) -> None:
     expected = np.diag([0.05, 0.02, 0.01, 0.01, 0.01, 0.0, 0.0, 0.0]) ** 2
     expected[0, 1] = expected[1, 0] = 0.8 * 0.05 * 0.02
     np.testing.assert_allclose(covariance, expected, atol=1e-18)
+
+
+def test_an_effect_put_beside_those_of_the_file_has_no_known_errors(tmp_path: Path) -> None:
+    """A model with other terms ended in a KeyError wherever it was shown or kept."""
+    model = model_of(tmp_path, MODEL)
+    pulley = Term.of(ROBOT, "pulley_radius", radius_m=0.01)
+    more = replace(model, terms=Terms([*model.terms, pulley]))
+    new = [row for row in more.records() if row["effect"] == "pulley_radius"]
+    assert [(row["value"], row["stderr"]) for row in new] == [(0.01, None)]
+    assert json_text(more.as_json()).count('"pulley_radius"') == 1
+    had, now = covariance_of(model), covariance_of(more)
+    assert had is not None and now is not None
+    kept = [effect != "pulley_radius" for effect, _key in more.terms.labels]
+    np.testing.assert_array_equal(now[np.ix_(kept, kept)], had)
+    assert not now[~np.array(kept)].any()
 
 
 @pytest.mark.slow

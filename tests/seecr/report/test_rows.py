@@ -51,6 +51,13 @@ def test_the_csv_is_read_again_as_commands(sweep: Solution, tmp_path: Path) -> N
     np.testing.assert_array_equal(np.asarray(again), lengths)
 
 
+def test_runs_with_odd_names_keep_their_rows(sweep: Solution, tmp_path: Path) -> None:
+    """Rows of a run called #1 were comments, so that the file lost them, or had no rows at all."""
+    path, runs = tmp_path / "sweep.csv", ["#1", "2, back", 'the "3rd"']
+    path.write_text(SweepRows(sweep, more={"run": runs}).csv_text())
+    assert list(read_commands(path, sweep.robot).run) == runs
+
+
 @pytest.mark.slow
 def test_rows_of_a_file_are_told_by_their_lines(tmp_path: Path) -> None:
     robot = load_robot("planar_vertical")

@@ -1,0 +1,39 @@
+"""Which rows of a log of commands are commands of their own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.importing.join import held_commands
+from crosscheck.measurements.data import Measurements
+from seecr.commands.loads import Loads
+
+ROWS = 4
+PULL = np.array([[0.0] * 6, [0.0] * 6, [5.0, 0, 0, 0, 0, 0], [0.0] * 6])
+ASIDE = np.array([[0.0] * 3, [0.0] * 3, [0.1, 0.0, 0.0], [0.0] * 3])
+
+
+@pytest.mark.parametrize(
+    ("loads", "rows"),
+    [
+        (None, [0]),
+        (Loads.of(ROWS, wrench=PULL), [0, 2, 3]),
+        (Loads.of(ROWS, mass=np.full(ROWS, 2.0), centre=ASIDE), [0, 2, 3]),
+        (Loads.of(ROWS, mass=np.array([0.0, 0.0, 2.0, 0.0])), [0, 2, 3]),
+        (Loads.of(ROWS, centre=ASIDE), [0]),  # where nothing hangs
+    ],
+)
+@pytest.mark.parametrize("timed", [False, True])
+def test_another_load_is_another_command(
+    tmp_path: Path, loads: Loads | None, rows: list[int], timed: bool
+) -> None:
+    """Only masses were compared: rows that differ in force or centre were one command."""
+    log = Measurements(
+        path=tmp_path, n_cables=2, run=np.full(ROWS, "a"), loads=loads,
+        command_pose=np.tile([0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0], (ROWS, 1)),
+        t_s=np.arange(float(ROWS)) if timed else None,
+    )  # fmt: skip
+    assert held_commands(log, 0.5, 0.0, float(ROWS)).row.tolist() == rows
