@@ -14,7 +14,7 @@ from crosscheck.calibration.catalogue import Catalogue, catalogue_columns, gram_
 from crosscheck.calibration.challenge import excluding
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.detectable import detectable_size
-from crosscheck.calibration.equals import parameters_counted
+from crosscheck.calibration.equals import EQUAL, parameters_counted
 from crosscheck.calibration.imitated import Imitated, field_in_place
 from crosscheck.calibration.joining import at_null, layouts, promising_beside
 from crosscheck.calibration.joint import JointFit, Setting, settle
@@ -58,7 +58,7 @@ def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
     explore(scores, [always, names])
     every = scores.every
     for name in sorted(names - always):
-        every |= _without(scores, names, {name, *alike.get(name, ())})
+        every |= _better_without(scores, names, {name, *alike.get(name, ())})
     every |= _refitted(found, scores, names)
     none = _impossible(found)
     every = {some: score for some, score in every.items() if not some & none}
@@ -69,15 +69,16 @@ def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
     return _with_equals(every, effects, alike, hints, shown, in_place)
 
 
-def _without(scores: Scores, names: Names, barred: Iterable[str]) -> dict[Names, float]:
-    """Scores of sets that do without a member and its equivalents.
+def _better_without(scores: Scores, names: Names, barred: Iterable[str]) -> dict[Names, float]:
+    """Scores of sets that do without a member and its equivalents, if one is clearly better.
 
     Two effects may do together what one does, such as a heavier platform off its centre for a force
-    and moment; no exchange of a single effect leads there.
+    and moment; no exchange of a single effect leads there. The linear model is about the members,
+    though: what is hardly better in it says little.
     """
     others = excluding(scores, frozenset(barred))
-    explore(others, [names - frozenset(barred)], _MOVES)
-    return others.every
+    best = explore(others, [names - frozenset(barred)], _MOVES)
+    return others.every if others.score(best) > scores.score(names) + EQUAL else {}
 
 
 def _impossible(found: Search) -> Names:

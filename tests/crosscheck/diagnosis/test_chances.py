@@ -18,7 +18,7 @@ from crosscheck.calibration.sets import Scores, explore
 from crosscheck.calibration.varying import Varying
 from crosscheck.diagnosis import nearby
 from crosscheck.diagnosis.chances import Chances
-from crosscheck.diagnosis.nearby import _impossible, _refitted, _without, chances_near
+from crosscheck.diagnosis.nearby import _better_without, _impossible, _refitted, chances_near
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.stepwise import by_steps
 from crosscheck.fit.candidates import null_fit
@@ -148,9 +148,11 @@ def test_what_two_do_together_one_of_many_parameters_is_not_sure_of() -> None:
     found = frozenset({"wrench"})
     explore(scores, [frozenset(), found])
     assert probabilities(scores.every, found, list(columns)).of("wrench") > 0.97
-    every = scores.every | _without(scores, found, found)
+    every = scores.every | _better_without(scores, found, found)
     assert frozenset({"mass", "centre"}) in every
     assert probabilities(every, found, list(columns)).of("wrench") < 0.1
+    # and what explains less than the members do is no doubt about them
+    assert _better_without(scores, frozenset({"mass", "centre"}), {"mass"}) == {}
 
 
 @pytest.mark.slow
