@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from seecr.columns.beside import choice
 from seecr.columns.known import know_columns
 from seecr.columns.loads import known_loads
-from seecr.columns.poses import command_lengths, command_poses, poses_of
+from seecr.columns.poses import aimed_poses, command_lengths, command_poses
 from seecr.columns.reach import check_reach
 from seecr.columns.table import read_table
 from seecr.columns.times import runs, temperatures, times
@@ -35,7 +35,8 @@ class CommandFile:
     Attributes:
         path: the file.
         commands: its rows.
-        wanted: (n, 7) poses of columns ``want_*``, or None.
+        wanted: (n, 7) poses of columns ``want_*``, or None without lengths, or where a row states
+            no whole pose.
         run: (n,) names of runs.
         notes: sentences for the reader: what was assumed or filled in.
     """
@@ -61,11 +62,11 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
     columns = know_columns(read_table(path), robot.n_cables)
     run = runs(columns)
     lengths = command_lengths(columns, robot)
-    wanted = poses_of(columns, robot, "want", "wanted")
     if lengths is None:
-        poses = command_poses(columns, robot)
+        # what these commands were for has no part in where they lead
+        poses, wanted = command_poses(columns, robot), None
     else:
-        poses = np.tile(robot.reference_pose, (len(run), 1)) if wanted is None else wanted
+        poses, wanted = aimed_poses(columns, robot)
     check_reach(columns, robot, poses, lengths)
     told, stands = _beside(path.with_suffix(".toml"))
     commands = Commands(

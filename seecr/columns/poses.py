@@ -105,6 +105,38 @@ def wanted_poses(columns: Columns, robot: Robot) -> Array | None:
     return wanted
 
 
+def aimed_poses(columns: Columns, robot: Robot) -> tuple[Array, Array | None]:
+    """Poses (n, 7) that lengths are for, and the same if every row states one of its own.
+
+    Of several equilibria with the same lengths, one near the first is meant. What is not stated is
+    as at the reference pose; nothing deviates from what nobody wanted.
+
+    Raises:
+        InputFileError: an orientation is incomplete.
+    """
+    if _all_stated(columns, robot):
+        whole = poses_of(columns, robot, "want", "wanted")
+        assert whole is not None
+        return whole, whole
+    reference = np.tile(robot.reference_pose, (columns.n_rows, 1))
+    stated = wanted_poses(columns, robot)
+    if stated is None:
+        return reference, None
+    columns.notes.append(
+        "Columns want_* state no whole pose in every row: what is missing is taken from the "
+        "reference pose where the search begins, and no deviations are given."
+    )
+    return np.where(np.isfinite(stated), stated, reference), None
+
+
+def _all_stated(columns: Columns, robot: Robot) -> bool:
+    """Whether each row has a wanted position, and an orientation if there are columns for one."""
+    given = columns.present("want", POSITION + QUATERNION + ANGLES)
+    needed = {part for part, free in zip(POSITION, _free_coordinates(robot), strict=False) if free}
+    cells = [columns.numbers(f"want_{part}", blank_is_nan=True) for part in given]
+    return bool(given) and needed.issubset(given) and bool(np.isfinite(cells).all())
+
+
 def _group(
     columns: Columns,
     of: tuple[str, str, str],
