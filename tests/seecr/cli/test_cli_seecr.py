@@ -240,6 +240,9 @@ def test_export_writes_a_description_and_what_mujoco_alone_reads(tmp_path: Path)
         "out-mujoco.xml, for MuJoCo alone, also contains pulley_radius",
         f"next: seecr pose {out} 0.3 0.2 0.15",
     ]  # fmt: skip
+    turned = ("0.3", "0.2", "0.15", "0.8", "0", "0", "-0.6")
+    there = run("export", "demobot_cogiro", out, *turned, "--model", model)
+    assert there.stdout.splitlines()[-1] == f"next: seecr pose {out} {' '.join(turned)}"
     np.testing.assert_allclose(load_robot(out).ea, 1.1 * robot.ea)
     assert 'type="cylinder"' in (tmp_path / "out-mujoco.xml").read_text()
     plain = run("export", "demobot_cogiro", tmp_path / "plain.xml", "--json")
