@@ -33,7 +33,6 @@ class CommandFile:
     """Commands as read from a file.
 
     Attributes:
-        path: the file.
         commands: its rows.
         wanted: (n, 7) poses of columns ``want_*``, or None without lengths, or where a row states
             no whole pose.
@@ -41,7 +40,6 @@ class CommandFile:
         notes: sentences for the reader: what was assumed or filled in.
     """
 
-    path: Path
     commands: Commands
     wanted: Array | None
     run: tuple[str, ...]
@@ -80,7 +78,7 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
         stands=np.ones(len(run), dtype=bool) if stands else None,
         line=columns.table.line,
     )
-    return CommandFile(path, commands, wanted, tuple(run.tolist()), tuple(columns.notes))
+    return CommandFile(commands, wanted, tuple(run.tolist()), tuple(columns.notes))
 
 
 def _beside(path: Path) -> tuple[bool, bool]:
