@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 LARGEST = 1e30
 """Largest number accepted: squares of larger ones overflow, and no measured value is so large."""
 
+NORM_TOLERANCE = 1e-3
+"""How far a unit quaternion's norm may be from one: six digits leave 1e-6, more is wrong."""
+
 # Below this angle the series of sin(x)/x is exact to double precision.
 _SMALL_ANGLE = 1e-4
 

@@ -9,13 +9,10 @@ from numpy.typing import NDArray
 
 from seecr.columns.known import ANGLES, POSITION, QUATERNION, Columns
 from seecr.description.joints import pose_of_values
-from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
+from seecr.pose import NORM_TOLERANCE, Array, quat_from_rxyz, rxyz_from_quat
 
 if TYPE_CHECKING:
     from seecr.description.robot import Robot
-
-# Files with six digits are off by up to 1e-6; a norm farther from one is a mistake.
-_NORM_TOLERANCE = 1e-3
 
 
 def command_lengths(columns: Columns, robot: Robot) -> Array | None:
@@ -214,7 +211,7 @@ def _check_norm(columns: Columns, prefix: str, quat: Array, norm: Array) -> None
             "check the order and the columns"
         )
 
-    columns.refuse(np.abs(norm - 1.0) > _NORM_TOLERANCE, f"{prefix}_qw", text)
+    columns.refuse(np.abs(norm - 1.0) > NORM_TOLERANCE, f"{prefix}_qw", text)
 
 
 def measured_orientation(columns: Columns) -> tuple[Array | None, Array]:
