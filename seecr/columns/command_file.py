@@ -34,8 +34,8 @@ class CommandFile:
 
     Attributes:
         commands: its rows.
-        wanted: (n, 7) poses of columns ``want_*``, or None without lengths, or where a row states
-            no whole pose.
+        wanted: (n, 7) poses of columns ``want_*``, NaN where a row does not state all of one; None
+            without such columns or lengths.
         run: (n,) names of runs.
         notes: sentences for the reader: what was assumed or filled in.
     """

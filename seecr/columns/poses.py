@@ -103,10 +103,11 @@ def wanted_poses(columns: Columns, robot: Robot) -> Array | None:
 
 
 def aimed_poses(columns: Columns, robot: Robot) -> tuple[Array, Array | None]:
-    """Poses (n, 7) that lengths are for, and the same if every row states one of its own.
+    """Poses (n, 7) that lengths are for, and what is stated of them, if anything.
 
     Of several equilibria with the same lengths, one near the first is meant. What is not stated is
-    as at the reference pose; nothing deviates from what nobody wanted.
+    as at the reference pose there. Unless every row states a pose it is NaN in the second, since
+    nothing deviates from what nobody wanted.
 
     Raises:
         InputFileError: an orientation is incomplete.
@@ -123,7 +124,7 @@ def aimed_poses(columns: Columns, robot: Robot) -> tuple[Array, Array | None]:
         "Columns want_* state no whole pose in every row: what is missing is taken from the "
         "reference pose where the search begins, and no deviations are given."
     )
-    return np.where(np.isfinite(stated), stated, reference), None
+    return np.where(np.isfinite(stated), stated, reference), stated
 
 
 def _all_stated(columns: Columns, robot: Robot) -> bool:

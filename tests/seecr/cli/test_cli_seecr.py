@@ -502,6 +502,24 @@ def test_a_search_tells_its_evaluations_when_it_is_asked_for(tmp_path: Path) -> 
     )
 
 
+def test_incomplete_wanted_poses_are_read_again_as_they_were_stated(tmp_path: Path) -> None:
+    """Files that ``crosscheck compare`` read were refused."""
+    robot, names = load_robot(model_path("planar_vertical")), [f"length_{i}_m" for i in range(1, 5)]
+    x = float(robot.reference_pose[0]) + 0.05
+    lengths = ",".join(repr(float(one)) for one in robot.rest_lengths)
+    given, out = tmp_path / "given.csv", tmp_path / "out"
+    given.write_text(f"want_x_m,want_z_m,{','.join(names)}\n{x!r},,{lengths}\n,,{lengths}\n")
+    swept = run("sweep", "planar_vertical", given, "--no-recording", "--out", out, "--json")
+    assert swept.exit_code == 0, swept.output
+    said = json.loads(swept.stdout)
+    assert any("no deviations are given" in note for note in said["notes"])
+    assert [row["deviation_m"] for row in said["rows"]] == [None, None]
+    assert [row["wanted"][0] for row in said["rows"]] == [x, None]
+    first, again = (read_commands(path, robot) for path in (given, out / "sweep.csv"))
+    np.testing.assert_array_equal(again.wanted, first.wanted)
+    np.testing.assert_array_equal(again.commands.pose, first.commands.pose)
+
+
 def test_told_lengths_and_loads_are_read_again_as_they_were_given(tmp_path: Path) -> None:
     """They were read as absolute: 17 mm off, without a word."""
     robot, names = load_robot(model_path("planar_vertical")), "length_1_m,length_2_m,length_3_m"
