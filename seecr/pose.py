@@ -14,6 +14,25 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+__all__ = [
+    "LARGEST",
+    "NORM_TOLERANCE",
+    "Array",
+    "all_finite",
+    "cross",
+    "pose_add",
+    "pose_difference",
+    "quat_conjugate",
+    "quat_from_rotvec",
+    "quat_from_rxyz",
+    "quat_multiply",
+    "quat_rotate",
+    "quat_to_matrix",
+    "rotvec_from_quat",
+    "rxyz_from_quat",
+    "transform_points",
+]
+
 Array = NDArray[np.float64]
 
 LARGEST = 1e30

@@ -144,7 +144,7 @@ def import_case(
     commands = [commands] if isinstance(commands, str | Path) else commands
     if len(files) != len(commands):
         raise CrosscheckError(
-            f"expected {counted(len(files), 'log')} of commands, one for each recording, got "
+            f"expected {counted(len(files), 'command log')}, one for each recording, got "
             f"{len(commands)}; "
             "give --commands once for each file, in their order"
         )

@@ -237,9 +237,9 @@ def test_files_of_different_robots(files, tmp_path):
     other = load_robot(model_path("planar_vertical"))
     assert "are these the commands of another robot?" in wrong(files, robot=other)
     takes, logs = [files["motive"], files["motive"]], [files["commands"]]
-    with pytest.raises(SeecrError, match="2 logs of commands, one for each recording, got 1; give"):
+    with pytest.raises(SeecrError, match="2 command logs, one for each recording, got 1; give"):
         import_case("motive", takes, ROBOT, logs)
-    with pytest.raises(SeecrError, match="1 log of commands, one for each recording, got 2; give"):
+    with pytest.raises(SeecrError, match="1 command log, one for each recording, got 2; give"):
         import_case("motive", takes[:1], ROBOT, logs * 2)
 
 
