@@ -49,7 +49,7 @@ def bar_tilt(exit_points: ArrayLike, positions: ArrayLike, half_length: float = 
     Raises:
         InputError: wrong shapes, numbers that are not finite, or a negative half length.
     """
-    exits, places = _points(exit_points, 2), finite(positions, "positions")
+    exits, places = _points(exit_points), finite(positions, "positions")
     if places.shape[-1:] != (2,):
         raise InputError(f"positions must be (..., 2), x y, got {places.shape}")
     half_length = _half_length(half_length)
@@ -121,7 +121,7 @@ def bar_equilibria(
     place = finite(position, "position")
     if place.shape != (2,):
         raise InputError(f"position must be (2,), x y, got {place.shape}")
-    exits = _points(exit_points, 2)
+    exits = _points(exit_points)
     if np.array_equal(exits[0], exits[1]):
         raise InputError(
             "exit_points must be two places, got one for both cables: there the bar swings as a "
@@ -189,10 +189,10 @@ def midline_point(exit_points: ArrayLike, anchor_points: ArrayLike) -> Array:
     return np.where(across[..., None] == 0.0, np.inf, point)
 
 
-def _points(values: ArrayLike, count: int) -> Array:
+def _points(values: ArrayLike) -> Array:
     points = numbers(values, "exit_points")
-    if points.shape != (count, 2) or not np.all(np.isfinite(points)):
-        raise InputError(f"exit_points must be ({count}, 2) finite numbers, got {points.shape}")
+    if points.shape != (2, 2) or not np.all(np.isfinite(points)):
+        raise InputError(f"exit_points must be (2, 2) finite numbers, got {points.shape}")
     return points
 
 

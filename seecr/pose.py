@@ -14,10 +14,32 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+__all__ = [
+    "LARGEST",
+    "NORM_TOLERANCE",
+    "Array",
+    "all_finite",
+    "cross",
+    "pose_add",
+    "pose_difference",
+    "quat_conjugate",
+    "quat_from_rotvec",
+    "quat_from_rxyz",
+    "quat_multiply",
+    "quat_rotate",
+    "quat_to_matrix",
+    "rotvec_from_quat",
+    "rxyz_from_quat",
+    "transform_points",
+]
+
 Array = NDArray[np.float64]
 
 LARGEST = 1e30
 """Largest number accepted: squares of larger ones overflow, and no measured value is so large."""
+
+NORM_TOLERANCE = 1e-3
+"""How far a unit quaternion's norm may be from one: six digits leave 1e-6, more is wrong."""
 
 # Below this angle the series of sin(x)/x is exact to double precision.
 _SMALL_ANGLE = 1e-4

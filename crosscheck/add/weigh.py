@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,37 +172,42 @@ def _split(terms: Terms, best: Fit, stderr: Array) -> tuple[Fitted, ...]:
 def _warnings(
     robot: Robot, best: Fit, fitted: Sequence[Fitted], own: NDArray[np.bool_]
 ) -> list[str]:
-    out = []
-    for f in fitted:
-        names = np.array(f.term.layout.names)
-        off = np.abs(f.term.vector - f.term.knowledge.value) / f.term.knowledge.stderr
-        against = f.term.knowledge.measured & (off > _CONTRADICTED)
-        if against.any():
-            which, most = some(names[against].tolist()), off[against].max()
-            out.append(
-                f"{f.term.name}: {which} is up to {most:.3g} standard errors from what was "
-                "measured independently: check that measurement, and the values that are fixed"
-            )
-        unseen, stopped = ~np.isfinite(f.stderr), np.asarray(f.at_bound, bool)
-        if stopped.any():
-            out.append(f"{f.term.name}: {some(names[stopped])} stopped at a bound")
-        if (unseen & ~stopped).any():
-            out.append(
-                f"{f.term.name}: {some(names[unseen & ~stopped])} not determined by these data"
-            )
-        if not f.term.is_possible(robot):
-            out.append(
-                f"{f.term.name}: no robot can have these values, so something else acts like this "
-                "effect"
-            )
-        size = np.abs(f.term.sizes)
-        large = (size > _IMPLAUSIBLE) & ~f.term.layout.shape
-        if large.any():
-            out.append(
-                f"{f.term.name}: {some(names[large])} is up to {size[large].max():.3g} times its "
-                "plausible size: check it on the robot"
-            )
-    return out + _together(best, own)
+    return [*(text for f in fitted for text in _warnings_of(robot, f)), *_together(best, own)]
+
+
+def _warnings_of(robot: Robot, f: Fitted) -> Iterator[str]:
+    """Warnings about one effect's values."""
+    name, names = f.term.name, np.array(f.term.layout.names)
+    off = np.abs(f.term.vector - f.term.knowledge.value) / f.term.knowledge.stderr
+    against = f.term.knowledge.measured & (off > _CONTRADICTED)
+    if against.any():
+        yield (
+            f"{name}: {_are(names[against])} up to {off[against].max():.3g} standard errors from "
+            "what was measured independently: check that measurement, and the values that are fixed"
+        )
+    unseen, stopped = ~np.isfinite(f.stderr), np.asarray(f.at_bound, bool)
+    if stopped.any():
+        yield f"{name}: {some(names[stopped])} stopped at a bound"
+    if (unseen & ~stopped).any():
+        yield f"{name}: {some(names[unseen & ~stopped])} not determined by these data"
+    if not f.term.is_possible(robot):
+        yield (f"{name}: no robot can have these values, so something else acts like this effect")
+    size = np.abs(f.term.sizes)
+    large = (size > _IMPLAUSIBLE) & ~f.term.layout.shape
+    if large.any():
+        whose = (
+            "their plausible sizes: check them"
+            if large.sum() > 1
+            else "its plausible size: check it"
+        )
+        yield (
+            f"{name}: {_are(names[large])} up to {size[large].max():.3g} times {whose} on the robot"
+        )
+
+
+def _are(names: NDArray[np.str_]) -> str:
+    """Parameters as the subject of a sentence, with its verb."""
+    return f"{some(names.tolist())} {'is' if len(names) == 1 else 'are'}"
 
 
 def _widened(best: Fit, moved: Array, own: NDArray[np.bool_]) -> list[str]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.calibration.colour import Chain, Colour, whitened
+from crosscheck.calibration.colour import WHITE, Chain, Colour, whitened
 from crosscheck.calibration.robust import row_weights
 from crosscheck.fit.known import free_derivatives, known_left, known_readings
 from crosscheck.fit.problem import Problem
@@ -100,18 +100,18 @@ class _Step:
     state: State
 
 
-def tempered(setting: Setting, start: State, width: Array, colour: Colour) -> JointFit:
-    """Fit with the noise scaled up, by a hundred at most, and then less and less."""
-    far = np.sqrt(start.chi2 / max(len(start.white), 1)) / float(np.min(colour.scale))
+def tempered(setting: Setting, start: State, width: Array) -> JointFit:
+    """Fit with white noise scaled up, by a hundred at most, and then less and less."""
+    far = np.sqrt(start.chi2 / max(len(start.white), 1))
     joint = None
     for temper in TEMPERS:
         if temper > max(far, 1.0):
             continue  # the model is nearer than that already
         steps = _LAST if temper == TEMPERS[-1] else _STEPS
         state, known = (start, None) if joint is None else (joint.state, joint.jacobian)
-        joint = settle(setting, state, width, colour.hotter(temper), steps, known)
+        joint = settle(setting, state, width, WHITE.hotter(temper), steps, known)
     assert joint is not None
-    return JointFit(joint.state, joint.jacobian, width, colour, joint.weight, joint.settled)
+    return JointFit(joint.state, joint.jacobian, width, WHITE, joint.weight, joint.settled)
 
 
 def settle(

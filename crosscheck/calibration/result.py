@@ -18,7 +18,7 @@ from crosscheck.given import GivenModel, GivenRobot, basis_of, considered, model
 from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import calibrated, provenance_of, renewed
-from seecr.counted import counted, plural
+from seecr.counted import counted, plural, some
 from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.prediction.model import Model
@@ -27,6 +27,7 @@ from seecr.result import Record, Result
 # A parameter that is not known better than this part of its plausible size is known by its prior
 # only. An effect of such parameters is left out if it changes all readings by less than this chi2.
 _UNSEEN, _NOTHING = 0.98, 1e-2
+_MOST_NAMED = 8
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,6 +42,7 @@ class Calibrated(Result, JointErrors):
         scale, rho: by kind of reading, the estimated noise over the stated one, and its correlation
             between successive rows of a run.
         outliers: lines of the file that hardly count.
+        outlier_places: the same as they are told, after the name of the file if there are several.
         settled: whether the fit converged; if not, its values are not to be used.
         notes: notes about the data.
         model: the robot's model with all of this; :func:`crosscheck.save_model` keeps it.
@@ -49,6 +51,7 @@ class Calibrated(Result, JointErrors):
     fitted: tuple[Fitted, ...]
     covariance: Array
     outliers: tuple[int, ...]
+    outlier_places: tuple[str, ...]
     settled: bool
     notes: tuple[str, ...]
     model: Model
@@ -78,11 +81,9 @@ class Calibrated(Result, JointErrors):
             for name in self.scale
         ]
         if self.outliers:
-            lines = ", ".join(map(str, self.outliers))
-            count = plural(len(self.outliers), "line")
-            out.append(
-                f"outliers, given little weight and not included in these errors: {count} {lines}"
-            )
+            noun = plural(len(self.outliers), "line")
+            lines = f"{noun} {some(self.outlier_places, _MOST_NAMED)}"
+            out.append(f"outliers, given little weight and not included in these errors: {lines}")
         return out
 
     def lines(self) -> list[str]:
@@ -104,6 +105,7 @@ class Calibrated(Result, JointErrors):
         return {
             **JointErrors.as_json(self),
             "outliers": list(self.outliers),
+            "outlier_places": list(self.outlier_places),
             "settled": self.settled,
             "improves_held_out": self.pays,
             "effects": {one.term.name: one.as_json() for one in self.fitted},
@@ -159,6 +161,7 @@ def _result(found: Calibration, before: Terms, notes: tuple[str, ...], basis: Mo
     own = np.flatnonzero([name in kept for name, _key in found.terms.labels])
     covariance = found.covariance[np.ix_(own, own)]
     data, robot = found.setting.problem.data, found.setting.problem.robot
+    far = np.flatnonzero(found.outliers).tolist()
     source = provenance_of(data.name, "crosscheck calibrate")
     rms = found.together
     errors = {"before": rms.before, "after": rms.after, "held_out": rms.held_out}
@@ -166,7 +169,8 @@ def _result(found: Calibration, before: Terms, notes: tuple[str, ...], basis: Mo
         fitted=fitted,
         covariance=covariance,
         **vars(rms),
-        outliers=tuple(int(line) for line in data.line[found.outliers]),
+        outliers=tuple(int(data.line[row]) for row in far),
+        outlier_places=tuple(data.place(row) for row in far),
         settled=found.joint.settled,
         notes=notes,
         model=renewed(calibrated(basis, fitted, covariance, source, errors), robot, data),

@@ -71,7 +71,7 @@ def fit_everything(
     at_once, later = layouts(setting.problem)
     progress("fitting all effects", 0.05)
     start = start_of(setting, terms, Terms(Term(a, a.null) for a in at_once))
-    joint = with_noise(setting, tempered(setting, start, widths_of(start.terms), WHITE))
+    joint = with_noise(setting, tempered(setting, start, widths_of(start.terms)))
     wanted = [a for a in later if a.name not in terms]
     frozen = replace(setting, frozen=True)
     if given is not None:
@@ -204,7 +204,7 @@ def _from_alone(
             setting.problem, Terms([*alone.terms, *others]), setting.factor, alone.state
         )
         if state.valid:
-            fitted = tempered(setting, state, widths_of(state.terms), WHITE)
+            fitted = tempered(setting, state, widths_of(state.terms))
             found.append(with_noise(setting, fitted))
             if not poor(found[-1]):
                 break
@@ -261,7 +261,7 @@ def _with_more(setting: Setting, joint: JointFit, first: Terms, added: list[Term
         if k == 0:
             fitted = settle(setting, state, width, joint.colour)
         else:
-            fitted = tempered(setting, state, width, WHITE)
+            fitted = tempered(setting, state, width)
         found.append(with_noise(setting, fitted))
     return max(found, key=lambda j: worth(setting, j))
 

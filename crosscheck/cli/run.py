@@ -146,10 +146,12 @@ def _run(
     out: Path,
     as_json: bool,
 ) -> int:
+    from crosscheck.suite.worst_pose import FILE_NAME
     from seecr.files import staged
 
-    recordings_of = [f"{case.name}.rrd" for case in chosen]
-    with staged(out, sometimes=recordings_of) as folder:
+    # effects alone have no worst pose
+    sometimes = [FILE_NAME, *(f"{case.name}.rrd" for case in chosen)]
+    with staged(out, sometimes=sometimes) as folder:
         record = partial(_record, folder=folder) if recordings else None
         with progress_bar("compiling", sum(map(len, chosen))) as advance:
             from crosscheck.suite import run_suite

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
 from crosscheck.cli.choices import sigma_option
-from seecr.cli.following import following
+from seecr.cli.following import following, typed
 from seecr.cli.options import FILE, json_option, made_by, out_option, progress_bar
 
 if TYPE_CHECKING:
@@ -70,7 +71,9 @@ Examples:
 )
 @out_option("twin")
 @json_option
+@click.pass_context
 def command(
+    context: click.Context,
     robot: Path | None,
     seed: int | None,
     count: int | None,
@@ -99,7 +102,8 @@ def command(
       answer.sealed    what was hidden; no other command opens it
     """
     if opened is not None:
-        _check_alone(robot, seed, count, names, tensions, poses, sigmas)
+        named = context.get_parameter_source("out") is not ParameterSource.DEFAULT
+        _check_alone(robot, seed, count, names, tensions, poses, sigmas, named)
         return _open(opened, as_json)
     if robot is None or seed is None:
         raise click.UsageError("expected ROBOT.xml and --hide SEED, or --open FILE")
@@ -157,7 +161,7 @@ def _tell(twin: Twin, out: Path, made: Made | None) -> None:
         f"noise {', '.join(_noises(sigma))}"
     )
     click.echo(f"written to {out}: {', '.join(files)}")
-    click.echo(f"to see what is hidden: crosscheck twin --open {out}")
+    click.echo(f"to see what is hidden: {typed('crosscheck', 'twin', '--open', out)}")
     click.echo(following("crosscheck", "diagnose", out / "robot.xml", out / "measured.csv"))
 
 

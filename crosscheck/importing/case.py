@@ -147,7 +147,8 @@ def import_case(
     commands = [commands] if isinstance(commands, str | Path) else commands
     if len(files) != len(commands):
         raise CrosscheckError(
-            f"expected a log of commands for each of {len(files)} recordings, got {len(commands)}; "
+            f"expected {counted(len(files), 'command log')}, one for each recording, got "
+            f"{len(commands)}; "
             "give --commands once for each file, in their order"
         )
     said: list[str] = []
@@ -185,7 +186,8 @@ def write_case(found: Imported, robot_path: Path, out: Path, made: Made | None =
     """Write the case folder, completely or not at all; ``made`` is its provenance."""
     said = {} if made is None else {"made": made}
     check_case(out, robot_path)
-    with staged(out) as folder:
+    read = [file for take in found.takes for file in (take.stream.path, take.held.log.path)]
+    with staged(out, read=read) as folder:
         write_measurements(folder / "measured.csv", found.measured)
         copy_robot(robot_path, folder / "robot.xml")
         rows = found.records()

@@ -34,14 +34,6 @@ class ParameterRow:
 
 
 @dataclass(frozen=True)
-class RivalWords:
-    """What cannot be told from an effect, and how much worse it explains the data."""
-
-    name: str
-    loss: str
-
-
-@dataclass(frozen=True)
 class FindingCard:
     """A missing effect as the page shows it."""
 
@@ -49,7 +41,7 @@ class FindingCard:
     title: str
     place: str
     removes: str
-    rivals: list[RivalWords]
+    rivals: list[str]
     check: str
     parameters: list[ParameterRow]
     correlations: list[str]
@@ -82,7 +74,7 @@ def finding_card(found: Diagnosis, finding: MissingEffect) -> FindingCard:
         title=finding.title,
         place=finding.layout.effect.place,
         removes=removed(finding.share),
-        rivals=[RivalWords(r.name, short(max(r.loss, 0.0), 2)) for r in finding.rivals],
+        rivals=[rival.name for rival in finding.rivals],
         check=finding.check,
         parameters=rows,
         correlations=_correlations(found, finding),

@@ -59,7 +59,7 @@ def facts(problem: Problem, *, other_noise: bool = False) -> list[tuple[str, str
         rows += f" of {data.n_rows}"
     ways = int((~data.read).sum())
     if ways:
-        rows += f", {ways} way point" + "s" * (ways > 1)
+        rows += f", {counted(ways, 'way point')}"
     return [
         ("robot", f"{problem.robot.name}, {counted(problem.robot.n_cables, 'cable')}"),
         ("data", data.name),

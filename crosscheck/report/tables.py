@@ -111,7 +111,7 @@ class CandidateRow:
     """An effect that is not listed, as the page shows it.
 
     Attributes:
-        effect, title: its name, and in words. score: of the search.
+        effect, title: its name, and in words.
         alone: part of the excess chi2 that it takes away by itself, 0 to 1; None if not tried.
         needs: what it would take. why_not: the reason. probability: in words, "" if not known.
         together: that of its class, if it has equivalents.
@@ -119,7 +119,6 @@ class CandidateRow:
 
     effect: str
     title: str
-    score: str
     alone: float | None
     needs: str
     why_not: str
@@ -139,7 +138,6 @@ def candidate_rows(found: Diagnosis) -> list[CandidateRow]:
             CandidateRow(
                 effect=row.effect,
                 title=row.title,
-                score=short(row.score) if row.score else "",
                 alone=_alone(found, candidate),
                 needs=_needs(found, candidate),
                 why_not=str(row.why_not),

@@ -199,7 +199,8 @@ def effects_line(results: Sequence[EffectResult]) -> str:
     bad = [result.case.name for result in results if result.outcome is not Outcome.AGREE]
     verdict = "all agree"
     if bad:
-        verdict = f"{len(bad)} of {counted(len(results), 'case')} do not agree: {some(bad)}"
+        verb = "does" if len(bad) == 1 else "do"
+        verdict = f"{len(bad)} of {counted(len(results), 'case')} {verb} not agree: {some(bad)}"
     worst = max(results, key=lambda result: result.worst[0])
     orientation = max(result.worst[1] for result in results)
     tension = max(result.worst[2] for result in results)

@@ -14,6 +14,8 @@ from seecr.errors import InputFileError
 from seecr.files import written
 from seecr.pose import Array
 
+__all__ = ["FILE_NAME", "KEYFRAME", "worst_pose", "write_worst_pose", "write_worst_pose_mjcf"]
+
 KEYFRAME = "worst"
 FILE_NAME = "worst_pose.xml"
 

@@ -62,4 +62,4 @@ def _table(found: Addition) -> Table:
         ("before, on held-out runs", found.held_out_before, "dim"),
         (f"with {found.name}, on held-out runs", found.held_out, ""),
     )
-    return rms_table("rms error", rows)
+    return rms_table(rows)

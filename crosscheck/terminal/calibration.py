@@ -30,7 +30,7 @@ def print_calibration(
         ("calibrated", found.after, "bold"),
         ("calibrated, on held-out runs", found.held_out, ""),
     )
-    console.print(rms_table("rms error", rows))
+    console.print(rms_table(rows))
     table = table_of(["effect", "parameters", "largest value in standard errors"])
     largest = [_largest(one) for one in found.fitted]
     for one, size in zip(found.fitted, largest, strict=True):

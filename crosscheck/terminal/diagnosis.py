@@ -57,7 +57,7 @@ def _way(found: Diagnosis) -> Table:
     for finding in found.missing:
         rows.append((f"+ {finding.effect}", finding.rms, ""))
         rows.append(("  on held-out runs", finding.held_out_rms, "dim"))
-    return rms_table("rms error", [*rows, ("noise alone", found.floor, "dim")])
+    return rms_table([*rows, ("noise alone", found.floor, "dim")])
 
 
 def _print_finding(console: Console, finding: MissingEffect, probability: str) -> None:

@@ -62,13 +62,13 @@ def print_parameters(
         say(console, f"  and {len(lines) - most} more in {file}")
 
 
-def rms_table(title: str, rows: Sequence[tuple[str, Rms, str]]) -> Table:
+def rms_table(rows: Sequence[tuple[str, Rms, str]]) -> Table:
     """A table of rms errors: name, errors by kind and style of each row.
 
     Kinds that were not read have no column.
     """
     kinds = [k for k in KINDS if any(rms.get(k.key) is not None for _name, rms, _style in rows)]
-    table = table_of([title, *(heading(k) for k in kinds)])
+    table = table_of(["rms error", *(heading(k) for k in kinds)])
     for name, rms, style in rows:
         table.add_row(Text(name), *(cell(k, rms) for k in kinds), style=style)
     return table

@@ -23,13 +23,11 @@ class Descent:
         balanced: MuJoCo's forces balance, and no direction leads further down.
         free: some motion changes no force, so that the end point along it is arbitrary.
         residual: residual force relative to the load.
-        iterations: number of steps.
     """
 
     balanced: bool
     free: bool
     residual: float
-    iterations: int
 
     @property
     def at_rest(self) -> bool:
@@ -51,13 +49,13 @@ def descend(world: World, judge: bool = True, limit: int = _MAX_ITERATIONS) -> D
         total += iterations
         fine = size <= max(_TOLERANCE, 10.0 * world.rounding())
         if not (fine and judge):
-            return Descent(fine, False, size, total)
+            return Descent(fine, False, size)
         value, softest, neutral = _softest(world)
         if value >= -neutral:
-            return Descent(True, value <= neutral, size, total)
+            return Descent(True, value <= neutral, size)
         if nudge < _NUDGES:
             world.move(_NUDGE * world.length * softest / world.metre)
-    return Descent(False, False, size, total)
+    return Descent(False, False, size)
 
 
 def _softest(world: World) -> tuple[float, Array, float]:

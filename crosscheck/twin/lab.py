@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,10 @@ from crosscheck.twin.answer import Moves
 from crosscheck.twin.hidden import times
 from crosscheck.twin.measure import Truth, measure
 from crosscheck.twin.trajectory import trajectory
+from seecr.commands.loads import Loads
 from seecr.description.robot import Robot
 from seecr.effects import Effect, Term
-from seecr.pose import quat_from_rotvec, quat_multiply
+from seecr.pose import Array, quat_from_rotvec, quat_multiply
 
 # Noise of a tracker, relative to the mean cable length (30 micrometres on a DemoBot), and in angle.
 _POSITION, _ORIENTATION_RAD = 6e-5, 3.5e-4
@@ -89,10 +90,20 @@ def random_of(
 def key_of(case: Measurements) -> tuple[int, ...]:
     """Numbers that identify a user's own commands: other commands get other noise."""
     told = case.command_lengths if case.command_pose is None else case.command_pose
-    carried = None if case.loads is None else case.loads.mass
-    parts = [np.round(part, _TOLD) + 0.0 for part in (told, carried) if part is not None]
+    carried = () if case.loads is None else _carried(case.loads)
+    parts = [np.round(part, _TOLD) + 0.0 for part in (told, *carried) if part is not None]
     digest = hashlib.sha256(b"".join(part.tobytes() for part in parts)).digest()
     return tuple(np.frombuffer(digest[:16], dtype=np.uint32).tolist())
+
+
+def _carried(loads: Loads) -> Iterator[Array]:
+    """What identifies known loads. What is not there has no part in it: cases keep their noise."""
+    yield loads.mass
+    centre = np.where(loads.mass[:, None] != 0.0, np.nan_to_num(loads.centre), 0.0)
+    # each with its number, lest one passes for the other
+    for number, part in enumerate((centre, loads.wrench), start=1):
+        if part.any():
+            yield np.append(part, number)
 
 
 def lacking_in(case: Measurements) -> dict[str, str]:

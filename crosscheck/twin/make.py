@@ -158,7 +158,7 @@ def make_twin(
         notes=(*robot.notes, *(() if given is None else given.notes)),
     )
     if out is not None:
-        _write(twin, path, Path(out))
+        _write(twin, path, Path(out), None if given is None else given.path)
     return twin
 
 
@@ -179,8 +179,10 @@ def _answer(made: Measured, robot: Robot, seed: int) -> Answer:
     )
 
 
-def _write(twin: Twin, robot_path: Path, out: Path) -> None:
-    with staged(out) as folder:
+def _write(twin: Twin, robot_path: Path, out: Path, commands: Path | None) -> None:
+    # commands made in Python name a file that need not be there
+    read = [commands] if commands is not None and commands.exists() else []
+    with staged(out, read=read) as folder:
         write_measurements(folder / "measured.csv", twin.measured)
         copy_robot(robot_path, folder / "robot.xml")
         write_text(folder / NAME, seal(twin.answer))

@@ -37,7 +37,7 @@ _LIMIT = 300
 _SHARE, _SHARES = 1e-10, 20
 
 Progress = Callable[[int], None]
-_NOWHERE = Descent(False, False, np.nan, 0)
+_NOWHERE = Descent(False, False, np.nan)
 
 
 @dataclass(frozen=True, eq=False)

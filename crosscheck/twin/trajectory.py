@@ -40,8 +40,8 @@ def trajectory(robot: Robot, points: int = 18, extent: float = 1.0) -> Trajector
         line = _line(points, reach[0], _ALONG)
         _to_and_fro(runs, f"along_{name}", np.stack([line, 0 * line, height + 0 * line], 1))
     _to_and_fro(runs, "across", _across(points, reach))
-    changes = {name: _base_change(robot, frame, reach, part) for name, part in runs.items()}
-    changes["loop"] = _loop(robot, frame, reach, 2 * points)
+    changes = {name: _base_change(frame, reach, part) for name, part in runs.items()}
+    changes["loop"] = _loop(frame, reach, 2 * points)
     poses = np.concatenate([_reachable(robot, extent * change) for change in changes.values()])
     counts = [len(change) for change in changes.values()]
     return Trajectory(poses, np.repeat(np.array(list(changes)), counts), _clock(counts))
@@ -80,13 +80,13 @@ def _to_and_fro(runs: dict[str, Array], name: str, part: Array) -> None:
     runs[f"{name}_fwd"], runs[f"{name}_back"] = part, part[::-1]
 
 
-def _base_change(robot: Robot, frame: Array, reach: Array, part: Array) -> Array:
+def _base_change(frame: Array, reach: Array, part: Array) -> Array:
     """Change (n, 6) of the reference pose; heights are fractions of the reach upwards."""
     local = part * np.array([1.0, 1.0, reach[2, 1]])
     return np.concatenate([local @ frame, np.zeros_like(local)], axis=1)
 
 
-def _loop(robot: Robot, frame: Array, reach: Array, points: int) -> Array:
+def _loop(frame: Array, reach: Array, points: int) -> Array:
     """Change (points, 6) along a closed curve of position and tilt."""
     angle = np.linspace(0.0, 2.0 * np.pi, points, endpoint=False)
     size = _LOOP * np.min(np.abs(reach[:2]), axis=1)

@@ -107,9 +107,10 @@ def _check_unit(name: str, turn: Sequence[float]) -> None:
         InputError: it is not.
     """
     from seecr import InputError
+    from seecr.pose import NORM_TOLERANCE
 
     norm = sum(part * part for part in turn) ** 0.5
-    if not abs(norm - 1.0) <= 1e-3:
+    if not abs(norm - 1.0) <= NORM_TOLERANCE:
         raise InputError(
             f"{name}: expected a unit quaternion, scalar first, got one of norm {norm:.4g}"
         )

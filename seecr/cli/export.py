@@ -83,7 +83,7 @@ def command(
         }  # fmt: skip
         click.echo(json_text(document))
         return 0
-    place = [f"{value + 0.0:g}" for value in (coordinates or machine.reference_pose)[:3]]
+    place = [f"{value + 0.0:g}" for value in coordinates or machine.reference_pose[:3]]
     then = following("seecr", "pose", out, *place)
     for line in [*notes, *found.lines(out.name, beside.name), then]:
         click.echo(line)

@@ -17,8 +17,13 @@ Words = tuple[object, ...]
 
 def following(*words: object) -> str:
     """The line that names a command, as a shell takes it."""
+    return f"next: {typed(*words)}"
+
+
+def typed(*words: object) -> str:
+    """A command as a shell takes it."""
     program, *arguments = (str(word) for word in words)
-    return f"next: {shlex.join([_reached(program), *arguments])}"
+    return shlex.join([_reached(program), *arguments])
 
 
 def _reached(program: str) -> str:

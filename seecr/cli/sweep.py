@@ -142,13 +142,15 @@ def command(
                 tell(0, "errors")
             spread = None if own is None else spread_of(machine, commands, own)
             tell(len(commands), "solved")
-        commanded = commands.lengths is None or wanted
         bar, too_many = _bar(solution, commands, own)
         rows = SweepRows(solution, commands.lengths, more, spread, wanted, commands.loads, bar)
+        commanded = commands.lengths is None or rows.aimed
         status = 0 if at_rest(solution) else 3
         runs = _runs(machine, given, more)
         spans, why_not = _spans(solution, commands, own, runs)
         met = midline_points(solution)
+        if rows.aimed:
+            said = (*said, _WANTED)
         notes = [*notes_of(own, solution), *said, *why_not, *too_many]
         document = {
             "made": made_by(machine.source, poses, model),
@@ -169,7 +171,7 @@ def command(
             write_text(folder / "sweep.toml", beside)
         if figure != "none":
             sweep_figure(
-                folder / f"sweep.{figure}", solution, commanded, wanted, runs, spread,
+                folder / f"sweep.{figure}", solution, commanded, rows.aimed, runs, spread,
                 zones=spans or (), bar=bar,
             )  # fmt: skip
         if not no_recording:
@@ -255,8 +257,8 @@ def _solved(
 
 def _commands(
     robot: Robot, poses: Path | None, given: _Commanded
-) -> tuple[Commands, _Columns, tuple[str, ...], bool]:
-    """The commands, what else their file says, notes on it, whether lengths have poses wanted."""
+) -> tuple[Commands, _Columns, tuple[str, ...], NDArray[np.float64] | None]:
+    """The commands, what else their file says, notes on it, and the poses that lengths are for."""
     from seecr import Commands, InputError
     from seecr.columns.command_file import read_commands
 
@@ -274,7 +276,7 @@ def _commands(
             "number of poses; leave it out"
         )
     if poses is None:
-        return Commands(_along(robot, given)), {}, (_COUNTED,), False
+        return Commands(_along(robot, given)), {}, (_COUNTED,), None
     read = read_commands(poses, robot)
     more: _Columns = {}
     if len(set(read.run)) > 1:
@@ -283,9 +285,7 @@ def _commands(
         more["t_s"] = read.commands.time.tolist()
     if read.commands.temperature is not None:
         more["temperature_C"] = read.commands.temperature.tolist()
-    wanted = read.wanted is not None and read.commands.lengths is not None
-    notes = (*read.notes, _WANTED) if wanted else read.notes
-    return read.commands, more, notes, wanted
+    return read.commands, more, read.notes, read.wanted
 
 
 def _along(robot: Robot, given: _Commanded) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from seecr.columns.beside import choice
 from seecr.columns.known import know_columns
 from seecr.columns.loads import known_loads
-from seecr.columns.poses import command_lengths, command_poses, poses_of
+from seecr.columns.poses import aimed_poses, command_lengths, command_poses
 from seecr.columns.reach import check_reach
 from seecr.columns.table import read_table
 from seecr.columns.times import runs, temperatures, times
@@ -33,14 +33,13 @@ class CommandFile:
     """Commands as read from a file.
 
     Attributes:
-        path: the file.
         commands: its rows.
-        wanted: (n, 7) poses of columns ``want_*``, or None.
+        wanted: (n, 7) poses of columns ``want_*``, NaN where a row does not state all of one; None
+            without such columns or lengths.
         run: (n,) names of runs.
         notes: sentences for the reader: what was assumed or filled in.
     """
 
-    path: Path
     commands: Commands
     wanted: Array | None
     run: tuple[str, ...]
@@ -61,11 +60,11 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
     columns = know_columns(read_table(path), robot.n_cables)
     run = runs(columns)
     lengths = command_lengths(columns, robot)
-    wanted = poses_of(columns, robot, "want", "wanted")
     if lengths is None:
-        poses = command_poses(columns, robot)
+        # what these commands were for has no part in where they lead
+        poses, wanted = command_poses(columns, robot), None
     else:
-        poses = np.tile(robot.reference_pose, (len(run), 1)) if wanted is None else wanted
+        poses, wanted = aimed_poses(columns, robot)
     check_reach(columns, robot, poses, lengths)
     told, stands = _beside(path.with_suffix(".toml"))
     commands = Commands(
@@ -79,7 +78,7 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
         stands=np.ones(len(run), dtype=bool) if stands else None,
         line=columns.table.line,
     )
-    return CommandFile(path, commands, wanted, tuple(run.tolist()), tuple(columns.notes))
+    return CommandFile(commands, wanted, tuple(run.tolist()), tuple(columns.notes))
 
 
 def _beside(path: Path) -> tuple[bool, bool]:

@@ -9,13 +9,10 @@ from numpy.typing import NDArray
 
 from seecr.columns.known import ANGLES, POSITION, QUATERNION, Columns
 from seecr.description.joints import pose_of_values
-from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
+from seecr.pose import NORM_TOLERANCE, Array, quat_from_rxyz, rxyz_from_quat
 
 if TYPE_CHECKING:
     from seecr.description.robot import Robot
-
-# Files with six digits are off by up to 1e-6; a norm farther from one is a mistake.
-_NORM_TOLERANCE = 1e-3
 
 
 def command_lengths(columns: Columns, robot: Robot) -> Array | None:
@@ -105,6 +102,39 @@ def wanted_poses(columns: Columns, robot: Robot) -> Array | None:
     return wanted
 
 
+def aimed_poses(columns: Columns, robot: Robot) -> tuple[Array, Array | None]:
+    """Poses (n, 7) that lengths are for, and what is stated of them, if anything.
+
+    Of several equilibria with the same lengths, one near the first is meant. What is not stated is
+    as at the reference pose there. Unless every row states a pose it is NaN in the second, since
+    nothing deviates from what nobody wanted.
+
+    Raises:
+        InputFileError: an orientation is incomplete.
+    """
+    if _all_stated(columns, robot):
+        whole = poses_of(columns, robot, "want", "wanted")
+        assert whole is not None
+        return whole, whole
+    reference = np.tile(robot.reference_pose, (columns.n_rows, 1))
+    stated = wanted_poses(columns, robot)
+    if stated is None:
+        return reference, None
+    columns.notes.append(
+        "Columns want_* state no whole pose in every row: what is missing is taken from the "
+        "reference pose where the search begins, and no deviations are given."
+    )
+    return np.where(np.isfinite(stated), stated, reference), stated
+
+
+def _all_stated(columns: Columns, robot: Robot) -> bool:
+    """Whether each row has a wanted position, and an orientation if there are columns for one."""
+    given = columns.present("want", POSITION + QUATERNION + ANGLES)
+    needed = {part for part, free in zip(POSITION, _free_coordinates(robot), strict=False) if free}
+    cells = [columns.numbers(f"want_{part}", blank_is_nan=True) for part in given]
+    return bool(given) and needed.issubset(given) and bool(np.isfinite(cells).all())
+
+
 def _group(
     columns: Columns,
     of: tuple[str, str, str],
@@ -182,7 +212,7 @@ def _check_norm(columns: Columns, prefix: str, quat: Array, norm: Array) -> None
             "check the order and the columns"
         )
 
-    columns.refuse(np.abs(norm - 1.0) > _NORM_TOLERANCE, f"{prefix}_qw", text)
+    columns.refuse(np.abs(norm - 1.0) > NORM_TOLERANCE, f"{prefix}_qw", text)
 
 
 def measured_orientation(columns: Columns) -> tuple[Array | None, Array]:

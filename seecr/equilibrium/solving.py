@@ -87,7 +87,7 @@ def solve(
         whole(threads, "threads", 1)
     robot = robot_of(robot)
     if gravity is not None:
-        robot = replace(robot, gravity=_array(gravity, (3,), "gravity"))
+        robot = replace(robot, gravity=_gravity(gravity))
     if isinstance(poses, HasCommands):
         poses = poses.as_commands(robot)
     commands = _commands(robot, poses, rest_lengths)
@@ -171,8 +171,8 @@ def _commands(
     return Commands(rows, lengths=table)
 
 
-def _array(values: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
-    array = finite(values, name)
-    if array.shape != shape:
-        raise InputError(f"{name} must be {shape}, got {array.shape}")
-    return array
+def _gravity(values: ArrayLike) -> Array:
+    vector = finite(values, "gravity")
+    if vector.shape != (3,):
+        raise InputError(f"gravity must be (3,), got {vector.shape}")
+    return vector

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from seecr.files import written
+
 __all__ = ["COLOURS", "figure"]
 
 # Okabe and Ito (2008), "Color Universal Design"; brown for their yellow, which is faint on white.
@@ -41,4 +43,5 @@ def figure(path: Path, rows: int = 1, columns: int = 1, **options: Any) -> Itera
         FigureCanvasAgg(drawn)
         yield drawn.subplots(rows, columns, squeeze=False, **options)
         metadata = {"Date": None} if path.suffix == ".svg" else None
-        drawn.savefig(path, metadata=metadata)
+        with written(path) as (part,):
+            drawn.savefig(part, format=path.suffix.removeprefix("."), metadata=metadata)

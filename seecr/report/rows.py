@@ -28,7 +28,7 @@ class SweepRows:
     Attributes:
         solution: of n commands.
         lengths: (n, m) [m] commanded instead of poses.
-        wanted: whether these lengths were for wanted poses; deviations are from these.
+        wanted: (n, 7) poses that these lengths were for, NaN where a row has none or a part of one.
         more: further values of each row, by name.
         spread: standard deviations of poses and tensions, if the model has a covariance.
         loads: known loads, if any.
@@ -39,21 +39,26 @@ class SweepRows:
     lengths: Array | None = None
     more: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     spread: Spread | None = None
-    wanted: bool = False
+    wanted: Array | None = None
     loads: Loads | None = None
     bar: BarManifold | None = None
+
+    @property
+    def aimed(self) -> bool:
+        """Whether deviations are from wanted poses: every row has one."""
+        return self.wanted is not None and bool(np.isfinite(self.wanted).all())
 
     def as_json(self) -> list[Record]:
         """``rows`` in ``sweep.json``."""
         found, spread = self.solution, self.spread
         commanded, none = self.lengths is None, [None] * len(found)
-        aimed = commanded or self.wanted
+        aimed = commanded or self.aimed
         columns = {
             **({} if found.line is None else {"line": found.line}),
             **self.more,
             "command": found.command if commanded else none,
             **({} if self.lengths is None else {"command_lengths_m": self.lengths}),
-            **({"wanted": found.command} if self.wanted else {}),
+            **({} if self.wanted is None else {"wanted": self.wanted}),
             "pose": found.pose,
             "deviation_m": found.deviation[:, :3] if aimed else none,
             "rotation_rad": found.deviation[:, 3:] if aimed else none,
@@ -90,11 +95,11 @@ class SweepRows:
             columns |= _named("cmd_{}", COORDINATES, found.command)
         else:
             columns |= _named("length_{}_m", cables, self.lengths)
-        if self.wanted:
-            columns |= _named("want_{}", COORDINATES, found.command)
+        if self.wanted is not None:
+            columns |= _named("want_{}", COORDINATES, self.wanted)
         columns |= load_columns(self.loads)
         columns |= _named("pose_{}", COORDINATES, found.pose)
-        if self.lengths is None or self.wanted:
+        if self.lengths is None or self.aimed:
             columns |= _named("deviation_{}_m", "xyz", found.deviation[:, :3])
             columns |= _named("rotation_{}_rad", "xyz", found.deviation[:, 3:])
         columns |= _named("tension_{}_N", cables, found.tensions)

@@ -13,7 +13,7 @@ from seecr.counted import rows_words
 from seecr.description.joints import values_of_pose
 from seecr.description.robot import Robot
 from seecr.errors import InputError
-from seecr.pose import LARGEST, Array
+from seecr.pose import LARGEST, NORM_TOLERANCE, Array
 from seecr.statics import batch
 from seecr.statics.tables import Tables
 
@@ -84,7 +84,7 @@ def commanded_poses(values: ArrayLike, name: str = "poses") -> Array:
     if array.ndim != 2 or array.shape[1] != 7:
         raise InputError(f"{name} must be (n, 7), x y z qw qx qy qz, got {np.shape(values)}")
     norm = np.linalg.norm(array[:, 3:], axis=1)
-    if np.any(np.abs(norm - 1.0) > 1e-3):
+    if np.any(np.abs(norm - 1.0) > NORM_TOLERANCE):
         row = int(np.argmax(np.abs(norm - 1.0)))
         raise InputError(
             f"{name} row {row} has a quaternion of norm {norm[row]:.4g}; expected a unit "

@@ -161,7 +161,7 @@ def _far(margins: Array, sure: float, solved: bool) -> NDArray[np.bool_]:
     return far
 
 
-def check_chance(robot: Robot, model: GivenEffects) -> None:
+def check_chance(model: GivenEffects) -> None:
     """Check that poses can have probabilities, before hours are spent on them.
 
     Raises:

@@ -132,7 +132,7 @@ def workspace_map(
     effects = read_once(effects, robot)
     axes = (_axis("x", x), _axis("y", y), _axis("z", z))
     if chance:
-        check_chance(robot, effects)
+        check_chance(effects)
     if elastic or robot.n_cables < robot.n_dof:
         _refuse_memory(robot, effects)
     turned = robot.reference_pose[3:] if orientation is None else finite(orientation, "orientation")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from made_data import SIGMA, measured, term
 
-from crosscheck.add import add_effect
+from crosscheck.add import add_effect, weigh
 from crosscheck.add.result import Addition
 from crosscheck.fit.noise import Whiteness
 from crosscheck.model.fitted import Fitted
@@ -57,6 +57,25 @@ def test_the_added_effect_is_found_by_its_name_and_the_model_has_all() -> None:
     assert found.terms.names == ("pulley_radius", "stiffness")
     assert found.lines()[-2:] == ["warning: odd", "note: said"]
     assert found.as_json()["added"] == ["stiffness", "creep"]
+
+
+def test_warnings_of_several_parameters_are_in_the_plural() -> None:
+    """Once "gain_1, gain_2 is up to 9 times its plausible size"."""
+    gains = {f"gain_{i}": 0.1 for i in (1, 2)}
+    one, two = (
+        " ".join(weigh._warnings_of(ROBOT, fitted("drum_gain", **dict(list(gains.items())[:k]))))
+        for k in (1, 2)
+    )
+    assert one.startswith("drum_gain: gain_1 is up to ")
+    assert two.startswith("drum_gain: gain_1, gain_2 are up to ")
+    assert "times its plausible size: check it on" in one
+    assert "times their plausible sizes: check them on" in two
+    known = Term.of(ROBOT, "drum_gain").measured(**dict.fromkeys(gains, (0.01, 1e-4)))
+    known = known.with_vector(np.zeros(8))
+    off = Fitted(known, np.full(8, 1e-4), np.zeros(8, dtype=bool))
+    assert "gain_1, gain_2 are up to 100 standard errors from" in " ".join(
+        weigh._warnings_of(ROBOT, off)
+    )
 
 
 def test_what_a_tracker_throws_far_off_is_left_out_neighbours_as_well() -> None:

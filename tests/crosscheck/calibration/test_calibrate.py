@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from crosscheck.fit.registration import registered
 from crosscheck.fit.state import evaluate
 from crosscheck.given import considered
 from crosscheck.measurements.data import Measurements
+from crosscheck.measurements.together import together
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Terms
@@ -84,6 +86,24 @@ def test_what_is_left_out_of_the_model_does_nothing() -> None:
     assert rms["position_rms_m"] == pytest.approx(found.after["position_rms_m"], rel=1e-3)
     mass = next(one for one in found.fitted if one.term.name == "platform_mass")
     assert mass.stderr > 0.98 * mass.term.layout.scale
+
+
+def test_outliers_of_several_files_are_told_with_their_file() -> None:
+    """Once "lines 5, 5", of which nobody knows the file; and a list without an end."""
+    data = measured(ROBOT, (), points=6, seed=1)
+    position = data.position.copy()
+    position[[3, 3 + data.n_rows // 2]] += 0.05
+    halves = np.array_split(np.arange(data.n_rows), 2)
+    far = replace(data, position=position)
+    parts = [replace(far.rows(h), line=np.arange(2, 2 + len(h))) for h in halves]
+    names = (Path("monday.csv"), Path("tuesday.csv"))
+    days = together([replace(part, path=p) for part, p in zip(parts, names, strict=True)])
+    found = calibrate(ROBOT, days, only=("stiffness",))
+    assert found.outliers == (5, 5)
+    assert found.noise_lines()[-1].endswith(": lines monday.csv 5, tuesday.csv 5")
+    assert found.as_json()["outlier_places"] == ["monday.csv 5", "tuesday.csv 5"]
+    many = replace(found, outliers=(5,) * 20, outlier_places=("monday.csv 5",) * 20)
+    assert many.noise_lines()[-1].endswith("monday.csv 5 and 12 more")
 
 
 @pytest.mark.slow

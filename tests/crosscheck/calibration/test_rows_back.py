@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_data import COGIRO, measured
 
-from crosscheck.calibration.colour import WHITE, chain_of
+from crosscheck.calibration.colour import chain_of
 from crosscheck.calibration.joint import JointFit, Setting, tempered
 from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.robust import outliers
@@ -37,7 +37,7 @@ def fitted(data: Measurements) -> tuple[Setting, JointFit]:
     setting = Setting(problem, factor, chain_of(problem))
     start = Terms(Term(layout, layout.null) for layout in LAYOUTS)
     state = evaluate(problem, start, factor)
-    return setting, with_noise(setting, tempered(setting, state, widths_of(start), WHITE))
+    return setting, with_noise(setting, tempered(setting, state, widths_of(start)))
 
 
 def written_off(setting: Setting, joint: JointFit) -> list[int]:

@@ -163,6 +163,7 @@ def test_an_effect_is_a_case_like_any_other(tmp_path):
 
 @pytest.mark.slow
 def test_effects_alone_run_in_several_processes(tmp_path):
+    (tmp_path / "worst_pose.xml").write_text("of an older run")
     result = run("--case", "effect-*-platform_mass", "--jobs", "2", "--out", tmp_path)
     assert result.exit_code == 0
     assert result.stdout.startswith(
@@ -188,7 +189,7 @@ def test_an_effect_that_differs_ends_1_and_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(effect_suite, "measure", heavier)
     result = run(*SMALL, "--case", EFFECT, "--out", tmp_path)
     assert result.exit_code == 1
-    assert f"1 of 1 case do not agree: {EFFECT}; worst" in result.stdout
+    assert f"1 of 1 case does not agree: {EFFECT}; worst" in result.stdout
     assert f"SEECR and MuJoCo differ in {EFFECT}; " in result.stdout
     assert json.loads((tmp_path / "results.json").read_text())["verdict"] == "differ"
     poses, effects = ET.parse(tmp_path / "junit.xml").getroot().findall("testsuite")

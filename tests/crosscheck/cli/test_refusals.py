@@ -216,7 +216,8 @@ def test_what_else_had_no_effect(stiff: tuple[Path, Path], tmp_path: Path) -> No
     assert "--sigma position=1mm: expected one for the position, got two; leave one out" in refused(
         "compare", *stiff, *twice
     )
-    for other in ((robot,), ("--hide", 3), ("--tensions",), ("--poses", data)):
+    folder = ("--out", tmp_path / "there")
+    for other in ((robot,), ("--hide", 3), ("--tensions",), ("--poses", data), folder):
         assert "--open shows an existing case; leave out all other options but --json" in refused(
             "twin", "--open", tmp_path, *other
         )

@@ -237,8 +237,10 @@ def test_files_of_different_robots(files, tmp_path):
     other = load_robot(model_path("planar_vertical"))
     assert "are these the commands of another robot?" in wrong(files, robot=other)
     takes, logs = [files["motive"], files["motive"]], [files["commands"]]
-    with pytest.raises(SeecrError, match="a log of commands for each of 2 recordings, got 1"):
+    with pytest.raises(SeecrError, match="2 command logs, one for each recording, got 1; give"):
         import_case("motive", takes, ROBOT, logs)
+    with pytest.raises(SeecrError, match="1 command log, one for each recording, got 2; give"):
+        import_case("motive", takes[:1], ROBOT, logs * 2)
 
 
 def test_a_named_point_that_is_never_seen(made, tmp_path, files):

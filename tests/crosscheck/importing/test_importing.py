@@ -19,7 +19,7 @@ from crosscheck.importing.dwells import find_dwells
 from crosscheck.importing.logged import Logged, Stream
 from crosscheck.importing.markers import aligning, body_of_markers
 from crosscheck.measurements.dwells import mean_error
-from seecr.errors import InputError
+from seecr.errors import InputError, InputFileError
 from seecr.pose import quat_rotate, rotvec_from_quat
 
 pytestmark = pytest.mark.slow
@@ -170,10 +170,15 @@ def test_recordings_are_a_case_folder_in_one_call(made, commands, tmp_path):
     case = tmp_path / "case"
     again = crosscheck.load_measurements(case / "measured.csv", case / "robot.xml")
     assert again.n_rows == found.measured.n_rows
+    sent = commands.rename(case / "measured.csv")
+    kept = sent.read_bytes()
+    with pytest.raises(InputFileError, match=r"measured\.csv: would be overwritten, but was read"):
+        crosscheck.import_case("poses", log, robot, sent, out=case)
+    assert sent.read_bytes() == kept
     with pytest.raises(InputError, match=r"^form must be one of motive, vicon, poses, got 'csv'$"):
-        crosscheck.import_case("csv", log, robot, commands)
+        crosscheck.import_case("csv", log, robot, sent)
     with pytest.raises(InputError, match=r"has different numbers from .*\.xml"):
-        crosscheck.import_case("poses", log, ROBOT, commands, out=tmp_path / "other")
+        crosscheck.import_case("poses", log, ROBOT, sent, out=tmp_path / "other")
 
 
 def test_positions_alone_and_level_commands(tmp_path):

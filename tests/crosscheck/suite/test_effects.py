@@ -49,6 +49,9 @@ def test_sag_is_run_where_it_is_large_and_tensions_go_with_the_weight(good):
     assert heavy.tension_limit == pytest.approx(1e-6 * 91.058 / 0.4)
     line = words.effects_line([good, good, heavy])
     assert "on 1 robot, cable_weight on cogiro_large against" in line
+    bad = replace(good, position_m=np.array([1.0, 1.0]))
+    assert ": 1 of 2 cases does not agree: " in words.effects_line([good, bad])
+    assert ": 2 of 2 cases do not agree: " in words.effects_line([bad, bad])
 
 
 def test_the_seed_draws_the_size():

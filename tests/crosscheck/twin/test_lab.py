@@ -104,7 +104,14 @@ def test_commands_are_the_same_to_a_tenth_of_a_nanometre() -> None:
     assert key_of(replace(case, command_pose=signs)) == key
     assert key_of(replace(case, command_pose=case.command_pose + 1e-10)) == key
     assert key_of(replace(case, command_pose=case.command_pose + 2e-9)) != key
-    assert key_of(replace(case, loads=Loads.of(2, mass=np.array(0.1)))) != key
+    hung = Loads.of(2, mass=np.array(0.1))
+    mass = key_of(replace(case, loads=hung))
+    assert mass != key
+    there = Loads.of(2, mass=np.array(0.1), centre=np.array([0.0, 0.0, -0.1]))
+    pushed = Loads.of(2, mass=np.array(0.1), wrench=np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))
+    assert len({key, mass, *(key_of(replace(case, loads=one)) for one in (there, pushed))}) == 4
+    nowhere = Loads.of(2, mass=np.array(0.1), centre=np.zeros(3), wrench=np.zeros(6))
+    assert key_of(replace(case, loads=nowhere)) == mass
     assert len(key) == 4
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import filecmp
 import json
+import shlex
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
@@ -93,13 +94,29 @@ def test_a_user_s_own_poses_are_measured_with_their_loads_and_way_points(tmp_pat
 def test_the_command_takes_poses_and_noise(tmp_path):
     path = users_poses(tmp_path)
     args = ["twin", str(COGIRO), "--hide", "1", "--effects", "0", "--poses", str(path)]
-    args += ["--sigma", "position=2um", "--sigma", "tension=0.1N", "--out", str(tmp_path / "case")]
+    args += [
+        "--sigma",
+        "position=2um",
+        "--sigma",
+        "tension=0.1N",
+        "--out",
+        str(tmp_path / "a case"),
+    ]
     result = CliRunner().invoke(main, args)
     assert result.exit_code == 0, result.output
     assert "12 rows of demobot_cogiro in 1 run; noise 0.002 mm" in result.output
-    toml = (tmp_path / "case" / "measured.toml").read_text()
+    measured = tmp_path / "a case" / "measured.csv"
+    before = measured.read_bytes()
+    args[args.index("--poses") + 1] = str(measured)
+    again = CliRunner().invoke(main, args)
+    assert again.exit_code == 2 and f"{measured}: would be overwritten, but was" in again.output
+    assert measured.read_bytes() == before
+    opening = ["twin", "--open", str(tmp_path / "a case")]
+    (shown,) = [line for line in result.output.splitlines() if line.startswith("to see ")]
+    assert shlex.split(shown.partition(": ")[2])[1:] == opening
+    toml = (tmp_path / "a case" / "measured.toml").read_text()
     assert 'start = "first_row"' in toml and "tension_N = 0.1" in toml
-    header = (tmp_path / "case" / "measured.csv").read_text().partition("\n")[0]
+    header = (tmp_path / "a case" / "measured.csv").read_text().partition("\n")[0]
     assert "payload_kg,force_x_N" in header and "tension_8_N" in header
 
 
@@ -399,7 +416,8 @@ def test_the_command_s_json_is_all_it_prints(tmp_path):
 )
 def test_bad_usage_is_one_line_and_status_2(tmp_path, args, text):
     args = [str(COGIRO) if arg == "ROBOT" else arg for arg in args]
-    run = CliRunner().invoke(main, ["twin", *args, "--out", str(tmp_path / "out")])
+    to = [] if "--open" in args else ["--out", str(tmp_path / "out")]
+    run = CliRunner().invoke(main, ["twin", *args, *to])
     assert run.exit_code == 2
     assert text in run.output and run.output.count("\n") == 1
     assert not (tmp_path / "out").exists()

@@ -240,6 +240,9 @@ def test_export_writes_a_description_and_what_mujoco_alone_reads(tmp_path: Path)
         "out-mujoco.xml, for MuJoCo alone, also contains pulley_radius",
         f"next: seecr pose {out} 0.3 0.2 0.15",
     ]  # fmt: skip
+    turned = ("0.3", "0.2", "0.15", "0.8", "0", "0", "-0.6")
+    there = run("export", "demobot_cogiro", out, *turned, "--model", model)
+    assert there.stdout.splitlines()[-1] == f"next: seecr pose {out} {' '.join(turned)}"
     np.testing.assert_allclose(load_robot(out).ea, 1.1 * robot.ea)
     assert 'type="cylinder"' in (tmp_path / "out-mujoco.xml").read_text()
     plain = run("export", "demobot_cogiro", tmp_path / "plain.xml", "--json")
@@ -497,6 +500,24 @@ def test_a_search_tells_its_evaluations_when_it_is_asked_for(tmp_path: Path) -> 
         remembered.exit_code == 2
         and "got it together with a model with history" in remembered.output
     )
+
+
+def test_incomplete_wanted_poses_are_read_again_as_they_were_stated(tmp_path: Path) -> None:
+    """Files that ``crosscheck compare`` read were refused."""
+    robot, names = load_robot(model_path("planar_vertical")), [f"length_{i}_m" for i in range(1, 5)]
+    x = float(robot.reference_pose[0]) + 0.05
+    lengths = ",".join(repr(float(one)) for one in robot.rest_lengths)
+    given, out = tmp_path / "given.csv", tmp_path / "out"
+    given.write_text(f"want_x_m,want_z_m,{','.join(names)}\n{x!r},,{lengths}\n,,{lengths}\n")
+    swept = run("sweep", "planar_vertical", given, "--no-recording", "--out", out, "--json")
+    assert swept.exit_code == 0, swept.output
+    said = json.loads(swept.stdout)
+    assert any("no deviations are given" in note for note in said["notes"])
+    assert [row["deviation_m"] for row in said["rows"]] == [None, None]
+    assert [row["wanted"][0] for row in said["rows"]] == [x, None]
+    first, again = (read_commands(path, robot) for path in (given, out / "sweep.csv"))
+    np.testing.assert_array_equal(again.wanted, first.wanted)
+    np.testing.assert_array_equal(again.commands.pose, first.commands.pose)
 
 
 def test_told_lengths_and_loads_are_read_again_as_they_were_given(tmp_path: Path) -> None:

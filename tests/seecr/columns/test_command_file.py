@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from crosscheck.measurements.read import load_commands
 from seecr.columns.command_file import read_commands
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
@@ -48,6 +49,27 @@ def test_lengths_with_the_poses_they_are_for(tmp_path: Path, robot: Robot) -> No
     assert read.run == ("a", "a", "b") and read.commands.starts.tolist() == [True, False, True]
 
 
+@pytest.mark.parametrize("cells", ["0.3,", ","])
+def test_any_part_of_a_wanted_pose_may_be_missing(tmp_path: Path, robot: Robot, cells: str) -> None:
+    """As in measurements, which ``compare`` reads: their files were refused here."""
+    lengths = ",".join(["500"] * 8)
+    text = f"want_x_m,want_y_m,{LENGTHS}\n0.4,0.25,{lengths}\n{cells},{lengths}\n"
+    path = written(tmp_path, text)
+    read = read_commands(path, robot)
+    assert "no deviations are given" in " ".join(read.notes)
+    assert read.wanted is not None and np.isnan(read.wanted[:, 2:]).all()
+    begun = load_commands(path, robot).as_commands(robot).pose
+    np.testing.assert_array_equal(read.commands.pose, begun)
+    np.testing.assert_array_equal(read.commands.pose[0, :3], [0.4, 0.25, robot.reference_pose[2]])
+
+
+def test_what_commanded_poses_were_for_does_not_count(tmp_path: Path, robot: Robot) -> None:
+    text = "want_x_m,want_y_m,cmd_x_m,cmd_y_m,cmd_z_m\n,0.1,0.3,0.2,0.1\n"
+    read = read_commands(written(tmp_path, text), robot)
+    assert read.wanted is None and not any("want" in note for note in read.notes)
+    np.testing.assert_array_equal(read.commands.pose[:, :3], [[0.3, 0.2, 0.1]])
+
+
 def test_a_planar_robot_needs_no_third_coordinate(tmp_path: Path) -> None:
     planar = load_robot(model_path("planar_vertical"))
     read = read_commands(written(tmp_path, "cmd_x_m,cmd_z_m\n0.3,0.2\n"), planar)
@@ -76,8 +98,8 @@ def test_the_toml_beside_says_what_lengths_mean_and_where_runs_start(
         ("a,b\n1,2\n", "line 1: no command; expected columns cmd_x_m cmd_y_m cmd_z_m, or length_1"),
         ("cmd_x_m,cmd_y_m\n1,2\n", "incomplete commanded pose columns: expected cmd_x_m cmd_y_m "
          "cmd_z_m, cmd_z_m missing"),
-        ("want_x_m,want_y_m,cmd_x_m,cmd_y_m,cmd_z_m\n0,0,0,0,0\n",
-         "incomplete wanted pose columns: expected want_x_m want_y_m want_z_m, want_z_m missing"),
+        (f"want_qw,want_qx,{LENGTHS}\n1,0," + ",".join(["500"] * 8),
+         "incomplete quaternion columns: expected all four or none, want_qy want_qz missing"),
         ("want_qw,want_rx_deg,cmd_x_m\n1,0,0\n",
          "the orientation is given twice, as want_qw and as want_rx_d"),
         ("cmd_x_m,cmd_y_m,cmd_z_m\n1,2,nan\n", "line 2, column cmd_z_m: expected a number in "

@@ -40,7 +40,7 @@ def test_loads_are_read_as_they_were(
     tmp_path: Path, found: Any, kind: str, centre: np.ndarray | None
 ) -> None:
     loads = Loads.of(3, mass=np.array([0.1, 0.2, 0.0]), centre=centre, wrench=WRENCH)
-    wanted = CommandFile(tmp_path, Commands(found.wanted, loads=loads), None, ("a",) * 3, ())
+    wanted = CommandFile(Commands(found.wanted, loads=loads), None, ("a",) * 3, ())
     path = tmp_path / "written.csv"
     if kind == "sweep":
         path.write_text(SweepRows(found.solution, loads=loads).csv_text())
