@@ -38,6 +38,8 @@ from seecr.effects import Terms
 
 # Most equivalents that are fitted in place of a listed member.
 _SWAPPED = 6
+# Part of its worth that an effect keeps beside something unknown if it is there itself.
+_LEFT = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +56,7 @@ class SetSearch:
         judgement: the verdict.
         in_place: something unknown in place of some members of the best set.
         varies: what something unknown changes in time beside all effects, else in place of some.
+        outdone: members of the best set of which something unknown leaves hardly anything.
     """
 
     calibration: Calibration
@@ -65,6 +68,7 @@ class SetSearch:
     judgement: Judgement
     in_place: Imitated
     varies: tuple[Varying, ...] = ()
+    outdone: Names = frozenset()
 
 
 def search_sets(
@@ -120,6 +124,8 @@ def search_sets(
     if said.imitated is not None:
         odds = max(odds, in_place.odds)
         classes = classes.without(in_place.replaced, in_place.chance)
+    outdone = _outdone(found, in_place)
+    classes = classes.without(outdone, in_place.chance)
     free = free_of(joint)
     # no size is stated if something may have been absorbed: one of that size would have shown
     shown = None if said.more or said.imitated else detectable_size(
@@ -127,7 +133,18 @@ def search_sets(
     )  # fmt: skip
     in_time = unknown.likeliest
     varies = (in_time,) if in_time else in_place.seen if in_place.chance else ()
-    return SetSearch(whole, found, catalogue, classes, odds, shown, said, in_place, varies)
+    return SetSearch(whole, found, catalogue, classes, odds, shown, said, in_place, varies, outdone)
+
+
+def _outdone(found: Found, in_place: Imitated) -> Names:
+    """Members of the best set of which something unknown leaves hardly anything.
+
+    Readings that lag look much like backlash; where they follow an unknown law that no field has
+    exactly, a little is left for backlash.
+    """
+    best, scores = found.best.names, found.scores
+    alone = {name: scores.score(best) - scores.score(best - {name}) for name in in_place.worth}
+    return frozenset(n for n, worth in in_place.worth.items() if worth < _LEFT * alone[n])
 
 
 def _classes(

@@ -15,6 +15,7 @@ import numpy as np
 from crosscheck.calibration.equals import SMALL
 from crosscheck.calibration.judgement import SURE
 from crosscheck.calibration.search import SetSearch
+from crosscheck.calibration.sets import Names
 from crosscheck.comparison.associations import Association, associations
 from crosscheck.diagnosis.chances import Chances, chances_of
 from crosscheck.diagnosis.listed import diagnosis_of, missing_of, not_listed
@@ -42,7 +43,7 @@ def unexplained(found: Search, sought: SetSearch, notes: Sequence[str]) -> Diagn
         found: the steps. sought: the compared sets. notes: notes to begin with.
     """
     chances = chances_of(sought)
-    missing, shown = _warranted(found, chances)
+    missing, shown = _warranted(found, chances, sought.outdone)
     found = shown if missing else found
     return diagnosis_of(
         DiagnosisVerdict.UNKNOWN_EFFECT,
@@ -84,20 +85,29 @@ def beside_imitated(found: Search, sought: SetSearch) -> SetSearch:
     if said.imitated is None or said.sure:
         return sought
     own = sought.found.best.names - said.imitated.replaced - said.doubted
-    missing, _search = _warranted(found, chances)
+    missing, _search = _warranted(found, chances, sought.outdone)
     sure = tuple(m.effect for m in missing if m.effect in own and m.probability > SURE)
     return replace(sought, judgement=replace(said, sure=sure))
 
 
-def _warranted(found: Search, chances: Chances) -> tuple[list[MissingEffect], Search]:
-    """The effects that may be listed though structure remains, and the search up to these."""
+def _warranted(
+    found: Search, chances: Chances, outdone: Names
+) -> tuple[list[MissingEffect], Search]:
+    """The effects that may be listed though structure remains, and the search up to these.
+
+    None are of which something unknown leaves hardly anything.
+    """
+
+    def fine(name: str) -> bool:
+        return name not in outdone and _is_warranted(found, name)
+
     # an effect that was found beside one that may not be listed may not be listed either
-    first = list(takewhile(lambda name: _is_warranted(found, name), found.found))
+    first = list(takewhile(fine, found.found))
     if first:
         search: Search | None = replace(found, steps=found.steps[: 1 + len(first)])
     else:
         search = small_effects_alone(found, SMALL, _LEAST_ALONE)
-    if search is None:
+    if search is None or outdone.intersection(search.found):
         return [], replace(found, steps=found.steps[:1])
     return [missing_of(search, name, chances) for name in search.found], search
 

@@ -18,7 +18,7 @@ from crosscheck.calibration.imitated import NOT_ASKED, Imitated, _Sets, _with_fi
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.probability import Classes
-from crosscheck.calibration.search import search_sets
+from crosscheck.calibration.search import _outdone, search_sets
 from crosscheck.calibration.sets import Scores, log_prior
 from crosscheck.calibration.varying import Varying, anywhere, varying
 from crosscheck.diagnosis.verdict import diagnose
@@ -319,3 +319,14 @@ def test_a_lens_earns_more_with_smaller_coefficients_of_higher_degrees(
     assert round_too > found + 5.0
     monkeypatch.setattr(anywhere, "SMOOTH", 1.0)
     assert found > evidence(setting, joint) + 10.0
+
+
+def test_what_keeps_hardly_anything_of_its_worth_beside_something_unknown_is_not_there() -> None:
+    """A lag of the readings once left 11 of backlash's 1294, and backlash was named for certain."""
+    best = frozenset({"backlash", "tilt"})
+    worth = {frozenset({"tilt"}): -1294.0, frozenset({"backlash"}): -174.0}
+    scores = SimpleNamespace(score=lambda names: worth.get(names, 0.0))
+    found: Any = SimpleNamespace(best=SimpleNamespace(names=best), scores=scores)
+    lag = Imitated(173.0, frozenset(), (Varying.LAG,), {"backlash": 11.4, "tilt": 171.0})
+    assert _outdone(found, lag) == {"backlash"}
+    assert _outdone(found, NOT_ASKED) == frozenset()

@@ -173,7 +173,7 @@ def test_small_effects_of_the_steps_are_listed_beside_what_others_imitate(
     warranted = {"pulley_radius": 1.0, "creep": 1.0, "stiffness": 0.9, "backlash": 1.0}
     listed = [SimpleNamespace(effect=n, probability=p) for n, p in warranted.items()]
     monkeypatch.setattr(unexplained, "chances_of", lambda _sought: None)
-    monkeypatch.setattr(unexplained, "_warranted", lambda _found, _chances: (listed, None))
+    monkeypatch.setattr(unexplained, "_warranted", lambda *_: (listed, None))
     now = beside_imitated(nothing, sought).judgement
     assert now.sure == ("pulley_radius",) and now.imitated is imitated
     # what sets say for themselves goes first, and without something unknown nothing changes

@@ -81,7 +81,7 @@ def test_structure_that_nothing_explains_is_said_with_what_it_goes_with(
     assert chances is not None
     monkeypatch.setattr(module, "chances_of", lambda _sought: chances)
     monkeypatch.setattr(module, "estimated_floor", lambda _sought: floor)
-    sought: Any = None
+    sought: Any = SimpleNamespace(outdone=frozenset())
     found = module.unexplained(search, sought, ["a note"])
     assert found.floor == floor
     assert found.verdict is DiagnosisVerdict.UNKNOWN_EFFECT and "a note" in found.notes
@@ -128,3 +128,16 @@ def test_what_may_stand_for_a_listed_effect_has_that_reason_and_what_is_in_commo
         "tracker_scale": Reason(Why.IN_COMMON, by=("drum_gain",)),
         "stiffness": mine,
     }
+
+
+def test_what_something_unknown_outdoes_is_not_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    steps: Any = SimpleNamespace(found=("backlash", "tilt"), steps=("none", "one", "two"))
+    alone: Any = SimpleNamespace(found=("backlash",))
+    monkeypatch.setattr(module, "_is_warranted", lambda _found, _name: True)
+    monkeypatch.setattr(module, "replace", lambda _found, steps: SimpleNamespace(found=steps[1:]))
+    monkeypatch.setattr(module, "missing_of", lambda _found, name, _chances: name)
+    monkeypatch.setattr(module, "small_effects_alone", lambda *_: alone)
+    chances: Any = None
+    assert module._warranted(steps, chances, frozenset())[0] == ["one", "two"]
+    assert module._warranted(steps, chances, frozenset({"tilt"}))[0] == ["one"]
+    assert module._warranted(steps, chances, frozenset({"backlash"}))[0] == []
