@@ -29,8 +29,8 @@ SURE = 0.95
 # _OPEN_BESIDE if every member of the set is sure.
 _FEW, _OPEN, _OPEN_BESIDE = 5, 1.0, 2.0
 # Effects with more parameters than a pose has can together imitate anything: more than _LARGE of
-# them are a calibration.
-_NUMBERS, _LARGE = 6, 2
+# them are a calibration. A free platform's pose has _FREE.
+_LARGE, _FREE = 2, 6
 # A set that explains less ln evidence than this may be chance and needs no name.
 _OWED = 12.5
 # Held-out runs may be so many times as far off as the fit expects.
@@ -92,6 +92,7 @@ def judge(
     beside: float = -np.inf,
     in_place: Imitated = NOT_ASKED,
     without: Mapping[Names, float] = NOTHING,
+    freedoms: int = _FREE,
 ) -> Judgement:
     """Decide on the verdict.
 
@@ -106,6 +107,7 @@ def judge(
         in_place: a field in place of some members of the best set.
         without: how probable it is that groups of its members are noise; that makes them less sure,
             but it does not take many effects.
+        freedoms: the platform's degrees of freedom.
     """
     best, undecided = found.best.names - found.always - found.idle, classes.undecided
     classes = classes.at_most(found.best.names, without)
@@ -113,7 +115,7 @@ def judge(
     sure = sure_effects(found, classes, True)
     few = len(best) <= _FEW and undecided < (_OPEN_BESIDE if set(sure) == best else _OPEN)
     more = beside > UNKNOWN
-    large = too_large(_size(found, name) for name in best)
+    large = too_large((_size(found, name) for name in best), freedoms)
     few = few and not doubted and not more and not large
     sure = adequate(found, sure) if few and sure else sure_effects(found, classes, False)
     sure = tuple(name for name in sure if name not in doubted)
@@ -149,9 +151,9 @@ def in_each(found: Found, classes: Classes) -> tuple[str, ...]:
     return tuple(sorted(sure, key=lambda e: -worth[e]))
 
 
-def too_large(sizes: Iterable[int]) -> bool:
+def too_large(sizes: Iterable[int], freedoms: int) -> bool:
     """Whether effects with these numbers of parameters are together a calibration, no diagnosis."""
-    return sum(size > _NUMBERS for size in sizes) > _LARGE
+    return sum(size > freedoms for size in sizes) > _LARGE
 
 
 def sure_effects(found: Found, classes: Classes, few: bool) -> tuple[str, ...]:

@@ -192,7 +192,9 @@ def test_a_field_in_the_place_of_members_is_something_unknown() -> None:
 
 
 def test_a_large_set_of_large_groups_is_a_calibration() -> None:
-    assert not too_large([24, 8, 6, 6, 6]) and too_large([24, 8, 7])
+    assert not too_large([24, 8, 6, 6, 6], 6) and too_large([24, 8, 7], 6)
+    # a pose in the plane has three numbers, and four cables have a gain each
+    assert not too_large([12, 4, 3, 3], 3) and too_large([12, 4, 4], 3)
     best = {"": -9000.0, "ab": -4000.0, "ac": -4100.0, "bc": -4200.0, "abc": 0.0}
     found = found_of(best)
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
