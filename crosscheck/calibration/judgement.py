@@ -9,7 +9,7 @@ explains more beside the best set, but nothing beside the whole catalogue.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,10 +21,7 @@ from crosscheck.calibration.imitated import NOT_ASKED, Imitated
 from crosscheck.calibration.probability import Classes
 from crosscheck.calibration.refits import Found
 from crosscheck.calibration.sets import Names
-from crosscheck.fit.gauss_newton import IDLE
 from crosscheck.fit.reasons import DiagnosisVerdict
-from seecr.effects import catalogue
-from seecr.prediction.experiment import senses
 
 # An effect is sure from this probability on that it or an equivalent is missing.
 SURE = 0.95
@@ -32,8 +29,8 @@ SURE = 0.95
 # _OPEN_BESIDE if every member of the set is sure.
 _FEW, _OPEN, _OPEN_BESIDE = 5, 1.0, 2.0
 # Effects with more parameters than a pose has can together imitate anything: more than _LARGE of
-# them are a calibration. A free platform's pose has _FREE.
-_LARGE, _FREE = 2, 6
+# them are a calibration.
+_NUMBERS, _LARGE = 6, 2
 # A set that explains less ln evidence than this may be chance and needs no name.
 _OWED = 12.5
 # Held-out runs may be so many times as far off as the fit expects.
@@ -95,7 +92,6 @@ def judge(
     beside: float = -np.inf,
     in_place: Imitated = NOT_ASKED,
     without: Mapping[Names, float] = NOTHING,
-    freedoms: int = _FREE,
 ) -> Judgement:
     """Decide on the verdict.
 
@@ -110,7 +106,6 @@ def judge(
         in_place: a field in place of some members of the best set.
         without: how probable it is that groups of its members are noise; that makes them less sure,
             but it does not take many effects.
-        freedoms: the platform's degrees of freedom.
     """
     best, undecided = found.best.names - found.always - found.idle, classes.undecided
     classes = classes.at_most(found.best.names, without)
@@ -118,7 +113,7 @@ def judge(
     sure = sure_effects(found, classes, True)
     few = len(best) <= _FEW and undecided < (_OPEN_BESIDE if set(sure) == best else _OPEN)
     more = beside > UNKNOWN
-    large = too_large({name: _moving(found, name) for name in best}, freedoms)
+    large = too_large(_size(found, name) for name in best)
     few = few and not doubted and not more and not large
     sure = adequate(found, sure) if few and sure else sure_effects(found, classes, False)
     sure = tuple(name for name in sure if name not in doubted)
@@ -154,16 +149,9 @@ def in_each(found: Found, classes: Classes) -> tuple[str, ...]:
     return tuple(sorted(sure, key=lambda e: -worth[e]))
 
 
-def too_large(sizes: Mapping[str, int], freedoms: int) -> bool:
-    """Whether effects with these numbers of parameters are together a calibration, no diagnosis.
-
-    Args:
-        sizes: of each effect, the number of its parameters that move readings.
-        freedoms: the platform's degrees of freedom. A tracker reads all six, of any platform.
-    """
-    tracker = {name for name, effect in catalogue().items() if senses(effect)}
-    most = {name: _FREE if name in tracker else freedoms for name in sizes}
-    return sum(size > most[name] for name, size in sizes.items()) > _LARGE
+def too_large(sizes: Iterable[int]) -> bool:
+    """Whether effects with these numbers of parameters are together a calibration, no diagnosis."""
+    return sum(size > _NUMBERS for size in sizes) > _LARGE
 
 
 def sure_effects(found: Found, classes: Classes, few: bool) -> tuple[str, ...]:
@@ -210,13 +198,6 @@ def _size(found: Found, name: str) -> int:
     """An effect's number of amplitudes; 0 if it is not in the linear model."""
     group = found.scores.gram.groups.get(name)
     return 0 if group is None else len(group.columns)
-
-
-def _moving(found: Found, name: str) -> int:
-    """How many of an effect's amplitudes move readings: not those across a robot's plane."""
-    group = found.scores.gram.groups.get(name)
-    power = np.diag(found.scores.gram.normal)
-    return 0 if group is None else int(np.sum(power[group.columns] > IDLE**2))
 
 
 def worths(found: Found) -> dict[str, float]:

@@ -99,7 +99,7 @@ def search_sets(
     beside = unknown_beside(setting, best.joint, all_stated(problem, stated)).odds
     said = judge(
         found, classes, odds, every.surprise, every.not_noise, _doubted(found), beside, in_place,
-        without, problem.robot.n_dof,
+        without,
     )  # fmt: skip
     said = said.without(nothing_by_themselves(setting, found, said))
     if said.verdict is DiagnosisVerdict.MANY_EFFECTS and said.sure:

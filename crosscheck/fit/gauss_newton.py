@@ -29,7 +29,7 @@ PRIOR_SIZES = 10.0
 UNSEEN_SIZES = 100.0
 # A parameter of which a plausible size moves the readings by less than this part of their noise
 # moves none.
-IDLE = 1e-5
+_IDLE = 1e-5
 _ITERATIONS = 40
 _GAIN = 1e-3
 # Most trials of a step, each damped ten times more than the last; longest step, in plausible sizes.
@@ -118,11 +118,6 @@ class Fit:
         """(p,) standard errors; inf for a parameter that is not identifiable."""
         return np.sqrt(np.diag(self.covariance))
 
-    def moving(self, effect: str) -> int:
-        """How many of an effect's parameters move readings: not those across a robot's plane."""
-        columns = self.jacobian[:, self.terms.part(effect)]
-        return int(np.sum(np.linalg.norm(columns, axis=0) > IDLE))
-
     def with_idle(self, covariance: Array) -> Array:
         """A covariance (p, p) in which no value is unknown only because it moves no reading.
 
@@ -130,7 +125,7 @@ class Fit:
         a value is its plausible size.
         """
         out, moves = covariance.copy(), np.linalg.norm(self.jacobian, axis=0)
-        idle = np.isinf(np.diag(out)) & (moves < IDLE)
+        idle = np.isinf(np.diag(out)) & (moves < _IDLE)
         out[idle, idle] = self.terms.scale[idle] ** 2
         return out
 
