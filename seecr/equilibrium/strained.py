@@ -1,4 +1,4 @@
-"""Cables that are strained at the reference pose as no rope is: most likely a mistake in units."""
+"""Cables that are strained very much at the reference pose: most likely a mistake in units."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from seecr.pose import Array
 
 __all__ = ["strained"]
 
-# Ropes of steel break at 2 %, of fibres at 4 to 20 %, and are used far below that.
+# Twice the strain up to which ``correct`` seeks poses where no highest tension is given.
 _ODD = 0.1
 _MOST_NAMES = 2
 
@@ -26,7 +26,7 @@ def strained(robot: Robot) -> tuple[str, ...]:
     verb, upto = ("is", "") if len(odd) == 1 else ("are", "up to ")
     return (
         f"{robot.source or robot.name}: {names} {verb} strained by {upto}"
-        f"{100.0 * strains.max():.3g} % at the reference pose, more than ropes bear: is "
+        f"{100.0 * strains.max():.3g} % at the reference pose, which is much for a rope: is "
         "springlength about the distance of the sites [m], are stiffness in N/m and mass in kg?",
     )
 

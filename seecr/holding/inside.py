@@ -57,10 +57,10 @@ _GAINED = 2.0
 _NEWTON, _EXACT, _OFF = 30, 1e-12, 1e-9
 # Attempts, each with fewer loose cables.
 _AGAIN = 4
-# For a mere yes or no, rows this part of the load outside are given up.
-_HOPELESS = 0.1
 # Loose cables are also sought from these multiples of a cable's weight, or share of the load.
 _STARTS = (1.0, 3.0)
+HOPELESS = 0.1
+"""For a mere yes or no, rows this part of the load outside their limits are given up."""
 
 
 @dataclass(eq=False)
@@ -121,18 +121,18 @@ def farthest_inside(tables: Tables, low: Array, high: Array, hopeless: float = n
     lost = (out.margins < 0.0) & (out.margins > -_GAINED * weighs.max(axis=1)) & could.any(axis=1)
     rows = np.flatnonzero(lost)
     if len(rows):
-        starts = out.rest, *(rest_for(tables, f * first_tensions(tables, weighs)) for f in _STARTS)
-        for first in starts:
-            some = take(tables, rows)
-            asked = [np.array(np.broadcast_to(one, weighs.shape)[rows]) for one in (low, high)]
-            _loosen(out, rows, some, could[rows], asked[0], asked[1], first[rows])
+        _loosen(out, rows, take(tables, rows), could[rows], low, high, out.rest[rows])
+        for share in _STARTS:
             rows = rows[~out.loose[rows]]
+            some = take(tables, rows)
+            first = rest_for(some, share * first_tensions(some, weighs[rows]))
+            _loosen(out, rows, some, could[rows], low, high, first)
     return out
 
 
 def holds_tightly(tables: Tables, low: Array, high: Array) -> NDArray[np.bool_]:
     """(n,) whether tensions within limits (m,) hold poses, without loose cables."""
-    found = _tightened(tables, *limits_of(tables, low, high), _HOPELESS)
+    found = _tightened(tables, *limits_of(tables, low, high), HOPELESS)
     return np.asarray(found.margins >= -_OFF * tables.scale)
 
 
@@ -291,10 +291,12 @@ def _loosen(
     Args:
         out: the results to be filled in.
         rows: (k,) of it; tables: of these.
-        loose: (k, m) cables that may be loose. low, high: (k, m) [N] limits asked for.
+        loose: (k, m) cables that may be loose.
+        low, high: (m,) or (n, m) [N] limits asked for, of all rows of ``out``.
         first: (k, m) [m] rest lengths to start from.
     """
     weight = tables.cables[..., WEIGHT] * bridged_lengths(tables)
+    low, high = (np.array(np.broadcast_to(one, out.low.shape)[rows]) for one in (low, high))
     least = np.where(loose, _LOOSEST * weight, out.low[rows])
     room, left = _OFF * tables.scale[:, None], np.arange(len(rows))
     for _ in range(_AGAIN):

@@ -26,7 +26,7 @@ from seecr.holding.balance import (
 )
 from seecr.holding.distribution import distribute
 from seecr.holding.hanging import bridged_lengths, rest_for
-from seecr.holding.inside import Inside, farthest_inside, limits_of
+from seecr.holding.inside import HOPELESS, Inside, farthest_inside, limits_of
 from seecr.pose import Array
 from seecr.statics import batch
 from seecr.statics.tables import Tables, take
@@ -46,8 +46,6 @@ _FIRM = 1e-12
 _NONE = 1e-9
 # Fractions from the aim to the tensions farthest inside, with which a pose is tried again.
 _PARTS = (0.0, 0.5, 0.75, 0.9, 1.0)
-# Rows this part of the load outside are given up.
-_HOPELESS = 0.1
 
 
 @dataclass(eq=False)
@@ -152,7 +150,7 @@ def _from_inside(
     The aim is moved towards those tensions, which hold the pose, as far as necessary.
     """
     least, most = limits
-    start = farthest_inside(take(tables, rows), low, most[rows], _HOPELESS)
+    start = farthest_inside(take(tables, rows), low, most[rows], HOPELESS)
     _put_loose(out, rows[start.loose], take(tables, rows[start.loose]), start)
     held = ~start.loose & (start.margins >= -_NONE * tables.scale[rows])
     some, inside, rest = rows[held], start.tensions[held], start.rest[held]
