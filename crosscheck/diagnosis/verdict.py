@@ -22,7 +22,7 @@ from crosscheck.fit.candidates import candidates_for, null_fit
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.possible import hardly_happens
 from crosscheck.fit.prepare import Prepared, Progress, noise_floor, prepare
-from crosscheck.fit.problem import Problem, kinds_read, kinds_stated, rms_by_kind
+from crosscheck.fit.problem import Problem, Rms, kinds_read, kinds_stated, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Refusal, Unfit, Why
 from crosscheck.fit.thinned import thinned
 from crosscheck.fit.tolerance import HALF_THE_NOISE, Tolerance
@@ -94,14 +94,24 @@ def _may_be_noise(found: Diagnosis, problem: Problem) -> bool:
     """Whether the structure that was found may be autocorrelated noise whose size was not stated.
 
     With few rows no statistic separates the two, and effects of many parameters absorb a part of
-    such noise. Effects that remove most of the error are no noise.
+    such noise. Effects that remove most of the error are no noise, nor is an error most of which
+    all effects together foretell in runs that they have not seen.
     """
     if kinds_stated(problem) or problem.n_readings >= _FEW_READINGS:
         return False
     if found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         return False
-    pairs = [(was, found.after[key]) for key, was in found.before.items()]
-    return all(was < _MOST_OF_IT * now for was, now in pairs if was is not None and now is not None)
+    together = None if found.chances is None else found.chances.together
+    left = [found.after] if together is None else [found.after, together.held_out]
+    return all(_most_is_left(found.before, now) for now in left)
+
+
+def _most_is_left(before: Rms, now: Rms) -> bool:
+    """Whether errors of every kind have not fallen much."""
+    pairs = [(was, now[key]) for key, was in before.items()]
+    return all(
+        was < _MOST_OF_IT * left for was, left in pairs if was is not None and left is not None
+    )
 
 
 Notes = tuple[str, ...]

@@ -53,21 +53,26 @@ def test_structure_in_few_rows_may_be_noise_that_nobody_stated() -> None:
 
 
 @pytest.mark.parametrize(
-    "verdict, after_m, may_be",
+    "verdict, after_m, foretold_m, may_be",
     [
-        (DiagnosisVerdict.EFFECTS_FOUND, 1.5e-4, True),
-        (DiagnosisVerdict.EFFECTS_FOUND, 0.5e-4, False),  # no noise falls to a quarter
-        (DiagnosisVerdict.UNKNOWN_EFFECT, 2.0e-4, True),
-        (DiagnosisVerdict.NO_EFFECT_MISSING, 2.0e-4, False),
+        (DiagnosisVerdict.EFFECTS_FOUND, 1.5e-4, None, True),
+        (DiagnosisVerdict.EFFECTS_FOUND, 0.5e-4, None, False),  # no noise falls to a quarter
+        (DiagnosisVerdict.UNKNOWN_EFFECT, 2.0e-4, None, True),
+        (DiagnosisVerdict.UNKNOWN_EFFECT, 2.0e-4, 1.5e-4, True),
+        (DiagnosisVerdict.NO_EFFECT_MISSING, 2.0e-4, None, False),
+        # nothing is listed, but noise could not be foretold
+        (DiagnosisVerdict.MANY_EFFECTS, 2.0e-4, 0.5e-4, False),
     ],
 )
 def test_a_name_in_few_rows_has_to_remove_most_of_the_error(
-    verdict: DiagnosisVerdict, after_m: float, may_be: bool
+    verdict: DiagnosisVerdict, after_m: float, foretold_m: float | None, may_be: bool
 ) -> None:
     """Of 16 null sets of 20 or 36 rows three had a name: many parameters absorb such noise."""
     read = {"orientation_rms_rad": None, "tension_rms_N": None}
+    together = SimpleNamespace(held_out={"position_rms_m": foretold_m, **read})
     found = SimpleNamespace(
         verdict=verdict, missing=("exit_point_error",),
+        chances=SimpleNamespace(together=together) if foretold_m else None,
         before={"position_rms_m": 2e-4, **read}, after={"position_rms_m": after_m, **read},
     )  # fmt: skip
     data = drifting(20)
