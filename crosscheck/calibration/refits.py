@@ -216,7 +216,11 @@ def looked_about(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Ref
     member would seem sure.
     """
     while True:
-        better = exact.best_of(scores, _beside(exact, scores, best.names))
+        some = _beside(exact, scores, best.names)
+        exact.best_of(scores, some)
+        for names in some:
+            _begin_at(exact, scores, best, names)
+        better = exact.best_of(scores, [])
         better = exact.best_of(scores, containing(exact, better))
         if better.names == best.names:
             return scores, best
@@ -234,6 +238,17 @@ def _beside(exact: Exact, scores: Scores, names: Names) -> list[Names]:
 
     some = [other for other in near if len(other) <= len(names) and as_good(other)]
     return sorted(some, key=lambda other: (-near[other], sorted(other)))[:_BESIDE]
+
+
+def _begin_at(exact: Exact, scores: Scores, best: Refit, names: Names) -> None:
+    """Fit a part of the best set from its values, if far more is promised there than was found.
+
+    At its other members' shapes (a reference temperature, a time) it may explain as much, which a
+    fit from other shapes misses.
+    """
+    own = exact.fitted[names]
+    if names < best.names and (own is None or own.score < scores.score(names) - LOCAL_MINIMUM):
+        exact.take(scores, Terms(t for t in best.joint.terms if t.name in names))
 
 
 def containing(exact: Exact, best: Refit) -> list[Names]:

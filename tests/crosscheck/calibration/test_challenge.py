@@ -175,6 +175,31 @@ def test_who_stands_in_a_members_place_is_fitted_whatever_larger_sets_there_are(
     assert found.effect["a"] < 0.7 and found.of("a") > 0.99
 
 
+@pytest.mark.parametrize("lost, again", [(30.0, True), (3.0, False)])
+def test_a_part_of_the_best_set_begins_at_its_values_if_far_more_is_promised(
+    monkeypatch: pytest.MonkeyPatch, lost: float, again: bool
+) -> None:
+    """Creep was fitted from a time that it does not have, and a tilt of gravity made up for it."""
+    exact, begun = Linear(gram({"a": 2.0})), list[list[str]]()
+    both: Any = Terms([SimpleNamespace(name="a"), SimpleNamespace(name="b")])  # type: ignore[list-item]
+    joint: Any = SimpleNamespace(terms=both)
+    part, whole = frozenset("a"), frozenset("ab")
+    promised = exact.scores.score(part)
+    found = Refit(part, NO_FIT, {}, promised)
+    exact.fitted[whole] = Refit(whole, joint, {}, exact.scores.score(whole))
+    exact.fitted[part] = Refit(part, NO_FIT, {}, promised - lost)
+
+    def take(_scores: Scores, start: Terms) -> None:
+        begun.append([term.name for term in start])
+        exact.fitted[part] = found
+
+    monkeypatch.setattr(exact, "take", take)
+    monkeypatch.setattr(refits, "containing", lambda _exact, _best: [])
+    _scores, best = looked_about(exact, exact.scores, exact.possible[whole])
+    assert begun == ([["a"]] if again else [])
+    assert (best is found) is again
+
+
 def test_what_contains_a_member_and_joins_late_is_fitted_too() -> None:
     """Of friction the cable behind the exit point was told, and of both friction never."""
     exact = Linear(gram({"a": 2.0}))
