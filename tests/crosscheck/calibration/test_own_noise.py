@@ -46,8 +46,12 @@ def sought(data: Measurements) -> SetSearch:
 def test_noise_that_all_effects_followed_is_found_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """The joint fit is made to believe that what it leaves is small and not correlated."""
 
+    fits = list[Calibration]()  # of the same readings each time
+
     def followed(*args: object) -> Calibration:
-        found = fit_all_effects(*args)  # type: ignore[arg-type]
+        if not fits:
+            fits.append(fit_all_effects(*args))  # type: ignore[arg-type]
+        found = fits[0]
         small = Colour(np.array([0.25, 1.0, 1.0]), np.zeros(3))
         return replace(found, joint=replace(found.joint, colour=small))
 

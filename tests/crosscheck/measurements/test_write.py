@@ -139,7 +139,7 @@ def test_mistakes_in_parquet(tmp_path, robot, change, expected):
         load_measurements(path, robot)
 
 
-@pytest.mark.slow
+@pytest.mark.benchmark
 def test_hundred_thousand_rows_load_in_seconds(tmp_path, robot):
     n = 100_000
     rng = np.random.default_rng(1)
