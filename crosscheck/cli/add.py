@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from crosscheck.cli.choices import result_in, sigma_option
+from crosscheck.cli.choices import grown_model_option, result_in, sigma_option
 from crosscheck.cli.following import Given, after_fit
 from seecr.cli.options import FILE, json_option, made_by, progress_share
 
@@ -37,13 +37,7 @@ Examples:
     metavar="diagnosis.json",
     help="Instead of EFFECT: fit all effects that this diagnosis lists, together.",
 )
-@click.option(
-    "--model",
-    type=FILE,
-    required=True,
-    metavar="M.toml",
-    help="The model; created if it does not exist.",
-)
+@grown_model_option
 @click.option("--refit", is_flag=True, help="Refit an effect that the model already has.")
 @click.option(
     "--per",

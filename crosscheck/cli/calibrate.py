@@ -6,7 +6,13 @@ from pathlib import Path
 
 import click
 
-from crosscheck.cli.choices import exclude_option, only_option, result_in, sigma_option
+from crosscheck.cli.choices import (
+    exclude_option,
+    grown_model_option,
+    only_option,
+    result_in,
+    sigma_option,
+)
 from crosscheck.cli.following import Given, after_fit
 from seecr.cli.options import FILE, json_option, made_by, progress_share
 
@@ -21,13 +27,7 @@ Examples:
 )
 @click.argument("robot", type=FILE, metavar="ROBOT.xml")
 @click.argument("data", type=FILE, nargs=-1, required=True, metavar="DATA.csv...")
-@click.option(
-    "--model",
-    type=FILE,
-    required=True,
-    metavar="M.toml",
-    help="The model; created if it does not exist.",
-)
+@grown_model_option
 @only_option
 @exclude_option
 @sigma_option

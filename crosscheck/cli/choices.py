@@ -48,6 +48,15 @@ exclude_option = click.option(
 )
 """``--exclude EFFECT,...``, given to the command as ``exclude``, a tuple of names."""
 
+grown_model_option = click.option(
+    "--model",
+    type=FILE,
+    required=True,
+    metavar="M.toml",
+    help="The model; created if it does not exist.",
+)
+"""``--model M.toml`` of commands that add to a model, given to the command as ``model``."""
+
 tolerance_option = click.option(
     "--tolerance",
     "tolerances",
