@@ -100,6 +100,24 @@ def field_in_place(
     return replace(best, worth=worth)
 
 
+def field_beside(
+    setting: Setting, joint: JointFit, widths: Mapping[str, float], scores: Scores
+) -> Imitated:
+    """A field beside a set, in place of no member, and what each member is worth beside it.
+
+    Members that cost more evidence than they gain are left out. Args: as in
+    :func:`field_in_place`.
+    """
+    sets = _Sets.of(setting, joint, widths, scores)
+    whole = sets.needed(frozenset(joint.terms.names))
+    own = sorted(whole - scores.always)
+    if not sets.fields or not own:
+        return NOT_ASKED
+    total, seen = sets.beside(whole)
+    worth = {name: total - sets.beside(whole - {name})[0] for name in own}
+    return Imitated(total - sets.whole(whole), frozenset(), seen, worth)
+
+
 @dataclass(frozen=True, eq=False)
 class _Sets:
     """Subsets of a set in the model linearised about it, with and without a field.

@@ -9,7 +9,7 @@ explains more beside the best set, but nothing beside the whole catalogue.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,6 +41,9 @@ _PART, _WORTH = 0.1, 25.0
 # If a field explains something beside the best set, or in place of members, an effect must have few
 # parameters and carry more than this part of what all members, or those that stay, explain.
 _MOST, _ALL = 0.5, 0.95
+# Beside something unknown that all effects together leave, an effect must be worth so many times
+# what that explains.
+_FAR = 3.0
 
 NONE: Names = frozenset()
 NOTHING: Mapping[Names, float] = {}
@@ -92,6 +95,7 @@ def judge(
     beside: float = -np.inf,
     in_place: Imitated = NOT_ASKED,
     without: Mapping[Names, float] = NOTHING,
+    beside_field: Callable[[], Imitated] = lambda: NOT_ASKED,
 ) -> Judgement:
     """Decide on the verdict.
 
@@ -106,6 +110,8 @@ def judge(
         in_place: a field in place of some members of the best set.
         without: how probable it is that groups of its members are noise; that makes them less sure,
             but it does not take many effects.
+        beside_field: computes a field beside the best set; it is asked if one is likely beside all
+            effects.
     """
     best, undecided = found.best.names - found.always - found.idle, classes.undecided
     classes = classes.at_most(found.best.names, without)
@@ -128,8 +134,11 @@ def judge(
         kept = tuple(name for name in kept if name not in doubted)
         if kept or not unknown:
             return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, kept, undecided, imitated=in_place)
-    if unknown:  # known effects imitate it: none of them is sure
-        return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), undecided)
+    if unknown:  # known effects imitate it: none of them is sure but one that outweighs all else
+        # where no field explains what is unknown, nothing limits what a member may imitate of it
+        field = beside_field() if field_odds > UNKNOWN else NOT_ASKED
+        alone = tuple(n for n in outweighing(found, field) if n not in doubted)
+        return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, alone, undecided)
     if not sure and not more and undecided < _OPEN and explained_evidence(found) < _OWED:
         return Judgement(DiagnosisVerdict.NO_EFFECT_MISSING, (), undecided)
     verdict = DiagnosisVerdict.EFFECTS_FOUND if few and sure else DiagnosisVerdict.MANY_EFFECTS
@@ -192,6 +201,18 @@ def carrying_most(found: Found, worth: Mapping[str, float], part: float) -> tupl
     """
     least = max(_WORTH, part * sum(worth.values()))
     return tuple(n for n in worth if _size(found, n) <= SMALL and worth[n] > least)
+
+
+def outweighing(found: Found, field: Imitated) -> tuple[str, ...]:
+    """The member that is worth far more than all others and something unknown, if there is one.
+
+    What is unknown follows no field exactly. Members may imitate what the field misses, which is
+    less than what it explains; those of many parameters imitate more of it.
+    """
+    worth = field.worth
+    others = _ALL * sum(max(w, 0.0) for w in worth.values())
+    least = max(_WORTH, others, _FAR * field.odds)
+    return tuple(n for n, w in worth.items() if w > max(least, _OWED * _size(found, n)))
 
 
 def _size(found: Found, name: str) -> int:

@@ -11,7 +11,7 @@ from crosscheck.calibration.compared import all_stated, fit_and_compare
 from crosscheck.calibration.detectable import detectable_size
 from crosscheck.calibration.equals import EQUAL, parameters_counted
 from crosscheck.calibration.exact import FEW, Refit
-from crosscheck.calibration.imitated import Imitated, field_in_place
+from crosscheck.calibration.imitated import Imitated, field_beside, field_in_place
 from crosscheck.calibration.joint import Setting
 from crosscheck.calibration.judgement import NOTHING, Judgement, judge
 from crosscheck.calibration.linearised import free_of
@@ -99,7 +99,7 @@ def search_sets(
     beside = unknown_beside(setting, best.joint, all_stated(problem, stated)).odds
     said = judge(
         found, classes, odds, every.surprise, every.not_noise, _doubted(found), beside, in_place,
-        without,
+        without, lambda: field_beside(setting, best.joint, best.widths, found.scores),
     )  # fmt: skip
     said = said.without(nothing_by_themselves(setting, found, said))
     if said.verdict is DiagnosisVerdict.MANY_EFFECTS and said.sure:

@@ -1,6 +1,7 @@
-"""The diagnosis of data that compared sets of effects explain: by none, by a few, or by many.
+"""The diagnosis by compared sets of effects that explain the data: none, a few, or many.
 
-It may also be that something unknown explains the data better in place of some effects.
+It may also be that something unknown explains the data better in place of some effects, or that
+one effect is sure beside it.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.set_steps import fit_of, steps_of_set
 from crosscheck.diagnosis.small import share_of
 from crosscheck.diagnosis.steps import OTHER
-from crosscheck.diagnosis.unexplained import estimated_floor, where_of
+from crosscheck.diagnosis.unexplained import estimated_floor, structure_words, where_of
 from crosscheck.diagnosis.words import (
     agreement_words,
     and_what_is_left,
@@ -51,11 +52,12 @@ MORE = (
 
 def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
     """The diagnosis by compared sets of effects that leave only noise."""
-    verdict, imitated = sought.judgement.verdict, sought.judgement.imitated
+    verdict = sought.judgement.verdict
+    unknown = verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     search = steps_of_set(sought, frozenset(sought.judgement.sure))
     chances = chances_of(sought)
     more = sought.judgement.more
-    some = [] if more or imitated else alternatives(sought.found, sought.classes)
+    some = [] if more or unknown else alternatives(sought.found, sought.classes)
     if search.found and (
         len(some) < 2 or not shared(some, sought.classes).issuperset(search.found)
     ):
@@ -69,9 +71,9 @@ def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
         before=sought.calibration.before,
         floor=estimated_floor(sought),
         candidates=_not_listed(search, chances, sought.judgement, frozenset().union(*some)),
-        notes=(*notes, *_noise_notes(sought), *_size_notes(sought), *([MORE] * more)),
+        notes=(*notes, *_fit_notes(sought), *([MORE] * more)),
         chances=chances,
-        where=where_of(search) if imitated else (),
+        where=where_of(search) if unknown else (),
         alternatives=some,
     )
 
@@ -122,6 +124,13 @@ def _rival(sought: SetSearch, own: Refit, swapped: Refit, other: str) -> Rival:
     return Rival(other, fit, own.score - swapped.score)
 
 
+def _fit_notes(sought: SetSearch) -> list[str]:
+    """Notes about the fit of the best set; where it leaves structure, that is not called noise."""
+    said = sought.judgement
+    left = said.verdict is DiagnosisVerdict.UNKNOWN_EFFECT and said.imitated is None
+    return [*([] if left else _noise_notes(sought)), *_size_notes(sought)]
+
+
 def _noise_notes(sought: SetSearch) -> list[str]:
     """Notes about noise that is not as stated, and about lines that hardly count."""
     out, setting, joint = list[str](), sought.calibration.setting, sought.found.best.joint
@@ -163,6 +172,8 @@ def _sentence(
             f"{said.imitated.words}"
         )
         return and_what_is_left(words_of(missing), left, tried)
+    if said.verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
+        return structure_words(missing, tried, chances)
     if said.verdict is DiagnosisVerdict.EFFECTS_FOUND:
         left = noise_left(hints_of(chances, [m.effect for m in missing]))
         return and_what_is_left(words_of(missing), left, tried)

@@ -47,7 +47,7 @@ def unexplained(found: Search, sought: SetSearch, notes: Sequence[str]) -> Diagn
     found = shown if missing else found
     return diagnosis_of(
         DiagnosisVerdict.UNKNOWN_EFFECT,
-        _sentence(missing, found.tried, chances),
+        structure_words(missing, found.tried, chances),
         missing,
         found,
         before=rms_by_kind(found.problem, found.steps[0].fit.state.raw),
@@ -124,7 +124,8 @@ def _is_warranted(found: Search, name: str) -> bool:
     return beyond_smooth(found.problem, before.fit.state, step.fit.state, 0.0)
 
 
-def _sentence(missing: Sequence[MissingEffect], tried: int, chances: Chances) -> str:
+def structure_words(missing: Sequence[MissingEffect], tried: int, chances: Chances) -> str:
+    """The sentence about structure that remains beside what is listed."""
     like = chances.looks_like
     if not missing:
         return f"Structure remains that {none_of(tried)}: an unknown effect is missing.{like}"

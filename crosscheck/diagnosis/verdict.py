@@ -177,7 +177,9 @@ def _searched(
     said = sought.judgement
     if said.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT or said.imitated is not None:
         return explained(beside_imitated(found, sought), notes)
-    return unexplained(found, sought, (*notes, *more))
+    by_step = unexplained(found, sought, (*notes, *more))
+    # the steps take effects first that imitate what is unknown together with what is known
+    return explained(sought, notes) if said.sure and not by_step.missing else by_step
 
 
 def is_clear(steps: Diagnosis) -> bool:

@@ -167,7 +167,7 @@ def test_a_field_beside_the_best_set_alone_makes_it_many() -> None:
 def test_a_field_in_the_place_of_members_is_something_unknown() -> None:
     found = found_of({"": -9000.0, "a": -30.0, "b": -8970.0, "ab": 0.0})
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
-    here = Imitated(6.0, frozenset("b"), "", {"a": 800.0})
+    here = Imitated(6.0, frozenset("b"), (), {"a": 800.0})
 
     def said(in_place: Imitated, of: Found = found, doubted: Names = frozenset()) -> Judgement:
         return judge(of, classes, -5.0, 1.0, doubted=doubted, in_place=in_place)
@@ -189,6 +189,34 @@ def test_a_field_in_the_place_of_members_is_something_unknown() -> None:
     far = judge(found, classes, -5.0, 9.0, in_place=replace(here, worth={"a": 20.0}))
     assert (far.verdict, far.sure) == (DiagnosisVerdict.UNKNOWN_EFFECT, ())
     assert far.imitated is None
+
+
+def test_beside_what_all_effects_leave_one_is_sure_that_outweighs_all_else() -> None:
+    """Platform misplaced by a hundred times the noise, while the tracker drifts by ten."""
+    found = found_of({"": -9000.0, "a": -30.0, "b": -8970.0, "ab": 0.0})
+    classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
+    field = Imitated(20.0, frozenset(), (), {"a": 800.0, "b": 5.0})
+
+    def sure(beside: Imitated, of: Found = found, doubted: Names = frozenset()) -> tuple[str, ...]:
+        said = judge(of, classes, 9.0, 1.0, doubted=doubted, beside_field=lambda: beside)
+        assert said.verdict is DiagnosisVerdict.UNKNOWN_EFFECT and said.imitated is None
+        return said.sure
+
+    assert sure(field) == ("a",)
+    # not if others are worth something too, the field is worth a third as much, or it is little
+    assert sure(replace(field, worth={"a": 800.0, "b": 80.0})) == ()
+    assert sure(replace(field, odds=270.0)) == ()
+    assert sure(replace(field, odds=0.0, worth={"a": 20.0})) == ()
+    assert sure(field, doubted=frozenset("a")) == ()
+    # nor one of many parameters that is not worth more for it
+    seven = ColumnGroup(np.arange(7), np.array([1.0]))
+    grown = replace(found.scores.gram, groups={**found.scores.gram.groups, "a": seven})
+    large = replace(found, scores=replace(found.scores, gram=grown))
+    assert sure(field, large) == ("a",)
+    assert sure(replace(field, worth={"a": 80.0}), large) == ()
+    # and if no field explains what is unknown, a may follow it
+    far = judge(found, classes, -5.0, 9.0, beside_field=lambda: field)
+    assert (far.verdict, far.sure) == (DiagnosisVerdict.UNKNOWN_EFFECT, ())
 
 
 def test_a_large_set_of_large_groups_is_a_calibration() -> None:
