@@ -32,7 +32,7 @@ _DOUBT = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Imitated:
-    """A field in place of some members of a set.
+    """A field in place of some members of a set, or of none.
 
     Attributes:
         odds: ln odds of the field with the rest of the set over the whole set, with equal priors
@@ -96,8 +96,7 @@ def field_in_place(
     if not best.chance:
         return best
     rest, total = whole - best.replaced, without + best.odds
-    worth = {n: total - sets.beside(rest - {n})[0] for n in sorted(rest - scores.always)}
-    return replace(best, worth=worth)
+    return replace(best, worth=sets.worths_beside(rest, total))
 
 
 def field_beside(
@@ -110,11 +109,10 @@ def field_beside(
     """
     sets = _Sets.of(setting, joint, widths, scores)
     whole = sets.needed(frozenset(joint.terms.names))
-    own = sorted(whole - scores.always)
-    if not sets.fields or not own:
+    if not sets.fields or not whole - scores.always:
         return NOT_ASKED
     total, seen = sets.beside(whole)
-    worth = {name: total - sets.beside(whole - {name})[0] for name in own}
+    worth = sets.worths_beside(whole, total)
     return Imitated(total - sets.whole(whole), frozenset(), seen, worth)
 
 
@@ -176,6 +174,15 @@ class _Sets:
             every[name] = there.log_evidence + averaging(there, name)
         total = float(special.logsumexp(list(every.values())) - np.log(len(every)))
         return total + self._before(names), self._likely(every)
+
+    def worths_beside(self, names: Names, total: float) -> dict[str, float]:
+        """ln evidence that each member of a subset is worth beside a field.
+
+        Args:
+            names: the subset. total: what :meth:`beside` gives for it.
+        """
+        own = sorted(names - self.scores.always)
+        return {name: total - self.beside(names - {name})[0] for name in own}
 
     def _likely(self, every: Mapping[str, float]) -> tuple[Varying, ...]:
         """What is likely to vary, the likeliest first, by the ln evidence of each field."""

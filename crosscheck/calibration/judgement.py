@@ -206,8 +206,8 @@ def carrying_most(found: Found, worth: Mapping[str, float], part: float) -> tupl
 def outweighing(found: Found, field: Imitated) -> tuple[str, ...]:
     """The member that is worth far more than all others and something unknown, if there is one.
 
-    What is unknown follows no field exactly. Members may imitate what the field misses, which is
-    less than what it explains; those of many parameters imitate more of it.
+    What is unknown follows no field exactly. Members may imitate what the field misses, those of
+    many parameters more of it: worth that is to count is several times what the field explains.
     """
     worth = field.worth
     others = _ALL * sum(max(w, 0.0) for w in worth.values())

@@ -216,12 +216,10 @@ def looked_about(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Ref
     member would seem sure.
     """
     while True:
-        some = _beside(exact, scores, best.names)
-        exact.best_of(scores, some)
-        for names in some:
+        for names in _beside(exact, scores, best.names):
+            exact.fit(scores, names)
             _begin_at(exact, scores, best, names)
-        better = exact.best_of(scores, [])
-        better = exact.best_of(scores, containing(exact, better))
+        better = exact.best_of(scores, containing(exact, exact.best_of(scores, [])))
         if better.names == best.names:
             return scores, best
         best = better
@@ -243,8 +241,8 @@ def _beside(exact: Exact, scores: Scores, names: Names) -> list[Names]:
 def _begin_at(exact: Exact, scores: Scores, best: Refit, names: Names) -> None:
     """Fit a part of the best set from its values, if far more is promised there than was found.
 
-    At its other members' shapes (a reference temperature, a time) it may explain as much, which a
-    fit from other shapes misses.
+    With the shapes that its members have there (a reference temperature, a time) it may explain as
+    much; a fit from other shapes misses that.
     """
     own = exact.fitted[names]
     if names < best.names and (own is None or own.score < scores.score(names) - LOCAL_MINIMUM):

@@ -124,7 +124,8 @@ def search_sets(
     if said.imitated is not None:
         odds = max(odds, in_place.odds)
         classes = classes.without(in_place.replaced, in_place.chance)
-    outdone = _outdone(found, in_place)
+    # what outweighs something unknown is there, however much of its worth that could take
+    outdone = _outdone(found, in_place) - set(() if said.imitated else said.sure)
     classes = classes.without(outdone, in_place.chance)
     free = free_of(joint)
     # no size is stated if something may have been absorbed: one of that size would have shown

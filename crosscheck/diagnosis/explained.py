@@ -51,7 +51,7 @@ MORE = (
 
 
 def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
-    """The diagnosis by compared sets of effects that leave only noise."""
+    """The diagnosis by compared sets of effects; its notes are added to these."""
     verdict = sought.judgement.verdict
     unknown = verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     search = steps_of_set(sought, frozenset(sought.judgement.sure))
