@@ -188,16 +188,15 @@ def _pulley_pull(row, start, move, up, work, force, stiffness, gradient, state):
 @jit_inner
 def _catenary(row, across, rise, guess, error, jacobian, work):
     """A catenary from its guess, else a first one, else brackets; patiently only in the end."""
-    if solve_catenary(row, across, rise, _FEW, guess, error, jacobian, work):
-        return True
-    guess[2] = 0.0  # a first guess is made
-    if solve_catenary(row, across, rise, _FEW, guess, error, jacobian, work):
-        return True
-    guess_by_brackets(row, across, rise, guess)
-    if solve_catenary(row, across, rise, _MANY, guess, error, jacobian, work):
-        return True
-    guess[2] = 0.0
-    return solve_catenary(row, across, rise, _MANY, guess, error, jacobian, work)
+    for attempt in range(4):  # one call: each would be compiled into all that needs cables
+        if attempt == 2:
+            guess_by_brackets(row, across, rise, guess)
+        elif attempt > 0:
+            guess[2] = 0.0  # a first guess is made
+        most = _FEW if attempt < 2 else _MANY
+        if solve_catenary(row, across, rise, most, guess, error, jacobian, work):
+            return True
+    return False
 
 
 @jit_inner

@@ -164,7 +164,8 @@ def straight_balance_batch(
         matrices: (k, d, m), loads: (k, d) [N], torques over the length: matrix tau = load.
     """
     m, d = cables.shape[1], loads.shape[1]
-    space, still, values = make_turning_space(m, d, screws.shape[1], 3), np.zeros(7), np.zeros(d)
+    joints, still, values = screws.shape[1], np.zeros(7), np.zeros(d)
+    space = make_turning_space(m, d, joints, joints)  # nothing is turned
     place, trial_values = space[7], space[8]
     still[3] = 1.0
     for r in range(rows.shape[0]):

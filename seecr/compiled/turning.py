@@ -256,9 +256,7 @@ def turn_batch(
         best: (n, 7), best_values: (n, d), margins: (n,) [N] the best so far, updated; minus
             infinity where there is none.
     """
-    m, d, turns = cables.shape[1], hinges.shape[0], 0
-    for k in range(d):
-        turns += hinges[k]
+    m, d, turns = cables.shape[1], hinges.shape[0], np.count_nonzero(hinges)
     space = make_turning_space(m, d, screws.shape[1], turns)
     state, other = (np.empty(7), np.zeros(d)), (np.empty(7), np.zeros(d))
     tension = space[21]

@@ -185,7 +185,9 @@ def straight_balance(tables: Tables, rows: NDArray[np.intp], away: Array) -> tup
     from seecr.compiled.straight import straight_balance_batch  # takes a while to import
 
     (m, d), k = (tables.cables.shape[1], tables.n_dof), len(rows)
-    matrices, loads, moves = np.empty((k, d, m)), np.empty((k, d)), np.ascontiguousarray(away)
+    matrices, loads = np.empty((k, d, m)), np.empty((k, d))
+    # Numba would compile everything once more for views
+    rows, moves = np.ascontiguousarray(rows), np.ascontiguousarray(away)
 
     def run(part: slice) -> None:
         straight_balance_batch(

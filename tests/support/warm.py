@@ -6,9 +6,13 @@ import numpy as np
 
 import seecr
 from seecr.commands.data import Commands
+from seecr.holding.balance import straight_balance
 from seecr.holding.distribution import distribute
+from seecr.holding.inside import can_balance, innermost
+from seecr.inverse.nearest.turned import turned_in_place
 from seecr.prediction.experiment import Experiment
 from seecr.prediction.sensitivity import sensitivities
+from seecr.statics.tables import assemble
 from seecr.workspace.zones import tension_margin
 
 # What a walk, a change of all and a change of each cable are needed for.
@@ -44,5 +48,17 @@ def compile_margins() -> None:
     for name in ("planar_vertical", "demobot_parallel"):
         robot = seecr.load_robot(seecr.model_path(name))
         tension_margin(robot, robot.reference_pose)
-    one = np.ones((1, 1))
+    one, few = np.ones((1, 1)), np.ones((1, 2))
     distribute(one[None], one, one, 0.0 * one, 2.0 * one)
+    can_balance(few[None], one, 0.0 * few, 2.0 * few, one[0])
+    innermost(few[None], one, 0.0 * few, 2.0 * few, one[0])
+    compile_turning()
+
+
+def compile_turning() -> None:
+    """Orientations of a robot with fewer cables than freedoms, and the balance at any pose."""
+    robot = seecr.load_robot(seecr.model_path("planar_two_cable"))
+    poses = np.tile(robot.reference_pose, (2, 1))
+    tables, low = assemble(Experiment(robot, Commands(poses)).setup([])), np.zeros((2, 2))
+    turned_in_place(robot, tables, low, low + np.inf)
+    straight_balance(tables, np.arange(2), np.zeros((2, robot.n_dof)))

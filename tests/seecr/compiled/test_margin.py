@@ -65,7 +65,8 @@ def test_margins_of_poses_are_those_of_their_matrices() -> None:
     low, high = np.full(8, 0.1), np.full(8, 4.0)
     ways = robot.exit_points - pose[:3] - robot.anchor_points
     units = ways / np.linalg.norm(ways, axis=1, keepdims=True)
-    matrix = np.concatenate([units, np.cross(robot.anchor_points, units)], axis=1).T
+    moments = np.cross(robot.anchor_points, units)
+    matrix = np.ascontiguousarray(np.concatenate([units, moments], axis=1).T)
     load = np.concatenate([weight, np.cross(robot.centre_of_mass, weight)])
     scale, at_pose, of_matrix = robot.weight, np.empty(1), np.empty(1)
     margins_at(
