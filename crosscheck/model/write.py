@@ -32,6 +32,8 @@ from seecr.prediction.model import CALIBRATION, FIT, Model
 from seecr.prediction.uncertainty import CORRELATION, PARAMETERS, STDERR
 
 if TYPE_CHECKING:
+    from tomlkit import TOMLDocument
+
     from crosscheck.measurements.data import Measurements
 
 Rms = Mapping[str, float | None]
@@ -80,7 +82,7 @@ def with_fit(
         covariance: (p, p) of the values in the order of ``fitted``. It is kept if all values are
             seen, since an unseen one has none. That of the previous fit is removed.
     """
-    document = copy.deepcopy(model.document)
+    document = _copied(model.document)
     tables = {str(table["name"]): table for table in document.get("effect", [])}
     order = [*model.names, *(name for name in added if name not in model.names)]
     by_name = {one.usual.term.name: one for one in _kept(model, fitted)}
@@ -101,6 +103,16 @@ def with_fit(
         if same[0] and np.all(np.isfinite(np.diag(same[1]))):
             document[FIT] = with_remarks(_with_covariance(_together(), *same), before)
     return _with_values(replace(model, document=document), [by_name[name].usual for name in order])
+
+
+def _copied(document: TOMLDocument) -> TOMLDocument:
+    """A copy to change, without one of the correlations: most of the file, and only ever replaced.
+
+    To copy the 5,000 of a robot with eight cables takes a second.
+    """
+    tables = (document.get(name) for name in (FIT, CALIBRATION))
+    arrays = (table.get(CORRELATION) for table in tables if isinstance(table, Mapping))
+    return copy.deepcopy(document, {id(array): array for array in arrays})
 
 
 def _with_values(model: Model, fitted: Sequence[Fitted]) -> Model:
@@ -128,7 +140,7 @@ def calibrated(
         provenance: of the fit.
         errors: rms by kind: "before", "after", "held_out".
     """
-    document = copy.deepcopy(model.document)
+    document = _copied(model.document)
     tables = {str(table["name"]): table for table in document.get("effect", [])}
     every = _kept(model, fitted)
     for one in every:
@@ -295,7 +307,7 @@ def renewed(model: Model, robot: Robot, data: Measurements) -> Model:
         model: with its new values.
         robot, data: that they were fitted to; the range of the data is stored.
     """
-    document = copy.deepcopy(model.document)
+    document = _copied(model.document)
     if document.get("robot") is None or model.notes:
         document["robot"] = fingerprint(robot)
     if not model.names:
@@ -340,7 +352,7 @@ def _in_step(model: Model) -> Any:
     before = Terms() if model.written is None else model.written
     if before is model.terms:
         return model.document
-    document = copy.deepcopy(model.document)
+    document = _copied(model.document)
     tables = {str(table["name"]): table for table in document.get("effect", [])}
     for name in before.names:
         if name not in model.terms:
