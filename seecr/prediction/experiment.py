@@ -36,6 +36,11 @@ _LAW_ROUNDS = 30
 _LIMIT = 400
 # If more rows than this, and than a quarter of all, are unsolved, only so many are tried first.
 _MANY, _SAMPLE = 16, 4
+# So few rows are solved at once from where a nearby prediction has them: to part them takes longer.
+_AT_ONCE = 64
+
+# Rows by their indices, or a slice of them.
+Rows = NDArray[np.intp] | slice
 
 
 @dataclass(eq=False, repr=False)
@@ -236,7 +241,7 @@ class Experiment:
             if start is None and self._first is None:
                 return batch.descend(tables, limit=_LIMIT)
 
-            def warm(rows: NDArray[np.intp]) -> batch.Evaluation:
+            def warm(rows: Rows) -> batch.Evaluation:
                 assert start is not None
                 return batch.descend(
                     take(tables, rows), start.deviation[rows], _LIMIT,
@@ -252,17 +257,17 @@ class Experiment:
             def afresh(rows: NDArray[np.intp]) -> batch.Evaluation:
                 return batch.descend(take(tables, rows), limit=_LIMIT)
 
+            n, m = tables.cables.shape[:2]
             if start is None:
-                n, m = tables.cables.shape[:2]
                 found = batch.Evaluation.empty(n, m, tables.n_dof)
+                found.outcome[:] = ITERATIONS
+            elif n <= _AT_ONCE:
+                found = warm(slice(None))
             else:
-                found = batch.take_evaluation(start, np.arange(len(start.outcome)))
-            found.outcome[:] = ITERATIONS
-            for search in (
-                *([] if start is None else [warm]),
-                *([] if self._first is None else [on_the_way]),
-                afresh,
-            ):
+                found = batch.take_evaluation(start, np.arange(n))
+                found.outcome[:] = ITERATIONS
+                found = _among(found, warm)
+            for search in (*([] if self._first is None else [on_the_way]), afresh):
                 found = _among(found, search)
             return found
 
@@ -385,6 +390,8 @@ def _among(
     step of a fit that went too far), the solver would try every row up to its limit.
     """
     lost = found.outcome != CONVERGED
+    if not lost.any():
+        return found
     rows = np.flatnonzero(lost)
     first, rest = rows, rows[:0]
     if len(rows) > max(_MANY, len(lost) // 4):

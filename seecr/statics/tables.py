@@ -188,7 +188,7 @@ def _load_scale(setup: Setup) -> Array:
     return np.where(scale > 0.0, scale, 1e-3 * float(np.max(setup.ea)))
 
 
-def take(tables: Tables, rows: NDArray[np.integer]) -> Tables:
+def take(tables: Tables, rows: NDArray[np.integer] | slice) -> Tables:
     """Some rows of the tables."""
     return Tables(
         tables.cables[rows], tables.load[rows], tables.poses[rows], tables.screws[rows],
