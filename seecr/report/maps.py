@@ -16,7 +16,7 @@ from seecr.files import written
 from seecr.pose import Array
 from seecr.prediction.data_reach import DataReach
 from seecr.report.words import SAGS, direction_words
-from seecr.units import millimetres
+from seecr.units import millimetres, significant
 from seecr.workspace.grid import Workspace
 
 __all__ = [
@@ -60,7 +60,8 @@ def softest_line(found: Workspace) -> Iterator[str]:
         at_mm = [round(1e3 * axis[k], 1) for axis, k in zip(found.axes, at, strict=True)]
         place = " ".join(f"{value + 0.0:.7g}" for value in at_mm)
         direction = direction_words(found.robot, found.softest[at])
-        yield f"softest of these at x y z {place} mm: {direction}, {found.stiffness[at]:.4g} N/m"
+        soft = significant(found.stiffness[at], 4)
+        yield f"softest of these at x y z {place} mm: {direction}, {soft} N/m"
 
 
 def sag_lines_of(found: Workspace, effects: Collection[str]) -> Iterator[str]:

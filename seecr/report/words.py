@@ -15,7 +15,7 @@ from seecr.pose import Array, pose_difference, rxyz_from_quat
 from seecr.prediction.uncertainty import Spread
 from seecr.statics.solution import Solution, Status
 from seecr.statics.tables import Tables
-from seecr.units import joules, millimetres, short, with_error
+from seecr.units import joules, millimetres, short, significant, with_error
 from seecr.workspace.bars import BarBalance
 from seecr.workspace.midlines import midline_points
 from seecr.workspace.spans import SlackSpan
@@ -150,9 +150,9 @@ def stiffness_lines(solution: Solution) -> Iterator[str]:
     elif solution.status[0] is Status.UNSTABLE:
         yield f"leaves this pose: {direction}"
     else:
-        yield f"softest direction: {direction}, {soft:.4g} N/m{_nudged(solution)}"
+        yield f"softest direction: {direction}, {significant(soft, 4)} N/m{_nudged(solution)}"
     frequencies, shapes = (part[0] for part in solution.modes)
-    known = [f"{value:.4g}" for value in frequencies if np.isfinite(value)]
+    known = [significant(value, 4) for value in frequencies if np.isfinite(value)]
     if known:
         first = direction_words(solution.robot, shapes[:, 0])
         yield f"natural frequencies without damping: {', '.join(known)} Hz; lowest mode: {first}"

@@ -19,6 +19,7 @@ from seecr.report.words import (
     other_lines,
     pose_lines,
     span_lines,
+    stiffness_lines,
     sweep_lines,
 )
 from seecr.workspace.spans import SlackSpan
@@ -43,6 +44,15 @@ def test_a_large_robot_off_by_many_metres_has_no_exponent() -> None:
     found = seecr.solve(seecr.load_robot("camera"), [[200.0, 30.0, 10.0, 1, 0, 0, 0]])
     text = "\n".join([*pose_lines(found), str(found)])
     assert text.count("125032 mm") == 2 and "e+0" not in text, text
+
+
+def test_a_stiff_robot_has_no_exponent() -> None:
+    """A stiffness was 7.035e+06 N/m, and a frequency 1.102e+04 Hz."""
+    robot = seecr.load_robot("planar_vertical")
+    for stiffer, number in ((1e4, r" [1-9]\d{6} N/m"), (1e6, r", \d{5}, \d{5} Hz")):
+        stiff = seecr.solve(replace(robot, ea=stiffer * robot.ea), [robot.reference_pose])
+        text = "\n".join(stiffness_lines(stiff))
+        assert re.search(number, text), text
 
 
 def test_a_platform_that_hangs_twisted_is_told_so() -> None:
