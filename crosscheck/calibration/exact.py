@@ -25,7 +25,7 @@ _STEPS = 12
 # If a refit is worse than its linear evidence by this much, it may have ended in a local minimum,
 # and is repeated from other starting points.
 LOCAL_MINIMUM = 8.0
-# Sets up to this size are tried from more starting points, and without each of their members.
+# Sets up to this size are tried from more starting points.
 FEW = 5
 
 

@@ -31,6 +31,8 @@ ROUNDS = 4
 _BESIDE = 6
 # Most rounds of challenges: a challenger that wins is challenged in turn.
 _CHALLENGES = 3
+# Sets up to this size are tried without each of their members.
+_THINNED = 8
 # A set that is worse than the best by no more than this explains as much.
 _AS_MUCH = 12.5
 
@@ -147,7 +149,7 @@ def _searched(exact: Exact, scores: Scores, begin: Names, most: int) -> Refit:
 
 def _thinned(exact: Exact, scores: Scores, best: Refit) -> Refit:
     """The best set after dropping members, by exact fits, as long as that improves it."""
-    while len(own := best.names - scores.always) <= FEW:
+    while len(own := best.names - scores.always) <= _THINNED:
         for name in sorted(own):
             if does_nothing(exact.setting, best, name):
                 # without it its values still serve; a fit from another start may miss them

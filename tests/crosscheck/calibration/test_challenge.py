@@ -262,3 +262,20 @@ def test_what_is_left_without_such_a_member_starts_where_it_is(
     )
     assert refits._thinned(exact, exact.scores, best).names == frozenset("a")
     assert taken == [frozenset("a")]
+
+
+@pytest.mark.parametrize("size", [6, 8, 9])
+def test_sets_of_up_to_eight_are_fitted_without_each_member(
+    monkeypatch: pytest.MonkeyPatch, size: int
+) -> None:
+    """A cable behind the winches held six together, where four explained more by other values."""
+    exact, letters = Linear(gram({"a": 2.0})), "abcdefghi"[:size]
+    monkeypatch.setattr(refits, "does_nothing", lambda _setting, _found, _name: False)
+    best = Refit(frozenset(letters), NO_FIT, {}, 0.0)
+    exact.fitted[best.names] = best
+    for k in range(len(letters)):
+        less = best.names - {letters[k]}
+        exact.fitted[less] = Refit(less, NO_FIT, {}, 18.0 if k == 2 else -30.0)
+    monkeypatch.setattr(exact, "fit", lambda _scores, names: exact.fitted.get(names))
+    found = refits._thinned(exact, exact.scores, best).names
+    assert found == (best.names - {"c"} if size <= 8 else best.names)
