@@ -28,6 +28,8 @@ _LIKELY: dict[str, Any] = {
 }  # fmt: skip
 # Colours for poses that cannot and can be held, if margins have no numbers.
 _NO, _YES = "#D9D9D9", COLOURS[0]
+# Cells where the platform is free to move: no scale has this grey, nor stripes.
+_FREE, _STRIPES = "#D0D0D0", "#606060"
 # A grid larger than this [m] is labelled in metres.
 _LARGE = 5.0
 # Letters of a title that fit into an inch.
@@ -75,6 +77,8 @@ def map_figure(
             # at the left of their places panels leave room for their labels, however wide they get
             row[0].figure.colorbar(shown, ax=list(row), panchor=False, **_bar_of(panel, found))
             row[0].set_ylabel(f"{'xyz'[cut.high]} [{cut.unit}]")
+            if panel not in (_held_panel, _chance_panel):
+                _stripes(cut, row)
         if edge is not None:
             _dots(axes, cut, edge, at_least)
         for k, ax in zip(cut.picked, axes[0], strict=True):
@@ -164,14 +168,16 @@ def _words(cut: _Cut, edge: Array | None, at_least: float | None) -> Iterator[st
 
 
 def _white(cut: _Cut) -> Iterator[str]:
-    """The meaning of cells without a colour, if there are any."""
+    """The meaning of cells without a colour of the scales, if there are any."""
     found, shown, why = cut.found, cut.poses, []
     if not _yes_or_no(found) and not found.feasible.ravel()[shown].all():
         why.append("cannot be held (margin)")
-    if found.rests.any() and not found.rests.ravel()[shown].all():
+    if found.rests.any() and not (found.rests | found.free).ravel()[shown].all():
         why.append("does not come to rest (below it)")
     if why:
         yield "white: " + ", or ".join(why)
+    if found.rests.any() and found.free.ravel()[shown].any():
+        yield "grey with stripes: balanced, but free to move"
 
 
 def _without_end(cut: _Cut) -> Iterator[str]:
@@ -296,6 +302,22 @@ def _colours(
         ax.set_aspect("equal", anchor="W")
         ax.grid(False)
     return shown
+
+
+def _stripes(cut: _Cut, row: Any) -> None:
+    """Grey cells with stripes where the platform is free to move."""
+    import matplotlib
+    from matplotlib.colors import ListedColormap
+
+    x, y = (cut.per_metre * cut.found.axes[k] for k in (cut.wide, cut.high))
+    free = np.where(cut.found.free, 1.0, np.nan).ravel()
+    for ax, one in zip(row, cut.slices, strict=True):
+        if np.isfinite(free[one]).any():
+            with matplotlib.rc_context({"hatch.color": _STRIPES}):
+                ax.pcolor(
+                    x, y, free[one].T, cmap=ListedColormap([_FREE]), shading="nearest",
+                    hatch="/////", rasterized=True, zorder=0.5,
+                )  # fmt: skip
 
 
 def _has_edge(inside: Array) -> bool:

@@ -152,6 +152,22 @@ def test_turns_are_drawn_where_the_platform_can(drawn: Drawn, robot: Robot, turn
     assert ("turned [°]" in [ax.get_ylabel() for ax in figure.axes]) == turns
 
 
+def test_cells_where_the_platform_is_free_to_move_have_stripes(drawn: Drawn) -> None:
+    """They had been white, and white was said to be where it does not come to rest."""
+    x, y = np.linspace(0.04, 0.4, 3), np.linspace(0.04, 0.25, 3)
+    found = workspace_map(load_robot("demobot_parallel"), x, y, 0.1)
+    assert 0 < found.free.sum() < 9 and (found.rests | found.free).all()
+    one = drawn(found)
+    assert "grey with stripes: balanced, but free to move" in title(one)
+    assert "does not come to rest" not in title(one)
+    striped = [[own for own in ax.collections if own.get_hatch()] for ax in one.axes[:4]]
+    assert [len(own) for own in striped] == [0, 1, 1, 1], "the margin's panel has none"
+    assert all(len(own.get_paths()) == found.free.sum() for (own,) in striped[1:])
+    fallen = replace(found, status=np.where(found.free, 4, found.status).astype(np.int8))
+    other = title(drawn(fallen))
+    assert "does not come to rest (below it)" in other and "stripes" not in other
+
+
 def test_the_softest_pose_of_a_large_robot_has_no_exponent() -> None:
     robot = load_robot("camera")
     (line,) = softest_line(workspace_map(robot, [52.5, 60.0], [34.0], [20.0]))
