@@ -34,6 +34,7 @@ __all__ = [
     "span_lines",
     "stiffness_lines",
     "sweep_lines",
+    "unsought_lines",
 ]
 
 SAGS = (
@@ -316,6 +317,15 @@ def other_lines(
             f"{' '.join(slack) or 'none'}"
         )
         yield f"{line}; {passes[n].words}" if passes else line
+
+
+def unsought_lines(effects: Sequence[str]) -> Iterator[str]:
+    """That effects of these names, if any, lead to one rest along their way."""
+    if effects:
+        yield (
+            f"other equilibria are not sought: with {', '.join(effects)}, what the cables did "
+            "before decides where the platform rests"
+        )
 
 
 def _more_energy(more: float) -> str:
