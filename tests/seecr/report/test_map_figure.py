@@ -168,6 +168,36 @@ def test_cells_where_the_platform_is_free_to_move_have_stripes(drawn: Drawn) -> 
     assert "does not come to rest (below it)" in other and "stripes" not in other
 
 
+def test_the_stiffness_of_the_softest_direction_is_drawn(drawn: Drawn) -> None:
+    """It had been in the file of arrays alone."""
+    x, y = np.linspace(0.04, 0.76, 9), np.linspace(0.04, 0.46, 7)
+    found = workspace_map(load_robot("demobot_cogiro"), x, y, 0.1)
+    one = drawn(found)
+    bar = one.axes[-1]
+    assert bar.get_ylabel() == "stiffness of the\nsoftest direction [N/m]"
+    assert bar.get_yscale() == "log"
+    low, high = bar.get_ylim()
+    held = found.stiffness[found.feasible]
+    assert held.min() <= low < np.median(held) < high <= held.max()
+    mesh = one.axes[4].collections[0]
+    np.testing.assert_array_equal(mesh.get_array(), found.stiffness[:, :, 0].T)
+    ticks = [float(text.get_text()) for text in bar.get_yticklabels()]
+    assert len(ticks) >= 2 and min(ticks) >= low and max(ticks) <= high
+    # an elastic map alone has it
+    plain = drawn(replace(found, slack=np.full_like(found.slack, -1)))
+    assert "stiffness" not in " ".join(ax.get_ylabel() for ax in plain.axes)
+
+
+@pytest.mark.parametrize("decades", [0.0, 0.5, 1.5, 6.0])
+def test_stiffnesses_have_plain_ticks_however_far_apart(drawn: Drawn, decades: float) -> None:
+    robot = load_robot("demobot_cogiro")
+    found = workspace_map(robot, AXIS, AXIS, 0.1)
+    stiffness = 30.0 * np.logspace(0.0, decades, 9).reshape(3, 3, 1).astype(np.float32)
+    bar = drawn(replace(found, stiffness=stiffness)).axes[-1]
+    ticks = [text.get_text() for text in bar.get_yticklabels()]
+    assert 2 <= len(ticks) <= 7 and not any("e" in one or "$" in one for one in ticks), ticks
+
+
 def test_the_softest_pose_of_a_large_robot_has_no_exponent() -> None:
     robot = load_robot("camera")
     (line,) = softest_line(workspace_map(robot, [52.5, 60.0], [34.0], [20.0]))
