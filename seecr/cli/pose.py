@@ -44,8 +44,9 @@ def command(
     ROBOT is an MJCF file or the name of a shipped robot. X Y Z are metres in the base frame, QW
     QX QY QZ a quaternion, scalar first; without one the orientation is that of the reference pose.
     Other stable equilibria of the same command are searched for and listed by energy, with the
-    barrier in between. For a bar on two cables, all tilts at which it is in balance are listed,
-    with their stability; for two pairs of parallel cables in a plane, the paper's point V or H.
+    barrier in between, unless effects with a history decide where it rests. For a bar on two
+    cables, all tilts at which it is in balance are listed, with their stability; for two pairs of
+    parallel cables in a plane, the paper's point V or H.
 
     \b
     Exit status: 0 at rest, 2 bad input, 3 no equilibrium found, or a platform that is free to move
@@ -53,8 +54,8 @@ def command(
     """
     import numpy as np
 
-    from seecr import bar_balances, barriers, equilibria, midline_points, predict, solve, spread_of
-    from seecr.equilibrium.multiple import elsewhere
+    from seecr import bar_balances, barriers, equilibria, midline_points, solve, spread_of
+    from seecr.equilibrium.multiple import elsewhere, on_their_way
     from seecr.files import json_text, staged, write_text
     from seecr.report.rows import SweepRows
     from seecr.report.words import (
@@ -65,6 +66,7 @@ def command(
         other_lines,
         pose_lines,
         softest_words,
+        unsought_lines,
     )
 
     machine = robot_at(robot, cable)
@@ -72,10 +74,9 @@ def command(
     command = pose_of(coordinates, machine)
     with progress_share("solving") as tell:
         solution = solve(machine, command, effects=own or ())
-        # effects with a memory lead to one rest alone, along their way
-        memory = own is not None and predict(machine, command, own).has_history
+        lasting = [] if alone or own is None else on_their_way(machine, command, own)
         tell("other equilibria", 0.1)
-        others = None if alone or memory else equilibria(machine, command, effects=own or ())
+        others = None if alone or lasting else equilibria(machine, command, effects=own or ())
         tell("barriers", 0.6)
         passes: tuple[Barrier, ...] = ()
         if others is not None and solution.converged[0]:
@@ -90,6 +91,7 @@ def command(
     ]
     met = midline_points(solution)
     notes = list(notes_of(own, solution))
+    unsought = list(unsought_lines(lasting))
     document = {
         "made": made_by(machine.source, model),
         "exit_status": status,
@@ -104,7 +106,7 @@ def command(
         "frequencies_Hz": solution.frequencies[0],
         "equilibria": None if others is None else SweepRows(others),
         "barriers": passes,
-        "notes": notes,
+        "notes": [*notes, *unsought],
     }
     if out is not None:
         with staged(out) as folder:
@@ -118,6 +120,7 @@ def command(
         *midline_lines(solution),
         *bar_lines(*bars),
         *other_lines(solution, others, passes),
+        *unsought,
         after_pose(solution, robot, coordinates[3:], cable, own),
     ]
     for line in [*notes, *lines]:

@@ -106,9 +106,9 @@ def command(
     and a calibrated model, each pose gets the probability that it can be held. The edge is that of
     the poses that can be held, or with --at-least of those held with that probability.
 
-    Writes map.npz, map.json, a figure of slices and map.rrd. The recording has the elastic map in
-    further tabs, slice by slice on its timeline; of large grids it has some of the slices, and says
-    which.
+    Writes map.npz, map.json, a figure of slices and map.rrd. Where the elastic robot is not at
+    rest, status_names[status] of map.npz says why. The recording has the elastic map in further
+    tabs, slice by slice on its timeline; of large grids it has some of the slices, and says which.
 
     \b
     Exit status: 0 all well, 2 bad input, or no pose of the grid can be held, 3 the elastic robot

@@ -27,7 +27,7 @@ from seecr.statics.tables import take
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects
 
-__all__ = ["elsewhere", "equilibria", "other_rests"]
+__all__ = ["elsewhere", "equilibria", "on_their_way", "other_rests"]
 
 # Starts per batch, and most starts in all.
 _PART, _MOST = 256, 8192
@@ -82,6 +82,13 @@ def equilibria(
             "their way; expected none of these"
         )
     return _all_rests(solve_setup(one), repeated, most)
+
+
+def on_their_way(robot: Robot, pose: ArrayLike, effects: GivenEffects) -> list[str]:
+    """Names of the effects by which a command leads to one rest, on the way: see `equilibria`."""
+    command = Commands(commanded_poses(pose))
+    each = [(one.name, setup_with([one], robot, command)) for one in effects_of(effects, robot)]
+    return [name for name, alone in each if alone.has_history or alone.laws]
 
 
 def other_rests(

@@ -43,6 +43,7 @@ _OF_MOMENT = (
     "what a moment does on a platform that turns freely depends on the way, so it has no energy"
 )
 _OF_CABLE = "what its cables take depends on the way, or has no formula, so they have no energy"
+NO_BARRIER = "no barrier can be given"
 # A platform that is turned by more than this [rad] hangs twisted among its cables.
 TWISTED = 0.5 * np.pi
 
@@ -83,15 +84,19 @@ class Barrier(Result):
         }
 
     @property
+    def kind(self) -> str:
+        """In a word: whether pushes lead to the other equilibrium."""
+        return "twisted" if self.twisted else "reachable"
+
+    @property
     def words(self) -> str:
         """A sentence: whether pushes lead to the other equilibrium, and the energy it takes."""
         least = "" if self.exact else "at most "
-        twisted = "twisted" if self.twisted else "reachable"
         if not np.isfinite(self.energy):
-            return f"{twisted}; no barrier can be given: {self.why_not}"
+            return f"{self.kind}; {NO_BARRIER}: {self.why_not}"
         # the top of a path that was not made exact may be its end
         back = joules(self.back) if self.back > 1e-12 * self.energy else "next to nothing"
-        return f"{twisted}, {least}{joules(self.energy)} to get there, {back} back"
+        return f"{self.kind}, {least}{joules(self.energy)} to get there, {back} back"
 
     def lines(self) -> list[str]:
         """One line: ``words``."""

@@ -41,7 +41,7 @@ class Layer:
 
     Attributes:
         name: of its entity. title: of its view. unit: "" for a count.
-        values: (nx, ny, nz), NaN where the platform does not come to rest. top: end of its colours.
+        values: (nx, ny, nz), NaN where the platform is not at rest. top: end of its colours.
     """
 
     name: str
@@ -130,9 +130,8 @@ class Elastic:
             yield f"Of each slice {len(each)} of {counted(size, 'pose')}, evenly spread."
         if len(slices) > 1:
             yield "The timeline goes from slice to slice."
-        lost = int(np.sum(~found.rests))
-        if lost:
-            yield f"Without a point: {counted(lost, 'command')} where it does not come to rest."
+        if lost := _lost_words(found):
+            yield f"Without a point: {lost}."
         ends = [layer.end for layer in self.layers if layer.unit]
         yield (
             f"Colours end at {' and '.join(ends)}, as in the figure: 95 % of the "
@@ -244,6 +243,18 @@ class Elastic:
         level = abs(robot.up[self.across]) > 0.5
         above = _FROM_ABOVE if level else None
         return layout.scene_view(robot, low, high, title, aspect, contents, above)
+
+
+def _lost_words(found: Workspace) -> str:
+    """At how many commands the platform is not at rest; nothing if there are none."""
+    whys = {
+        "does not come to rest": ~found.rests & ~found.free,
+        "is free to move": found.free,
+    }
+    numbers = {why: int(poses.sum()) for why, poses in whys.items()}
+    return " and ".join(
+        f"{counted(number, 'command')} where it {why}" for why, number in numbers.items() if number
+    )
 
 
 def _legend_of(layer: Layer) -> str:

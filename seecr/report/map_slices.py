@@ -28,10 +28,16 @@ _LIKELY: dict[str, Any] = {
 }  # fmt: skip
 # Colours for poses that cannot and can be held, if margins have no numbers.
 _NO, _YES = "#D9D9D9", COLOURS[0]
+# Cells where the platform is free to move: no scale has this grey, nor stripes.
+_FREE, _STRIPES = "#D0D0D0", "#606060"
 # A grid larger than this [m] is labelled in metres.
 _LARGE = 5.0
 # Letters of a title that fit into an inch.
 _LETTERS = 13
+# Logarithmic colours end where so much of what can be held is softer, or stiffer.
+_ENDS = (0.05, 0.95)
+# Their ends are at least so far apart, as a ratio: otherwise they would show rounding.
+_APART = 1.1
 # Margins grow without limit towards the height of the exit points: their colours end at so many
 # times the median.
 _OUTSTANDING = 4.0
@@ -44,8 +50,8 @@ def map_figure(
     edge: Array | None = None,
     at_least: float | None = None,
 ) -> None:
-    """Slices of a workspace: margins, slack cables, and deviation and rotation, if it can turn, in
-    equilibrium.
+    """Slices of a workspace: margins, and in equilibrium slack cables, deviation, rotation, if the
+    platform can turn, and the stiffness of the softest direction.
 
     If the map has probabilities, they come second.
 
@@ -67,14 +73,20 @@ def map_figure(
     if np.any(found.rests):
         panels += [_slack_panel, _away_panel]
         panels += [_turn_panel] if found.robot.turns else []
+        panels.append(_soft_panel)
     n = len(cut.picked)
     size = (0.9 + 2.9 * n, 0.7 + 2.3 * len(panels))
     with figure(path, len(panels), n, sharex=True, sharey=True, figsize=size) as axes:
         for row, panel in zip(axes, panels, strict=True):
             shown = panel(cut, row)
             # at the left of their places panels leave room for their labels, however wide they get
-            row[0].figure.colorbar(shown, ax=list(row), panchor=False, **_bar_of(panel, found))
+            bar = row[0].figure.colorbar(
+                shown, ax=list(row), panchor=False, **_bar_of(panel, found)
+            )
+            bar.minorticks_off()
             row[0].set_ylabel(f"{'xyz'[cut.high]} [{cut.unit}]")
+            if panel not in (_held_panel, _chance_panel):
+                _stripes(cut, row)
         if edge is not None:
             _dots(axes, cut, edge, at_least)
         for k, ax in zip(cut.picked, axes[0], strict=True):
@@ -164,14 +176,16 @@ def _words(cut: _Cut, edge: Array | None, at_least: float | None) -> Iterator[st
 
 
 def _white(cut: _Cut) -> Iterator[str]:
-    """The meaning of cells without a colour, if there are any."""
+    """The meaning of cells without a colour of the scales, if there are any."""
     found, shown, why = cut.found, cut.poses, []
     if not _yes_or_no(found) and not found.feasible.ravel()[shown].all():
         why.append("cannot be held (margin)")
-    if found.rests.any() and not found.rests.ravel()[shown].all():
+    if found.rests.any() and not (found.rests | found.free).ravel()[shown].all():
         why.append("does not come to rest (below it)")
     if why:
         yield "white: " + ", or ".join(why)
+    if found.rests.any() and found.free.ravel()[shown].any():
+        yield "grey with stripes: balanced, but free to move"
 
 
 def _without_end(cut: _Cut) -> Iterator[str]:
@@ -214,6 +228,7 @@ def _bar_of(panel: Any, found: Workspace) -> dict[str, Any]:
         _held_panel: "tension margin [N]", _chance_panel: "probability",
         _slack_panel: "slack cables",
         _away_panel: "off the command [mm]", _turn_panel: "turned [°]",
+        _soft_panel: "stiffness of the\nsoftest direction [N/m]",
     }  # fmt: skip
     label = words[panel]
     more: dict[str, Any] = {"extend": "max"}
@@ -224,6 +239,9 @@ def _bar_of(panel: Any, found: Workspace) -> dict[str, Any]:
         more = {}
     elif panel is _slack_panel:
         more = {"ticks": np.arange(found.robot.n_cables + 1)}
+    elif panel is _soft_panel:
+        plain = FuncFormatter(lambda value, _: f"{value:.12g}")
+        more = {"extend": "both", "ticks": _ticks(*_soft_ends(found)), "format": plain}
     return {"label": label, "shrink": 0.9, **more}
 
 
@@ -275,20 +293,62 @@ def _turn_panel(cut: _Cut, row: Any) -> Any:
     return _colours(cut, row, turn, 0.0, colour_end(cut.found, turn))
 
 
+def _soft_panel(cut: _Cut, row: Any) -> Any:
+    """The smallest stiffness, on a logarithmic scale: towards the edge it falls by decades."""
+    from matplotlib.colors import LogNorm
+
+    return _colours(cut, row, _stiffness(cut.found), norm=LogNorm(*_soft_ends(cut.found)))
+
+
+def _stiffness(found: Workspace) -> Array:
+    """The stiffness of the softest direction (nx, ny, nz) [N/m], NaN where it is not positive."""
+    return np.where(found.rests & (found.stiffness > 0.0), found.stiffness, np.nan).astype(float)
+
+
+def _soft_ends(found: Workspace) -> tuple[float, float]:
+    """Ends of the colours of that stiffness, from poses that can be held, if there are any."""
+    stiffness = _stiffness(found)
+    for some in (stiffness[found.feasible], stiffness):
+        known = some[np.isfinite(some)]
+        if len(known):
+            low, high = (float(np.quantile(known, part)) for part in _ENDS)
+            wider = max(1.0, np.sqrt(_APART * low / high))
+            return low / wider, high * wider
+    return 1.0, 10.0
+
+
+def _ticks(low: float, high: float) -> Array:
+    """Round numbers between the ends of a logarithmic scale."""
+    from matplotlib.ticker import LogLocator, MaxNLocator
+
+    decades = np.log10(high / low)
+    some = (
+        MaxNLocator(5) if decades < 1.0
+        else LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2.0 else (1.0,))
+    )  # fmt: skip
+    ticks = np.asarray(some.tick_values(low, high))
+    return ticks[(ticks >= low) & (ticks <= high)]
+
+
 def _top(values: Array) -> float:
     known = values[np.isfinite(values)]
     return float(np.quantile(known, 0.95)) or 1.0 if len(known) else 1.0
 
 
 def _colours(
-    cut: _Cut, row: Any, values: Array, low: float, high: float, colours: Any = None
+    cut: _Cut, row: Any, values: Array, low: float | None = None, high: float | None = None,
+    colours: Any = None, norm: Any = None,
 ) -> Any:  # fmt: skip
-    """Coloured cells of each slice, with the edge of the workspace on top."""
+    """Coloured cells of each slice, with the edge of the workspace on top.
+
+    The colours go from ``low`` to ``high``, or as ``norm`` says.
+    """
     x, y = (cut.per_metre * cut.found.axes[k] for k in (cut.wide, cut.high))
     shown = None
     for ax, one, inside in zip(row, cut.slices, cut.inside(), strict=True):
         shown = ax.pcolormesh(
-            x, y, values.ravel()[one].T, vmin=low, vmax=high, cmap=colours, shading="nearest",
+            x, y, values.ravel()[one].T, vmin=low, vmax=high, norm=norm, cmap=colours,
+            shading="nearest",
             rasterized=True,  # otherwise lines show between the cells of an SVG
         )  # fmt: skip
         if _has_edge(inside):
@@ -296,6 +356,22 @@ def _colours(
         ax.set_aspect("equal", anchor="W")
         ax.grid(False)
     return shown
+
+
+def _stripes(cut: _Cut, row: Any) -> None:
+    """Grey cells with stripes where the platform is free to move."""
+    import matplotlib
+    from matplotlib.colors import ListedColormap
+
+    x, y = (cut.per_metre * cut.found.axes[k] for k in (cut.wide, cut.high))
+    free = np.where(cut.found.free, 1.0, np.nan).ravel()
+    for ax, one in zip(row, cut.slices, strict=True):
+        if np.isfinite(free[one]).any():
+            with matplotlib.rc_context({"hatch.color": _STRIPES}):
+                ax.pcolor(
+                    x, y, free[one].T, cmap=ListedColormap([_FREE]), shading="nearest",
+                    hatch="/////", rasterized=True, zorder=0.5,
+                )  # fmt: skip
 
 
 def _has_edge(inside: Array) -> bool:

@@ -17,7 +17,7 @@ from seecr.pose import Array
 from seecr.prediction.data_reach import DataReach
 from seecr.report.words import SAGS, direction_words
 from seecr.units import millimetres, significant
-from seecr.workspace.grid import Workspace
+from seecr.workspace.grid import STATUSES, Workspace
 
 __all__ = [
     "beyond_line", "edge_line", "likely_lines", "sag_lines_of", "softest_line", "write_arrays",
@@ -56,12 +56,9 @@ def softest_line(found: Workspace) -> Iterator[str]:
     """The softest pose of those that can be held, and the direction in which it is soft."""
     at = found.softest_at
     if at is not None:
-        # of robots of many metres, too, without an exponent
-        at_mm = [round(1e3 * axis[k], 1) for axis, k in zip(found.axes, at, strict=True)]
-        place = " ".join(f"{value + 0.0:.7g}" for value in at_mm)
         direction = direction_words(found.robot, found.softest[at])
         soft = significant(found.stiffness[at], 4)
-        yield f"softest of these at x y z {place} mm: {direction}, {soft} N/m"
+        yield f"softest of these at {found.place(at)}: {direction}, {soft} N/m"
 
 
 def sag_lines_of(found: Workspace, effects: Collection[str]) -> Iterator[str]:
@@ -78,7 +75,10 @@ def edge_line(edge: Array, tolerance: float) -> str:
 
 
 def write_arrays(path: Path, found: Workspace, edge: Array | None = None) -> None:
-    """``map.npz``: axes, results at the poses, (nx, ny, nz) each, and the edge's poses (k, 7)."""
+    """``map.npz``: axes, results at the poses, (nx, ny, nz) each, and the edge's poses (k, 7).
+
+    With an elastic map ``status_names[status]`` says at which poses it has an answer, or why not.
+    """
     x, y, z = found.axes
     with written(path) as (part,), part.open("wb") as file:
         more: dict[str, ArrayLike] = {}
@@ -86,6 +86,9 @@ def write_arrays(path: Path, found: Workspace, edge: Array | None = None) -> Non
             more["probability"] = found.chance
         if edge is not None:
             more["edge"] = edge
+        if found.status is not None:
+            more["status"] = found.status
+            more["status_names"] = [one.name.lower() for one in STATUSES]
         _write_npz(
             file, **more, x_m=x, y_m=y, z_m=z, orientation=found.orientation,
             margin_N=found.margin,

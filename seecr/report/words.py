@@ -10,7 +10,7 @@ from seecr.compiled.columns import FORCE_OF_WEIGHT, WEIGHT
 from seecr.counted import counted, figures
 from seecr.description.robot import Joint, Robot
 from seecr.equilibrium.multiple import elsewhere
-from seecr.equilibrium.passes import TWISTED, Barrier
+from seecr.equilibrium.passes import NO_BARRIER, TWISTED, Barrier
 from seecr.pose import Array, pose_difference, rxyz_from_quat
 from seecr.prediction.uncertainty import Spread
 from seecr.statics.solution import Solution, Status
@@ -34,6 +34,7 @@ __all__ = [
     "span_lines",
     "stiffness_lines",
     "sweep_lines",
+    "unsought_lines",
 ]
 
 SAGS = (
@@ -302,6 +303,8 @@ def other_lines(
     if others is None:
         return
     away = elsewhere(solution, others)
+    # why some have no barrier takes long to say, and mostly is the same for all
+    whys = dict.fromkeys(one.why_not for one in passes if one.why_not)
     if len(away) == 0:
         yield "no other stable equilibrium was found"
     for n, k in enumerate(away):
@@ -315,7 +318,19 @@ def other_lines(
             f"{_more_energy(others.energy[k] - solution.energy[0])}slack: "
             f"{' '.join(slack) or 'none'}"
         )
-        yield f"{line}; {passes[n].words}" if passes else line
+        if passes:
+            line += f"; {passes[n].kind if passes[n].why_not else passes[n].words}"
+        yield line
+    yield from (f"{NO_BARRIER}: {why}" for why in whys)
+
+
+def unsought_lines(effects: Sequence[str]) -> Iterator[str]:
+    """That effects of these names, if any, lead to one rest along their way."""
+    if effects:
+        yield (
+            f"other equilibria are not sought: with {', '.join(effects)}, what the cables did "
+            "before decides where the platform rests"
+        )
 
 
 def _more_energy(more: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,14 +13,25 @@ from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.result import Record, Result
+from seecr.statics.solution import Status
 from seecr.units import millimetres
 from seecr.workspace.margins import is_held
 
-__all__ = ["NEVER", "Workspace"]
+__all__ = ["NEVER", "STATUSES", "Workspace", "codes_of"]
 
 # Marks the number of slack cables at a pose where the elastic robot does not come to rest.
 NEVER = -1
+STATUSES = tuple(Status)
+"""What the codes of a map's statuses count: 0 is the first."""
 _FREEDOMS = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
+
+
+def codes_of(status: NDArray[np.object_]) -> NDArray[np.int8]:
+    """The code of each of some statuses (n,) of a solution, an index of :data:`STATUSES`."""
+    out = np.empty(len(status), np.int8)
+    for one in set(status):
+        out[status == one] = STATUSES.index(one)
+    return out
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -33,15 +45,17 @@ class Workspace(Result):
         margin: [N] how far inside their limits all tensions can stay; negative if the pose cannot
             be held. For robots with fewer cables than degrees of freedom it is that of the best
             orientation found in which the platform stays, and minus infinity if none was found.
-        deviation: (..., 3) [m] from the command to the elastic robot's equilibrium; NaN if it has
-            none; float32.
+        deviation: (..., 3) [m] from the command to the elastic robot's equilibrium; NaN where
+            it does not come to rest or is free to move; float32.
         rotation: (..., 3) [rad] likewise.
-        slack: number of slack cables; -1 if there is no equilibrium.
+        slack: number of slack cables; -1 where it does not come to rest or is free to move.
         stiffness: [N/m] smallest eigenvalue, with rotations times the robot's length.
         softest: (..., d) [m, rad] its direction, :attr:`Solution.softest_direction`; float32.
         chance: the probability that the pose can be held, given the uncertainty of the model;
             float32; None if it was not asked for.
         elastic: whether the equilibria of the elastic robot were computed.
+        status: how each of these solves ended, as codes: an index of ``tuple(seecr.Status)``; int8;
+            None without an elastic map.
     """
 
     robot: Robot
@@ -55,6 +69,7 @@ class Workspace(Result):
     softest: NDArray[np.float32]
     chance: NDArray[np.float32] | None = None
     elastic: bool = True
+    status: NDArray[np.int8] | None = None
 
     def likely(self, at_least: float) -> NDArray[np.bool_]:
         """The poses that can be held with at least a given probability.
@@ -99,6 +114,29 @@ class Workspace(Result):
     def rests(self) -> NDArray[np.bool_]:
         """The poses at which the elastic robot comes to rest, if that was computed."""
         return np.asarray(self.slack != NEVER)
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """The poses at which forces balance, but the elastic robot is free to move."""
+        if self.status is None:
+            return np.zeros(self.margin.shape, dtype=bool)
+        return np.asarray(self.status == STATUSES.index(Status.SINGULAR))
+
+    def _unrested(self) -> Iterator[tuple[Status, int, tuple[int, ...]]]:
+        """Why the elastic robot is not at rest: each reason, at how many poses, and the first."""
+        if self.status is None:
+            return
+        for code, status in enumerate(STATUSES):
+            own = self.status == code
+            if status is not Status.CONVERGED and own.any():
+                first = np.unravel_index(int(np.argmax(own)), own.shape)
+                yield status, int(own.sum()), tuple(map(int, first))
+
+    def place(self, at: tuple[int, ...]) -> str:
+        """Where a pose of the grid is, in words; its index is given."""
+        # of robots of many metres, too, without an exponent
+        at_mm = [round(1e3 * axis[k], 1) for axis, k in zip(self.axes, at, strict=True)]
+        return f"x y z {' '.join(f'{value + 0.0:.7g}' for value in at_mm)} mm"
 
     @property
     def cell(self) -> float:
@@ -155,6 +193,11 @@ class Workspace(Result):
             out.append(
                 f"elastic robot: at rest at {int(rests.sum())} of {counted(n, 'command')}{slack}"
             )
+            out += [
+                f"{poses} more ({status.name.lower()}), the first at {self.place(first)}: "
+                f"{status.value}"
+                for status, poses, first in self._unrested()
+            ]
             where = rests & self.feasible
             if np.any(where):
                 away = np.linalg.norm(self.deviation[where], axis=-1).max()
@@ -183,6 +226,7 @@ class Workspace(Result):
             "feasible": self.feasible.ravel(),
             **({} if self.chance is None else {"probability": self.chance.ravel()}),
             "slack": self.slack.ravel(),
+            **self._statuses(),
             **{f"d{a}_m": self.deviation[..., k].ravel() for k, a in enumerate("xyz")},
             **{f"r{a}_rad": self.rotation[..., k].ravel() for k, a in enumerate("xyz")},
             "smallest_eigenvalue_N_per_m": self.stiffness.ravel(),
@@ -193,6 +237,12 @@ class Workspace(Result):
         }
         listed = {name: values.tolist() for name, values in columns.items()}
         return [dict(zip(listed, row, strict=True)) for row in zip(*listed.values(), strict=True)]
+
+    def _statuses(self) -> dict[str, NDArray[np.object_]]:
+        """The column of names of the statuses, if there are any."""
+        if self.status is None:
+            return {}
+        return {"status": np.array([one.name for one in STATUSES], object)[self.status.ravel()]}
 
     def as_json(self, at_least: float | None = None) -> Record:
         """``map.json``: how much can be held, and the elastic robot's largest errors there.
@@ -222,6 +272,15 @@ class Workspace(Result):
             "size_feasible": self.size(self.feasible),
             "likely": likely,
             "rests": int(self.rests.sum()),
+            "not_at_rest": [
+                {
+                    "status": status,
+                    "poses": poses,
+                    "first_m": [axis[k] for axis, k in zip(self.axes, first, strict=True)],
+                    "sentence": status.value,
+                }
+                for status, poses, first in self._unrested()
+            ],
             "slack": {k: int(np.sum(counts == k)) for k in np.unique(counts)},
             "worst_where_feasible": {
                 name: float(values.max()) if len(values) else None for name, values in worst.items()

@@ -24,7 +24,7 @@ from seecr.prediction.model import GivenEffects
 from seecr.statics.starts import commanded_poses
 from seecr.threads import run_parts
 from seecr.workspace.chances import asked_chance, check_chance
-from seecr.workspace.grid import NEVER, Workspace
+from seecr.workspace.grid import NEVER, Workspace, codes_of
 from seecr.workspace.margins import margins_at, read_once
 
 Progress = Callable[[int], None]
@@ -122,7 +122,7 @@ def workspace_map(
         progress: called as poses are done.
 
     Returns:
-        margins and equilibria at all poses of the grid.
+        margins and equilibria at all poses of the grid, and why some have no equilibrium.
 
     Raises:
         InputError: an axis without values, an orientation that the joints do not allow, effects
@@ -142,6 +142,7 @@ def workspace_map(
     likely = np.empty(n, np.float32) if chance else None
     moved, stiffness = np.full((n, 6), np.nan, np.float32), np.full(n, np.nan, np.float32)
     softest = np.full((n, robot.n_dof), np.nan, np.float32)
+    status = np.empty(n, np.int8) if elastic else None
 
     def fill(part: slice) -> None:
         rows = np.arange(part.start, part.stop)
@@ -151,9 +152,10 @@ def workspace_map(
         margin[rows] = margins_at(robot, poses, lowest, highest, wrenches, effects)
         if likely is not None:
             likely[rows] = asked_chance(robot, poses, effects, lowest, highest, wrenches)
-        if elastic:
+        if status is not None:
             found = solve(robot, poses, effects=effects)
             there = found.converged
+            status[rows] = codes_of(found.status)
             moved[rows[there]] = found.deviation[there]
             slack[rows[there]] = found.slack[there].sum(axis=1)
             stiffness[rows] = np.where(there, found.smallest_eigenvalue, np.nan)
@@ -165,6 +167,7 @@ def workspace_map(
         moved[:, :3].reshape(*shape, 3), moved[:, 3:].reshape(*shape, 3),
         slack.reshape(shape), stiffness.reshape(shape), softest.reshape(*shape, -1),
         None if likely is None else likely.reshape(shape), elastic,
+        None if status is None else status.reshape(shape),
     )  # fmt: skip
 
 

@@ -9,24 +9,34 @@ when it is commanded to.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr.arguments import finite
+from seecr.commands.data import Commands
+from seecr.compiled.columns import EXTERNAL_FORCE, EXTERNAL_MOMENT
 from seecr.counted import counted
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.joints import motion_columns, values_of_pose
 from seecr.description.robot import Robot
 from seecr.errors import InputError
+from seecr.holding.balance import balance_of, bends
 from seecr.holding.distribution import tension_limits
+from seecr.holding.inside import farthest_inside
 from seecr.pose import Array, all_finite, quat_rotate, transform_points
+from seecr.prediction.experiment import Experiment, effects_of
 from seecr.result import Record, Result
 from seecr.statics.solution import Solution, check_solution
 from seecr.statics.starts import commanded_poses
+from seecr.statics.tables import Tables, assemble
 from seecr.threads import in_parts
+
+if TYPE_CHECKING:
+    from seecr.prediction.model import GivenEffects
 
 # Part of the load that may stay unbalanced, by rounding of the tensions.
 _BALANCED = 1e-9
@@ -69,8 +79,10 @@ def feasible(
     poses: ArrayLike,
     *,
     wrench: ArrayLike | None = None,
+    wrenches: ArrayLike | None = None,
     lowest: ArrayLike = 0.0,
     highest: ArrayLike = np.inf,
+    effects: GivenEffects = (),
 ) -> NDArray[np.bool_]:
     """Whether tensions within bounds can balance the load: W tau + w_e = 0 (paper, eq 3).
 
@@ -78,18 +90,25 @@ def feasible(
         robot: as described, or its MJCF; its mass, centre of mass and gravity are the load.
         poses: (n, 7) or (7,), actual poses of the platform.
         wrench: (6,) or (n, 6) external force [N] at the platform origin and moment [N m].
+        wrenches: (k, 6) a set of wrenches, each in addition to ``wrench``; the load must be
+            balanced under each of them.
         lowest: (m,) or one [N], not negative.
         highest: (m,) or one [N]; infinite for none.
+        effects: effects of the robot: a model, its file, or effects with values.
 
     Returns:
         (n,) bool.
 
     Raises:
-        InputError: wrong shapes, numbers that are not finite, quaternions that are no rotations, or
-            limits that contradict each other.
+        InputError: wrong shapes, numbers that are not finite, quaternions that are no rotations,
+            limits that contradict each other, or something other than effects with values.
+        InputFileError: there is no such file, or it holds no model of this robot.
     """
     robot = robot_of(robot)
-    margin = tension_margin(robot, poses, wrench=wrench, lowest=lowest, highest=highest)
+    margin = tension_margin(
+        robot, poses, wrench=wrench, wrenches=wrenches, lowest=lowest, highest=highest,
+        effects=effects,
+    )  # fmt: skip
     return np.asarray(margin >= -_BALANCED * load_scale(robot))
 
 
@@ -101,6 +120,7 @@ def tension_margin(
     wrenches: ArrayLike | None = None,
     lowest: ArrayLike = 0.0,
     highest: ArrayLike = np.inf,
+    effects: GivenEffects = (),
 ) -> Array:
     """How far inside their bounds all tensions that balance the load can stay [N].
 
@@ -116,13 +136,16 @@ def tension_margin(
             counts. All wrenches in their convex hull can then be balanced as well.
         lowest: (m,) or one [N], not negative.
         highest: (m,) or one [N]; infinite for none.
+        effects: effects of the robot: a model, its file, or effects with values. If cables have
+            weight or yield, their balance is not linear in the tensions; it is then solved in
+            rounds.
 
     Returns:
         (n,) [N]; minus infinity if W is singular or there are too few cables, and no tensions
         within bounds balance the load.
 
     Raises:
-        InputError: as for :func:`feasible`.
+        InputError, InputFileError: as for :func:`feasible`.
     """
     from seecr.compiled.margin import margins_at  # takes a while to import
 
@@ -131,6 +154,8 @@ def tension_margin(
     low, high = tension_limits(robot, lowest, highest)
     if wrench is not None:
         wrench = _wrench(wrench, len(places))
+    if acting := effects_of(effects, robot):
+        return margins_with(robot, places, acting, low, high, wrenches, wrench)
     out = np.full(len(places), np.nan)
     scale = load_scale(robot)
     if robot.n_cables < robot.n_dof:
@@ -152,6 +177,53 @@ def tension_margin(
         some_loads = _loads(robot, places[odd], _rows(wrench, odd), wrenches)
         out[odd] = _by_rank(*some_loads, low, high, scale)
     return out
+
+
+def margins_with(
+    robot: Robot,
+    poses: Array,
+    effects: GivenEffects,
+    lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf,
+    wrenches: ArrayLike | None = None,
+    wrench: Array | None = None,
+) -> Array:
+    """Margins (n,) [N] of :func:`seecr.tension_margin`, of a robot with effects.
+
+    Args:
+        robot, poses, effects, lowest, highest, wrenches: as there.
+        wrench: (6,) or (n, 6) [N, N m], to which each of ``wrenches`` is added.
+    """
+    low, high = tension_limits(robot, lowest, highest)
+    told = Commands(poses, lengths=robot.commanded_lengths(poses), told=True)
+    tables = assemble(Experiment(robot, told).setup(effects_of(effects, robot)))
+    if wrench is not None:
+        tables = _pushed(tables, wrench)
+    some = np.zeros((1, 6)) if wrenches is None else wrenches_of(wrenches)
+    if bends(tables):
+        every = [farthest_inside(_pushed(tables, one), low, high).margins for one in some]
+        return np.asarray(np.min(every, axis=0))
+    matrices, load = balance_of(tables, low)
+    # load of -W tau = w: the signs are those of the gradient
+    loads = load[:, None]
+    if robot.joints and wrenches is not None:
+        # of a wrench only that along the joints must be balanced
+        loads = np.stack([balance_of(_pushed(tables, one), low)[1] for one in some], axis=1)
+    elif wrenches is not None:
+        loads = loads + some * np.where(robot.hinges, 1.0 / robot.length, 1.0)
+    return margins_from(matrices, np.ascontiguousarray(loads), low, high, load_scale(robot))
+
+
+def _pushed(tables: Tables, wrench: Array) -> Tables:
+    """The same tables with an additional external wrench at the platform's origin.
+
+    Args:
+        tables: of n poses. wrench: (6,) or (n, 6) [N, N m].
+    """
+    load = tables.load.copy()
+    load[:, EXTERNAL_FORCE : EXTERNAL_FORCE + 3] += wrench[..., :3]
+    load[:, EXTERNAL_MOMENT : EXTERNAL_MOMENT + 3] += wrench[..., 3:]
+    return replace(tables, load=load)
 
 
 def margins_from(matrices: Array, loads: Array, low: Array, high: Array, scale: float) -> Array:

@@ -370,6 +370,27 @@ def test_correct_writes_commands_that_every_command_reads(tmp_path: Path) -> Non
     assert "2 cannot be held with tensions within the limits:" in lost.stdout
 
 
+def test_pose_says_that_a_history_leaves_no_other_equilibria(tmp_path: Path) -> None:
+    """It had said nothing of them, neither that there are none nor that none were sought."""
+    model = tmp_path / "model.toml"
+    model.write_text(
+        '[[effect]]\nname = "hysteresis"\n'
+        "parameters = { amplitude_N = 0.05, stretch_m = 0.001 }\n"
+        '[[effect]]\nname = "pulley_radius"\nparameters.radius_m = 0.01\n'
+    )
+    args = ["pose", "demobot_cogiro", "0.3", "0.25", "0.1", "--model", model]
+    said = (
+        "other equilibria are not sought: with hysteresis, what the cables did before decides "
+        "where the platform rests"
+    )
+    told = run(*args)
+    assert told.exit_code == 0 and said in told.stdout.splitlines()
+    document = json.loads(run(*args, "--json").stdout)
+    assert document["equilibria"] is None and said in document["notes"]
+    assert said not in run(*args, "--alone").stdout, "nobody asked"
+    assert "not sought" not in run(*args[:5]).stdout
+
+
 @pytest.mark.slow
 def test_map_writes_its_files_or_says_why_not(tmp_path: Path) -> None:
     out = tmp_path / "out"

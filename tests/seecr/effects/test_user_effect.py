@@ -9,8 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from effect_cases import experiment_of, moved, worst_mismatch
 
+from seecr.cli import main
 from seecr.effects import Effect, Term, Terms, catalogue, effect_named, layout_of, parameter
 from seecr.errors import InputError
 from seecr.prediction.sensitivity import sensitivities
@@ -134,6 +136,16 @@ def test_a_law_is_followed_along_a_walk_too(documented: None) -> None:
     slack_gear = effect_named("backlash")(gap=1e-12)
     walked = moved(experiment, [braid, slack_gear])
     assert walked == pytest.approx(moved(experiment, [braid]), rel=1e-5, abs=1e-8)
+
+
+def test_pose_answers_with_a_law_of_the_users(documented: None, tmp_path: Path) -> None:
+    """It had ended with status 2: no other equilibria can be sought."""
+    model = tmp_path / "model.toml"
+    model.write_text('[[effect]]\nname = "braid"\nparameters = { share = 0.4, knee = 5e-4 }')
+    args = ["pose", "demobot_cogiro", "0.3", "0.25", "0.1", "--model", str(model)]
+    told = CliRunner().invoke(main, args)
+    assert told.exit_code == 0, told.output
+    assert "other equilibria are not sought: with braid, " in told.stdout
 
 
 # --- what is said of one that is wrong -----------------------------------------------------------

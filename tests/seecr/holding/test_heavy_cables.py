@@ -19,7 +19,7 @@ from seecr.holding.lengths import hold
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.statics.tables import Tables, assemble
 from seecr.workspace.maps import default_axes
-from seecr.workspace.margins import margins_with
+from seecr.workspace.zones import margins_with
 
 CAMERA = load_robot(model_path("camera"))
 COGIRO = load_robot(model_path("demobot_cogiro"))

@@ -23,7 +23,7 @@ from seecr.prediction.experiment import Experiment, effects_of
 from seecr.prediction.model import load_model
 from seecr.statics.tables import Tables, assemble
 from seecr.workspace.maps import workspace_map
-from seecr.workspace.margins import margins_with
+from seecr.workspace.zones import margins_with
 
 LARGE = load_robot(model_path("cogiro_large"))
 SAG = load_model(model_path("cogiro_large").parent / "sag.toml", LARGE)

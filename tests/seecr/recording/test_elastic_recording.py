@@ -18,6 +18,7 @@ from seecr.recording.colours import scale_colours
 from seecr.recording.elastic import Elastic
 from seecr.recording.workspace import write_map_recording
 from seecr.report import map_slices
+from seecr.statics.solution import Status
 from seecr.workspace.grid import NEVER, Workspace
 from seecr.workspace.maps import workspace_map
 from seecr.workspace.slices import colour_end, evenly_picked
@@ -99,8 +100,19 @@ def test_legends_have_the_figures_ends_and_units(found: Workspace, back: Readbac
     text = str(said)
     assert "Slices normal to z: 3 of 3 values of z. The timeline goes from slice to slice." in text
     lost = int(np.sum(~found.rests))
-    assert f"Without a point: {lost} commands where it does not come to rest." in text
+    assert f"Without a point: {lost} commands where it is free to move." in text
     assert f"Colours end at {away:.4g} mm and {turn:.4g}°, as in the figure" in text
+
+
+def test_commands_without_a_point_are_told_by_their_reasons(found: Workspace) -> None:
+    assert found.status is not None
+    status = found.status.copy()
+    fallen = tuple(np.argwhere(found.free)[0])
+    status[fallen] = list(Status).index(Status.FALLING)
+    text = " ".join(Elastic(replace(found, status=status)).sentences())
+    free = int(found.free.sum()) - 1
+    said = f"1 command where it does not come to rest and {free} commands where it is free to move"
+    assert f"Without a point: {said}." in text
 
 
 def test_arrows_lead_to_where_it_rests_and_along_the_softest_direction(

@@ -152,6 +152,52 @@ def test_turns_are_drawn_where_the_platform_can(drawn: Drawn, robot: Robot, turn
     assert ("turned [°]" in [ax.get_ylabel() for ax in figure.axes]) == turns
 
 
+def test_cells_where_the_platform_is_free_to_move_have_stripes(drawn: Drawn) -> None:
+    """They had been white, and white was said to be where it does not come to rest."""
+    x, y = np.linspace(0.04, 0.4, 3), np.linspace(0.04, 0.25, 3)
+    found = workspace_map(load_robot("demobot_parallel"), x, y, 0.1)
+    assert 0 < found.free.sum() < 9 and (found.rests | found.free).all()
+    one = drawn(found)
+    assert "grey with stripes: balanced, but free to move" in title(one)
+    assert "does not come to rest" not in title(one)
+    striped = [[own for own in ax.collections if own.get_hatch()] for ax in one.axes[:4]]
+    assert [len(own) for own in striped] == [0, 1, 1, 1], "the margin's panel has none"
+    assert all(len(own.get_paths()) == found.free.sum() for (own,) in striped[1:])
+    fallen = replace(found, status=np.where(found.free, 4, found.status).astype(np.int8))
+    other = title(drawn(fallen))
+    assert "does not come to rest (below it)" in other and "stripes" not in other
+
+
+def test_the_stiffness_of_the_softest_direction_is_drawn(drawn: Drawn) -> None:
+    """It had been in the file of arrays alone."""
+    x, y = np.linspace(0.04, 0.76, 9), np.linspace(0.04, 0.46, 7)
+    found = workspace_map(load_robot("demobot_cogiro"), x, y, 0.1)
+    one = drawn(found)
+    bar = one.axes[-1]
+    assert bar.get_ylabel() == "stiffness of the\nsoftest direction [N/m]"
+    assert bar.get_yscale() == "log"
+    low, high = bar.get_ylim()
+    held = found.stiffness[found.feasible]
+    assert held.min() <= low < np.median(held) < high <= held.max()
+    mesh = one.axes[4].collections[0]
+    np.testing.assert_array_equal(mesh.get_array(), found.stiffness[:, :, 0].T)
+    ticks = [float(text.get_text()) for text in bar.get_yticklabels()]
+    assert len(ticks) >= 2 and min(ticks) >= low and max(ticks) <= high
+    # an elastic map alone has it
+    plain = drawn(replace(found, slack=np.full_like(found.slack, -1)))
+    assert "stiffness" not in " ".join(ax.get_ylabel() for ax in plain.axes)
+
+
+@pytest.mark.parametrize("decades", [0.0, 0.5, 1.5, 6.0])
+def test_stiffnesses_have_plain_ticks_however_far_apart(drawn: Drawn, decades: float) -> None:
+    robot = load_robot("demobot_cogiro")
+    found = workspace_map(robot, AXIS, AXIS, 0.1)
+    stiffness = 30.0 * np.logspace(0.0, decades, 9).reshape(3, 3, 1).astype(np.float32)
+    bar = drawn(replace(found, stiffness=stiffness)).axes[-1]
+    ticks = [text.get_text() for text in bar.get_yticklabels()]
+    assert 2 <= len(ticks) <= 7 and not any("e" in one or "$" in one for one in ticks), ticks
+
+
 def test_the_softest_pose_of_a_large_robot_has_no_exponent() -> None:
     robot = load_robot("camera")
     (line,) = softest_line(workspace_map(robot, [52.5, 60.0], [34.0], [20.0]))

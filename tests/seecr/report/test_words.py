@@ -70,11 +70,12 @@ def test_what_has_no_energy_gets_no_number() -> None:
     tilted = np.array([0.351, 0.216, 0.109, *(quat / np.linalg.norm(quat))])
     free = seecr.solve(robot, tilted, others=True)
     assert free.others is not None
-    way = [Barrier(np.nan, np.nan, tilted, False, False)]
+    way = [Barrier(np.nan, np.nan, tilted, False, False, "a moment has none")]
     rests = replace(free.others[0], energy=np.full(1, np.nan))
-    (line,) = other_lines(free, rests, way)
+    line, why = other_lines(free, rests, way)
     assert line.startswith("could also rest 15.7") and "nan" not in line
-    assert "no barrier can be given" in line
+    assert line.endswith("; reachable") and why == "no barrier can be given: a moment has none"
+    assert way[0].words == f"reachable; {why}"
     (line,) = other_lines(free, free.others[0])
     assert " mJ, slack:" in line
     # a hall's energies are told in joules; a way that ends at its top takes nothing back
@@ -108,6 +109,24 @@ def test_other_equilibria_are_told_apart() -> None:
     turned[:, 0] += [0.1, -0.1]
     lines = list(other_lines(found, replace(seecr.solve(robot, turned), energy=np.zeros(2))))
     assert len(set(lines)) == 2 and all(" mm, turned " in line for line in lines)
+
+
+def test_why_there_are_no_barriers_is_said_once() -> None:
+    """Every line of three had ended with the same 25 words."""
+    robot = seecr.load_robot(model_path("demobot_parallel"))
+    found = seecr.solve(robot, [robot.reference_pose])
+    turned = np.tile(robot.reference_pose, (3, 1))
+    turned[:, 0] += [0.1, -0.1, 0.05]
+    rests = seecr.solve(robot, turned)
+    none = [Barrier(np.nan, np.nan, pose, False, k == 1, "a reason") for k, pose in
+            enumerate(turned)]  # fmt: skip
+    *lines, why = other_lines(found, rests, none)
+    assert [line.split("; ")[-1] for line in lines] == ["reachable", "twisted", "reachable"]
+    assert why == "no barrier can be given: a reason"
+    known = Barrier(0.1, 0.2, turned[0], True, False)
+    *lines, why = other_lines(found, rests, [none[0], known, none[2]])
+    assert lines[1].endswith("reachable, 100 mJ to get there, 200 mJ back")
+    assert "a reason" not in "".join(lines) and why.endswith(": a reason")
 
 
 def test_the_furthest_is_so_by_position_and_orientation_at_once() -> None:

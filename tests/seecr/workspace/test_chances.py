@@ -25,8 +25,8 @@ from seecr.workspace import chances
 from seecr.workspace.chances import held_chance, kept_chance
 from seecr.workspace.edges import boundary
 from seecr.workspace.maps import workspace_map
-from seecr.workspace.margins import margins_at, margins_with
-from seecr.workspace.zones import tension_margin
+from seecr.workspace.margins import margins_at
+from seecr.workspace.zones import margins_with, tension_margin
 
 
 def drawn(model: Model, n: int) -> list[Terms]:

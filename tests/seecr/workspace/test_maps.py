@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import threading
 from dataclasses import replace
@@ -30,7 +31,7 @@ from seecr.planar import bar_tilt
 from seecr.pose import quat_from_rotvec
 from seecr.recording.workspace import write_map_recording
 from seecr.report.map_slices import map_figure
-from seecr.report.maps import softest_line
+from seecr.report.maps import softest_line, write_arrays
 from seecr.workspace import maps
 from seecr.workspace.edges import boundary
 from seecr.workspace.grid import Workspace
@@ -219,6 +220,54 @@ def test_a_map_is_what_each_pose_says(tmp_path: Path) -> None:
         map_figure(tmp_path / "no.png", workspace_map(robot, 0.4, 0.25, [0.1, 0.2], elastic=False))
 
 
+@pytest.mark.parametrize(
+    ("name", "axes", "why"),
+    [
+        ("demobot_parallel", ([0.04, 0.4, 0.76], [0.04, 0.25], [0.1, 0.2]), "singular"),
+        ("planar_two_cable", ([0.1, 0.5], [0.0], [0.5, 1.0]), "no_length"),
+        ("camera", ([0.0, 52.5], [0.0, 34.0], [20.0, 25.0]), "no_length"),
+    ],
+)
+def test_a_map_says_why_the_platform_is_not_at_rest(
+    name: str, axes: tuple[list[float], ...], why: str, tmp_path: Path
+) -> None:
+    """They had been NaN without a reason: some balance and are free to turn."""
+    robot = robot_named(name)
+    found = workspace_map(robot, *axes)
+    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    poses = np.column_stack([places, np.tile(robot.reference_pose[3:], (len(places), 1))])
+    alone = solve(robot, poses)
+    lost = np.flatnonzero(~alone.converged)
+    assert found.status is not None and len(lost) > 0
+    names = [one.name for one in alone.status]
+    assert [row["status"] for row in found.records()] == names
+    assert {names[row] for row in lost} == {why.upper()}
+    np.testing.assert_array_equal(
+        np.flatnonzero(found.free), lost if why == "singular" else np.array([], int)
+    )
+    sentence = alone.status[lost[0]].value
+    (said,) = (line for line in found.lines() if " more (" in line)
+    at = " ".join(f"{1e3 * x:.7g}" for x in places[lost[0]])
+    assert said == f"{len(lost)} more ({why}), the first at x y z {at} mm: {sentence}"
+    (told,) = json.loads(found.to_json())["not_at_rest"]
+    assert told == {
+        "status": why, "poses": len(lost), "first_m": places[lost[0]].tolist(),
+        "sentence": sentence,
+    }  # fmt: skip
+    write_arrays(tmp_path / "map.npz", found)
+    with np.load(tmp_path / "map.npz") as kept:
+        assert [one.upper() for one in kept["status_names"][kept["status"].ravel()]] == names
+
+
+def test_a_map_without_the_elastic_robot_has_no_status(tmp_path: Path) -> None:
+    found = workspace_map(robot_named("demobot_cogiro"), 0.4, 0.25, [0.1, 0.2], elastic=False)
+    assert found.status is None and not found.free.any() and "status" not in found.records()[0]
+    assert found.as_json()["not_at_rest"] == []
+    write_arrays(tmp_path / "map.npz", found)
+    with np.load(tmp_path / "map.npz") as kept:
+        assert "status" not in kept
+
+
 def drawn_panels(monkeypatch: pytest.MonkeyPatch, path: Path, found: Workspace) -> list[Any]:
     """Axes of a map's figure: its panels row by row, and one bar of colours for each row."""
     kept: list[Any] = []
@@ -288,7 +337,7 @@ def test_a_map_is_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
         parts = workspace_map(robot, *axes, progress=tell)
         assert sum(done) == 20 and min(done) > 0
         assert processors > 1 or done == [3, 3, 3, 3, 3, 3, 2]
-        for name in ("margin", "deviation", "rotation", "slack", "stiffness", "softest"):
+        for name in ("margin", "deviation", "rotation", "slack", "stiffness", "softest", "status"):
             np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
 
 
