@@ -24,7 +24,7 @@ from seecr.pose import Array
 def log_absent(
     setting: Setting, joint: JointFit, linear: Linear, widths: Mapping[str, float]
 ) -> float:
-    """ln evidence that parameters stopped at zero cost beside the others; hardly above 0.
+    """ln evidence that parameters stopped at zero cost beside the others; never above 0.
 
     Args:
         setting: the data.
@@ -43,7 +43,8 @@ def log_absent(
     cross = columns.T @ x
     left = linear.y - columns @ (inverse @ (columns.T @ linear.y))
     power = np.sum(x**2, axis=0) - np.sum(cross * (inverse @ cross), axis=0)
-    along = x.T @ left
+    # an optimum is pressed against the bound: what pulls away from it, the fit did not find
+    along = np.minimum(x.T @ left, 0.0)
     of_parameter = zip(_owners(joint, held), np.maximum(power, 0.0), along, strict=True)
     return float(sum(_gain(p, a, widths.get(term.name)) for term, p, a in of_parameter))
 

@@ -106,10 +106,7 @@ def with_fit(
 
 
 def _copied(document: TOMLDocument) -> TOMLDocument:
-    """A copy to change, without one of the correlations: most of the file, and only ever replaced.
-
-    To copy the 5,000 of a robot with eight cables takes a second.
-    """
+    """A copy to change; it shares the correlations, most of the file, which are only replaced."""
     tables = (document.get(name) for name in (FIT, CALIBRATION))
     arrays = (table.get(CORRELATION) for table in tables if isinstance(table, Mapping))
     return copy.deepcopy(document, {id(array): array for array in arrays})

@@ -18,6 +18,7 @@ from crosscheck.calibration.gram import (
     gram_of,
 )
 from crosscheck.calibration.worth import log_gain, log_gains
+from crosscheck.fit import evidence
 
 WIDTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0])
 
@@ -240,3 +241,19 @@ def test_what_is_left_to_gain_is_the_ln_posterior_lost_elsewhere() -> None:
 
     lost = log_posterior(solved.values) - log_posterior(z[solved.columns])
     assert solved.left_to_gain(z) == pytest.approx(lost)
+
+
+@pytest.mark.parametrize("size", [0.3, 0.42, 0.56, 0.75, 1.0])
+def test_what_one_effect_is_needs_no_other_that_acts_like_it(size: float) -> None:
+    """Errors of exit points were shared with anchor points, which made up for a missing width."""
+    rng = np.random.default_rng(2)
+    x = 30.0 * rng.normal(size=(200, 24))
+    y = x @ (size * np.sqrt(24.0 / 23.0) * stats.zscore(rng.normal(size=24))) + rng.normal(size=200)
+    widths = np.array(evidence.WIDTHS)
+    parts = {f"e{k}": ColumnGroup(np.arange(24 * k, 24 * k + 24), widths) for k in range(2)}
+    gram = gram_of(np.concatenate([x, x], axis=1), y, parts)
+    one, both = (
+        averaged(gram, best_widths(gram, dict.fromkeys(names, 1.0)))
+        for names in (["e0"], ["e0", "e1"])
+    )
+    assert both < one
