@@ -25,11 +25,13 @@ from seecr.compiled.columns import (
 from seecr.holding.hanging import bridged_lengths, rest_for
 from seecr.pose import Array
 from seecr.statics import batch
-from seecr.statics.tables import Tables
+from seecr.statics.tables import Tables, take
 from seecr.threads import in_parts
 
 # Newton steps to the tightness of a cable.
 _TIGHTNESS = 60
+# Newton steps to tensions, and their allowed error [load]: the balance is off by its square.
+_TO_TENSIONS, _SAME = 8, 1e-8
 
 
 @dataclass(eq=False)
@@ -51,6 +53,11 @@ class Rates:
         """Some rows (n,)."""
         return Rates(self.by_tension[rows], self.by_length[rows], self.pull[rows])
 
+    def put(self, rows: NDArray[np.intp], other: Rates) -> None:
+        """Overwrite rows with those of another."""
+        self.by_tension[rows], self.by_length[rows] = other.by_tension, other.by_length
+        self.pull[rows] = other.pull
+
     def load(self, at: batch.Evaluation) -> Array:
         """The load (n, d) [N] to be balanced, at an evaluation with these derivatives."""
         made = np.einsum("ndm,nm->nd", self.by_tension, at.states[..., TENSION])
@@ -63,6 +70,32 @@ def linearised(tables: Tables, start: batch.Evaluation) -> tuple[batch.Evaluatio
     pulls = np.broadcast_to(by_length[:, None, :] != 0.0, pull.shape)
     each = np.divide(pull, by_length[:, None, :], out=np.zeros_like(pull), where=pulls)
     return at, Rates(each, by_length, pull)
+
+
+def linearised_at(tables: Tables, tensions: Array) -> tuple[batch.Evaluation, Rates]:
+    """The balance where cables have tensions (n, m) [N], and its derivatives there.
+
+    Rest lengths for them are at first only approximate where cables bend. They are mended until the
+    tensions are those asked for: of a balance linearised beside them an error of second order would
+    stay, which too few cables cannot make up for by pulling differently.
+    """
+    now = with_rest(tables, rest_for(tables, tensions))
+    at, rates = linearised(now, here(now))
+    rows = np.arange(len(tables) if bends(tables) else 0)
+    for _ in range(_TO_TENSIONS):
+        own = at.states[rows, :, TENSION]
+        off = np.abs(own - tensions[rows]).max(axis=1)
+        some, rest = take(tables, rows), now.cables[rows, :, REST]
+        longer = next_rest(some, rest, rates.by_length[rows], own, tensions[rows])
+        go = (off > _SAME * some.scale) & np.isfinite(longer).all(axis=1)
+        rows, longer = rows[go], longer[go]
+        if len(rows) == 0:
+            break
+        now.cables[rows] = with_rest(take(tables, rows), longer).cables
+        there, slopes = linearised(take(now, rows), batch.take_evaluation(at, rows))
+        batch.put_evaluation(at, rows, there)
+        rates.put(rows, slopes)
+    return at, rates
 
 
 def with_rest(tables: Tables, rest: Array) -> Tables:
@@ -156,10 +189,8 @@ def balance_of(tables: Tables, low: Array, about: Array | None = None) -> tuple[
     It is linearised at the tensions ``about``, (n, m) [N], by default :func:`first_tensions`. That
     only matters if the direction of a pull depends on its size.
     """
-    now = with_rest(
-        tables, rest_for(tables, first_tensions(tables, low) if about is None else about)
-    )
-    at, rates = linearised(now, here(now))
+    about = first_tensions(tables, low) if about is None else about
+    at, rates = linearised_at(tables, about)
     return rates.by_tension, rates.load(at)
 
 
