@@ -77,25 +77,34 @@ def linearised_at(tables: Tables, tensions: Array) -> tuple[batch.Evaluation, Ra
 
     Rest lengths for them are at first only approximate where cables bend. They are mended until the
     tensions are those asked for: of a balance linearised beside them an error of second order would
-    stay, which too few cables cannot make up for by pulling differently.
+    stay, which too few cables cannot make up for by pulling differently. Where no lengths lead to
+    such tensions, those that come nearest are kept.
     """
     now = with_rest(tables, rest_for(tables, tensions))
     at, rates = linearised(now, here(now))
-    rows = np.arange(len(tables) if bends(tables) else 0)
+    off = _off(at, tensions)
+    rows = np.flatnonzero(np.isfinite(off)) if bends(tables) else np.arange(0)
     for _ in range(_TO_TENSIONS):
-        own = at.states[rows, :, TENSION]
-        off = np.abs(own - tensions[rows]).max(axis=1)
-        some, rest = take(tables, rows), now.cables[rows, :, REST]
-        longer = next_rest(some, rest, rates.by_length[rows], own, tensions[rows])
-        go = (off > _SAME * some.scale) & np.isfinite(longer).all(axis=1)
-        rows, longer = rows[go], longer[go]
+        rows = rows[off[rows] > _SAME * tables.scale[rows]]
         if len(rows) == 0:
             break
-        now.cables[rows] = with_rest(take(tables, rows), longer).cables
-        there, slopes = linearised(take(now, rows), batch.take_evaluation(at, rows))
-        batch.put_evaluation(at, rows, there)
-        rates.put(rows, slopes)
+        some, own = take(now, rows), at.states[rows, :, TENSION]
+        rest, by_length = some.cables[..., REST], rates.by_length[rows]
+        longer = with_rest(some, next_rest(some, rest, by_length, own, tensions[rows]))
+        there, slopes = linearised(longer, batch.take_evaluation(at, rows))
+        missed = _off(there, tensions[rows])
+        nearer = missed < off[rows]
+        rows = rows[nearer]
+        now.cables[rows], off[rows] = longer.cables[nearer], missed[nearer]
+        batch.put_evaluation(at, rows, batch.take_evaluation(there, np.flatnonzero(nearer)))
+        rates.put(rows, slopes.only(nearer))
     return at, rates
+
+
+def _off(at: batch.Evaluation, tensions: Array) -> Array:
+    """(n,) [N] by how much some tension differs from (n, m) [N]; infinite without an answer."""
+    most = np.abs(at.states[..., TENSION] - tensions).max(axis=1)
+    return np.where(np.isfinite(at.residual), most, np.inf)
 
 
 def with_rest(tables: Tables, rest: Array) -> Tables:
@@ -186,11 +195,14 @@ def bends(tables: Tables) -> bool:
 def balance_of(tables: Tables, low: Array, about: Array | None = None) -> tuple[Array, Array]:
     """Balance A tau = load at the poses of tables: (n, d, m) and (n, d) [N], torques over length.
 
-    It is linearised at the tensions ``about``, (n, m) [N], by default :func:`first_tensions`. That
-    only matters if the direction of a pull depends on its size.
+    It is linearised at the tensions ``about``, (n, m) [N], by default near :func:`first_tensions`.
+    That only matters if the direction of a pull depends on its size.
     """
-    about = first_tensions(tables, low) if about is None else about
-    at, rates = linearised_at(tables, about)
+    if about is None:  # somewhere near will do
+        now = with_rest(tables, rest_for(tables, first_tensions(tables, low)))
+        at, rates = linearised(now, here(now))
+    else:
+        at, rates = linearised_at(tables, about)
     return rates.by_tension, rates.load(at)
 
 
