@@ -25,11 +25,13 @@ from seecr.compiled.columns import (
 from seecr.holding.hanging import bridged_lengths, rest_for
 from seecr.pose import Array
 from seecr.statics import batch
-from seecr.statics.tables import Tables
+from seecr.statics.tables import Tables, take
 from seecr.threads import in_parts
 
 # Newton steps to the tightness of a cable.
 _TIGHTNESS = 60
+# Newton steps to tensions, and their allowed error [load]: the balance is off by its square.
+_TO_TENSIONS, _SAME = 8, 1e-8
 
 
 @dataclass(eq=False)
@@ -51,6 +53,11 @@ class Rates:
         """Some rows (n,)."""
         return Rates(self.by_tension[rows], self.by_length[rows], self.pull[rows])
 
+    def put(self, rows: NDArray[np.intp], other: Rates) -> None:
+        """Overwrite rows with those of another."""
+        self.by_tension[rows], self.by_length[rows] = other.by_tension, other.by_length
+        self.pull[rows] = other.pull
+
     def load(self, at: batch.Evaluation) -> Array:
         """The load (n, d) [N] to be balanced, at an evaluation with these derivatives."""
         made = np.einsum("ndm,nm->nd", self.by_tension, at.states[..., TENSION])
@@ -63,6 +70,41 @@ def linearised(tables: Tables, start: batch.Evaluation) -> tuple[batch.Evaluatio
     pulls = np.broadcast_to(by_length[:, None, :] != 0.0, pull.shape)
     each = np.divide(pull, by_length[:, None, :], out=np.zeros_like(pull), where=pulls)
     return at, Rates(each, by_length, pull)
+
+
+def linearised_at(tables: Tables, tensions: Array) -> tuple[batch.Evaluation, Rates]:
+    """The balance where cables have tensions (n, m) [N], and its derivatives there.
+
+    Rest lengths for them are at first only approximate where cables bend. They are mended until the
+    tensions are those asked for: of a balance linearised beside them an error of second order would
+    stay, which too few cables cannot make up for by pulling differently. Where no lengths lead to
+    such tensions, those that come nearest are kept.
+    """
+    now = with_rest(tables, rest_for(tables, tensions))
+    at, rates = linearised(now, here(now))
+    off = _off(at, tensions)
+    rows = np.flatnonzero(np.isfinite(off)) if bends(tables) else np.arange(0)
+    for _ in range(_TO_TENSIONS):
+        rows = rows[off[rows] > _SAME * tables.scale[rows]]
+        if len(rows) == 0:
+            break
+        some, own = take(now, rows), at.states[rows, :, TENSION]
+        rest, by_length = some.cables[..., REST], rates.by_length[rows]
+        longer = with_rest(some, next_rest(some, rest, by_length, own, tensions[rows]))
+        there, slopes = linearised(longer, batch.take_evaluation(at, rows))
+        missed = _off(there, tensions[rows])
+        nearer = missed < off[rows]
+        rows = rows[nearer]
+        now.cables[rows], off[rows] = longer.cables[nearer], missed[nearer]
+        batch.put_evaluation(at, rows, batch.take_evaluation(there, np.flatnonzero(nearer)))
+        rates.put(rows, slopes.only(nearer))
+    return at, rates
+
+
+def _off(at: batch.Evaluation, tensions: Array) -> Array:
+    """(n,) [N] by how much some tension differs from (n, m) [N]; infinite without an answer."""
+    most = np.abs(at.states[..., TENSION] - tensions).max(axis=1)
+    return np.where(np.isfinite(at.residual), most, np.inf)
 
 
 def with_rest(tables: Tables, rest: Array) -> Tables:
@@ -153,13 +195,14 @@ def bends(tables: Tables) -> bool:
 def balance_of(tables: Tables, low: Array, about: Array | None = None) -> tuple[Array, Array]:
     """Balance A tau = load at the poses of tables: (n, d, m) and (n, d) [N], torques over length.
 
-    It is linearised at the tensions ``about``, (n, m) [N], by default :func:`first_tensions`. That
-    only matters if the direction of a pull depends on its size.
+    It is linearised at the tensions ``about``, (n, m) [N], by default near :func:`first_tensions`.
+    That only matters if the direction of a pull depends on its size.
     """
-    now = with_rest(
-        tables, rest_for(tables, first_tensions(tables, low) if about is None else about)
-    )
-    at, rates = linearised(now, here(now))
+    if about is None:  # somewhere near will do
+        now = with_rest(tables, rest_for(tables, first_tensions(tables, low)))
+        at, rates = linearised(now, here(now))
+    else:
+        at, rates = linearised_at(tables, about)
     return rates.by_tension, rates.load(at)
 
 

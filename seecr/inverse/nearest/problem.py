@@ -190,9 +190,11 @@ class Reaching:
         """Starting points, held or not, with the tensions that come nearest to balance."""
         if len(rows) == 0:
             return Spots(away, rows, np.empty((0, self.least.shape[1])), np.empty(0))
-        each = zip(rows, *self.at(away, rows), strict=True)
-        found = [balanced(a, load, self.least[i], self.most[i]) for i, a, load in each]
-        tensions = np.array([one for one, _ in found]).reshape(len(rows), self.least.shape[1])
+        tensions, (matrices, loads) = self.least[rows], self.at(away, rows)
+        # an anchor point on the pulley itself has no cable to it, and its pose no balance
+        for i in np.flatnonzero(np.isfinite(loads).all(axis=1)):
+            limits = tensions[i], self.most[rows[i]]
+            tensions[i] = balanced(matrices[i], loads[i], *limits)[0]
         # the balance linearised at these tensions
         matrix, load = self.at(away, rows, tensions)
         left = np.abs(np.einsum("ndm,nm->nd", matrix, tensions) - load).max(axis=1)

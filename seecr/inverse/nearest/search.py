@@ -108,7 +108,11 @@ class Best:
 
     def search(self, candidates: Candidates, most: int) -> None:
         """Search from the best candidates, ``most`` of each row."""
-        self.keep(inward(self.problem, screened(self.problem, candidates, most)))
+        spots = screened(self.problem, candidates, most)
+        if spots.tensions.shape[1] < len(self.problem.free):
+            # few poses are held at all, and from stable ones searches may go on to unstable ones
+            self.keep(spots)
+        self.keep(inward(self.problem, spots))
 
     def keep(self, other: Spots) -> None:
         """Take results that are nearer, and stable ones rather than unstable ones."""

@@ -10,8 +10,11 @@ from seecr.compiled.columns import TENSION
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
+from seecr.effects.base import Effect
 from seecr.effects.cable import CableWeight
-from seecr.holding.balance import balance_of, with_rest
+from seecr.effects.geometry import PulleyRadius
+from seecr.effects.structure import FrameCompliance
+from seecr.holding.balance import balance_of, linearised_at, with_rest
 from seecr.holding.hanging import bridged_lengths, least_of_heavy, rest_for
 from seecr.holding.lengths import Held, hold, hold_again
 from seecr.prediction.experiment import Experiment
@@ -71,6 +74,27 @@ def test_balance_about_tensions_is_exact_there() -> None:
     most = first.tensions.max(axis=0) * (1.0 + 1e-9)
     again = hold(tables, np.zeros((2, 8)), least, most)
     assert again.fine.all()
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        [CableWeight(WEIGHT), PulleyRadius(0.2)],
+        [FrameCompliance(2e-5, 1e-5)],
+        [FrameCompliance(1e-6, 3e-5), PulleyRadius(0.2)],
+    ],
+)
+def test_balance_is_linearised_at_the_tensions_it_is_asked_for(effects: list[Effect]) -> None:
+    """Their lengths were approximate: what is left of the balance then is no error of the pose."""
+    robot = load_robot(model_path("cogiro_large"))
+    poses = all_over(robot)
+    commands = Commands(poses, lengths=robot.commanded_lengths(poses), told=True)
+    tables = assemble(Experiment(robot, commands).setup(effects))
+    wanted = 2.0 * np.maximum(least_of_heavy(tables), 0.1 * robot.weight)
+    at, rates = linearised_at(tables, wanted)
+    assert np.abs(at.states[..., TENSION] - wanted).max() < 1e-8 * robot.weight
+    left = np.einsum("ndm,nm->nd", rates.by_tension, wanted) - rates.load(at)
+    np.testing.assert_allclose(left, at.gradient, atol=1e-7 * robot.weight)
 
 
 def test_cables_that_pull_nothing_are_longer_than_their_span() -> None:

@@ -6,19 +6,33 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from seecr.description.mjcf import load_robot
 from seecr.effects import Term, Terms
 from seecr.equilibrium.solving import solve
 from seecr.inverse import correction
-from seecr.inverse.nearest import in_place
-from seecr.inverse.nearest.problem import Reaching
+from seecr.inverse.nearest import in_place, search
+from seecr.inverse.nearest.problem import Reaching, Spots
 from seecr.inverse.nearest.search import Best
 from seecr.pose import Array, quat_from_rotvec
 from seecr.statics.tables import Tables
 
 ROBOT = load_robot("planar_two_cable")
 HEAVY = Terms([Term.of(ROBOT, "cable_weight", weight_N_per_m=1.0)])
+
+# The directions of their pulls depend on how large these are: with lengths a little beside those of
+# the tensions asked for, nothing was in balance any more.
+LEANING = Terms(
+    [Term.of(ROBOT, "frame_compliance", sideways_m_per_N=2e-5, upwards_m_per_N=1e-5)],
+)
+OVER_PULLEYS = Terms(
+    [
+        Term.of(ROBOT, "cable_weight", weight_N_per_m=0.1),
+        Term.of(ROBOT, "pulley_radius", radius_m=0.03),
+    ]
+)
+PLACES = np.array([[0.4, 0.5], [0.25, 0.3], [0.6, 0.8], [0.12, 0.45]])
 
 
 def rests(places: Array) -> Array:
@@ -91,3 +105,50 @@ def test_searched_rows_are_spread_evenly_from_the_first_to_the_last() -> None:
     rows = np.arange(100, 171)
     assert in_place._apart(rows).tolist() == [100, 110, 120, 130, 140, 150, 160, 170]
     assert in_place._apart(rows[:3]).tolist() == [100, 101, 102]
+
+
+def level_at(places: Array) -> Array:
+    """Level poses (n, 7) at positions (n, 2), x and z [m]."""
+    poses = np.tile(ROBOT.reference_pose, (len(places), 1))
+    poses[:, [0, 2]] = places
+    return poses
+
+
+@pytest.mark.parametrize("effects", [LEANING, OVER_PULLEYS])
+def test_positions_are_kept_and_mapped_where_pulls_turn_with_their_size(effects: Terms) -> None:
+    """All were lost. Lengths for them are those of a search through the equilibria alone."""
+    poses = level_at(PLACES)
+    found = correction.correct(ROBOT, poses, effects=effects, prefer="position")
+    assert found.stays.all() and found.settled.all()
+    assert np.abs(found.left[:, :3]).max() < 1e-9
+    assert np.all(correction.margins_in_place(ROBOT, poses, effects, 0.0, np.inf) > 0.0)
+    plain = correction.correct(ROBOT, poses, prefer="position").solution
+    for k, pose in enumerate(poses):
+
+        def away(lengths: Array, pose: Array = pose, start: Array = plain.pose[k]) -> Array:
+            there = solve(ROBOT, start[None], rest_lengths=lengths[None], effects=effects)
+            return np.asarray((there.pose[0] - pose)[[0, 2]])
+
+        lengths = least_squares(away, plain.rest_lengths[k], xtol=1e-12, gtol=1e-14).x
+        assert np.abs(away(lengths)).max() < 1e-8
+        np.testing.assert_allclose(found.solution.rest_lengths[k], lengths, atol=1e-6)
+
+
+def test_a_position_with_a_cables_end_on_its_pulley_is_not_held() -> None:
+    """The map of all others ended in an error of another library."""
+    pulleys = Terms([Term.of(ROBOT, "pulley_radius", radius_m=0.02)])
+    end = ROBOT.exit_points[0] - ROBOT.anchor_points[0]
+    poses = level_at(np.array([[end[0], end[2]], [0.5, 0.5]]))
+    margins = correction.margins_in_place(ROBOT, poses, pulleys, 0.0, np.inf)
+    assert margins[1] > 0.0 and not np.isnan(margins[0])
+
+
+def test_stable_poses_are_kept_from_which_searches_go_on_to_unstable_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def nowhere(_problem: Reaching, start: Spots) -> Spots:
+        return start.only(np.zeros(0, dtype=np.intp))
+
+    monkeypatch.setattr(search, "inward", nowhere)
+    found = correction.correct(ROBOT, level_at(PLACES[:1]), prefer="position")
+    assert found.stays.all() and np.abs(found.left[:, :3]).max() < 1e-9
