@@ -142,9 +142,10 @@ def command(
                 tell(0, "errors")
             spread = None if own is None else spread_of(machine, commands, own)
             tell(len(commands), "solved")
-        bar, too_many = _bar(solution, commands, own)
-        rows = SweepRows(solution, commands.lengths, more, spread, wanted, commands.loads, bar)
+        rows = SweepRows(solution, commands.lengths, more, spread, wanted, commands.loads)
         commanded = commands.lengths is None or rows.aimed
+        bar, too_many = _bar(solution, commands, own, commanded)
+        rows = replace(rows, bar=bar)
         status = 0 if at_rest(solution) else 3
         runs = _runs(machine, given, more)
         spans, why_not = _spans(solution, commands, own, runs)
@@ -328,7 +329,7 @@ def _spans(
 
 
 def _bar(
-    solution: Solution, commands: Commands, model: Model | None
+    solution: Solution, commands: Commands, model: Model | None, commanded: bool
 ) -> tuple[BarManifold | None, tuple[str, ...]]:
     """Of a bar as it is described, the tilts beside the manifold; and why they are not computed."""
     from seecr import bar_manifold
@@ -339,7 +340,7 @@ def _bar(
     if len(solution) > _MOST_TILTS:
         most = counted(_MOST_TILTS, "pose")
         return None, (f"Tilts of the manifold are not computed: more than {most}.",)
-    return bar_manifold(solution), ()
+    return bar_manifold(solution, commanded), ()
 
 
 def _runs(robot: Robot, given: _Commanded, more: _Columns) -> Sequence[int] | None:

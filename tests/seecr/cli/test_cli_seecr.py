@@ -101,6 +101,9 @@ def test_a_sweep_of_a_bar_is_compared_with_the_manifold(
     first = json.loads((tmp_path / "v" / "sweep.json").read_text())["rows"][0]
     assert first["tilt_rad"] == pytest.approx(-first["rotation_rad"][1], abs=1e-12)
     assert first["manifold_there_rad"] == pytest.approx(first["tilt_rad"], abs=1e-9)
+    (tmp_path / "len.csv").write_text("length_1_m,length_2_m\n0.6,0.7\n")
+    out = run("sweep", "planar_two_cable", tmp_path / "len.csv", "--out", tmp_path / "l").output
+    assert "the bar is tilted by" in out and "where it was commanded to" not in out
     monkeypatch.setattr("seecr.cli.sweep._MOST_TILTS", 2)
     many = run("sweep", "planar_two_cable", *line).output
     assert "Tilts of the manifold are not computed: more than 2 poses." in many

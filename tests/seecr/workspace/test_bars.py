@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from seecr.commands.data import Commands
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
@@ -86,6 +87,14 @@ def test_a_sweep_of_a_bar_in_words() -> None:
         "manifold of its equilibria to rounding",
         "to rest where it was commanded to it would tilt by -49.61 to +0.00 deg",
     ]
+
+
+def test_of_lengths_no_tilt_at_a_command_is_told() -> None:
+    """No pose was commanded, and the reference pose stood in for it."""
+    lengths = Commands(BAR.reference_pose[None], lengths=np.array([[0.6, 0.7]]))
+    met = bar_manifold(solve(BAR, lengths), commanded=False)
+    assert met is not None and np.isnan(met.at_command).all() and np.isfinite(met.there).all()
+    assert "commanded" not in str(met)
 
 
 def test_off_the_manifold_it_is_said_by_how_much() -> None:
