@@ -57,8 +57,8 @@ def test_a_sweep_tells_the_zones_of_slack_cables_and_the_papers_points(tmp_path:
     assert lines[at + 2] == "  x 285.143 to 296.235 mm, 11.093 mm wide: 1 slack: cable3"
     assert [x.split(": ")[1] for x in lines[at + 3 : at + 6]] == ["0 slack", "1 slack", "2 slack"]
     assert lines[at + 6].startswith(
-        "point V goes from x z 175.64 138.04 to x z 624.36 138.04 mm, -17.80 to +17.80 mm beside "
-        "the line of the weight"
+        "point V goes from x z 175.64 138.04 to x z 624.36 138.04 mm; on the way it is between "
+        "-17.80 and +17.80 mm beside the line of the weight"
     )
     document = json.loads((tmp_path / "v" / "sweep.json").read_text())
     zones = document["zones"]
