@@ -149,10 +149,11 @@ def command(
         status = 0 if at_rest(solution) else 3
         runs = _runs(machine, given, more)
         spans, why_not = _spans(solution, commands, own, runs)
+        gave_up = _gave_up(solution, method)
         met = midline_points(solution)
         if rows.aimed:
             said = (*said, _WANTED)
-        notes = [*notes_of(own, solution), *said, *why_not, *too_many]
+        notes = [*notes_of(own, solution), *said, *gave_up, *why_not, *too_many]
         document = {
             "made": made_by(machine.source, poses, model),
             "exit_status": status,
@@ -326,6 +327,20 @@ def _spans(
     if commands.run is None and runs is not None:
         commands = replace(commands, run=np.unique(runs, return_inverse=True)[1])
     return slack_spans(solution, commands, effects=model or ()), ()
+
+
+def _gave_up(solution: Solution, method: str | None) -> tuple[str, ...]:
+    """That a search of SciPy's gave up where the robot may well rest, and what zones make of it."""
+    from seecr import Status
+    from seecr.counted import counted
+
+    lost = sum(status is Status.GAVE_UP for status in solution.status)
+    if lost == 0:
+        return ()
+    return (
+        f"The search ({method}) gave up at {lost} of {counted(len(solution), 'pose')}, where the "
+        "platform may well rest: zones come from the poses that it solved.",
+    )
 
 
 def _bar(

@@ -512,6 +512,11 @@ def test_a_search_tells_its_evaluations_when_it_is_asked_for(tmp_path: Path) -> 
         r"fsolve: \d+ to \d+ evaluations of the equations per pose, [\d.]+ the median; .* ms",
         line,
     )
+    gave_up = run(*args, *bare, "--method", "fsolve", "--cable", "25000").output
+    assert re.search(r"The search \(fsolve\) gave up at \d of 5 poses, where the platform", gave_up)
+    assert "free to move" not in gave_up
+    balance = re.search(r"forces balance to (\S+) of the load", gave_up)
+    assert balance is not None and float(balance[1]) < 1e-9
     together = run(*args, *bare, "--method", "newton", "--follow")
     assert together.exit_code == 2
     assert "--method needs every command to be solved by itself; got it together with --follow" in (
