@@ -11,7 +11,7 @@ from seecr.counted import counted, figures
 from seecr.description.robot import Joint, Robot
 from seecr.equilibrium.multiple import elsewhere
 from seecr.equilibrium.passes import NO_BARRIER, TWISTED, Barrier
-from seecr.pose import Array, pose_difference, rxyz_from_quat
+from seecr.pose import Array, pose_difference, rotvec_from_quat, rxyz_from_quat
 from seecr.prediction.uncertainty import Spread
 from seecr.statics.solution import Solution, Status
 from seecr.statics.tables import Tables
@@ -344,11 +344,20 @@ def jump_lines(solution: Solution) -> Iterator[str]:
         return
     if not any(solution.jumps):
         yield "followed from the reference pose: the platform does not jump on the path"
+    turns = _turns(solution)
     for i, jumps in enumerate(solution.jumps):
         for jump in jumps:
-            command = _three(1e3 * jump.command[:3], ".1f")
-            at = f"on the path to {solution.place(i)}, at command {command} mm"
-            yield f"{at}: {jump.words}"
+            command = f"{_three(1e3 * jump.command[:3], '.1f')} mm"
+            if turns:
+                angles = np.degrees(rotvec_from_quat(jump.command[3:]))
+                command += f", turned by {_three(angles, '.2f')} deg about x y z"
+            yield f"on the path to {solution.place(i)}, at command {command}: {jump.words}"
+
+
+def _turns(solution: Solution) -> bool:
+    """Whether the path of commands from the reference pose on turns."""
+    away = pose_difference(solution.command, solution.robot.reference_pose)[:, 3:]
+    return bool(np.any(np.linalg.norm(away, axis=1) > _NO_TURN))
 
 
 def sweep_lines(
