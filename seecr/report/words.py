@@ -266,14 +266,20 @@ def span_lines(spans: Sequence[SlackSpan]) -> Iterator[str]:
     if len(spans) == 1:
         yield f"on the whole way {spans[0].words}"
         return
+    # a run that stays at one pose is no way
+    spans = [span for span in spans if span.width > 0.0 or span.turn > _NO_TURN]
+    if not spans:
+        return
     if all(span.slack == () for span in spans):
-        yield f"on all {len(spans)} ways no cable is slack"
+        ways = "the only way" if len(spans) == 1 else f"all {len(spans)} ways"
+        yield f"on {ways} no cable is slack"
         return
     if len(spans) > _MOST_SPANS:
         yield f"{counted(len(spans), 'zone')} of slack cables, with their widths, in sweep.json"
         return
-    within = short(1e3 * max(max(span.within) for span in spans), 2)
-    yield f"zones of slack cables on the way, edges to within {within} mm:"
+    within = max(max(span.within) for span in spans)
+    near = f", edges to within {short(1e3 * within, 2)} mm" if within > 0.0 else ""
+    yield f"zones of slack cables on the way{near}:"
     ends = np.array([[span.first[:3], span.last[:3]] for span in spans]).reshape(-1, 3)
     moves = np.ptp(ends, axis=0)
     axes = [k for k in range(3) if moves[k] > 1e-6 * max(moves.max(), 1e-300)]
@@ -285,7 +291,7 @@ def span_lines(spans: Sequence[SlackSpan]) -> Iterator[str]:
         )
         wide = f"{1e3 * span.width:.3f} mm wide" if span.width > 0.0 else ""
         turn = f"turned by {np.degrees(span.turn):.4g} deg" if span.turn > _NO_TURN else ""
-        size = ", ".join(part for part in (wide, turn) if part) or "one pose"
+        size = ", ".join(part for part in (wide, turn) if part)
         name = " ".join("xyz"[k] for k in shown)
         yield f"  {name} {first} to {last} mm, {size}: {span.words}"
 
