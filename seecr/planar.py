@@ -22,6 +22,8 @@ from seecr.result import Record, Result
 _OFF_CIRCLE = 1e-5
 # Sine of the angle between cables on one line, up to rounding.
 _OPPOSED = 1e-12
+# A tension below this part of the weight is zero: forces of poses at rest balance to as much.
+_ROUNDED = 1e-9
 
 
 def bar_tilt(exit_points: ArrayLike, positions: ArrayLike, half_length: float = 0.0) -> Array:
@@ -70,8 +72,8 @@ class BarRest(Result):
     Attributes:
         theta: tilt [rad].
         tensions: of both cables, in weights; negative for a cable that would have to push.
-        stable: whether both cables pull and the equilibrium is stable: the bar's one free motion
-            raises its middle.
+        stable: whether no cable would have to push and the equilibrium is stable: the bar's one
+            free motion raises its middle.
     """
 
     theta: float
@@ -264,7 +266,7 @@ def _rests(theta: float, to_exit: Array, h: float) -> bool:
 
 
 def _balance(theta: float, to_exit: Array, h: float) -> tuple[tuple[float, float], bool]:
-    """Tensions in weights; whether both cables pull and the bar's one free motion raises it.
+    """Tensions in weights; whether none is below zero and the bar's one free motion raises it.
 
     That motion keeps both cable lengths. The second derivative of the energy along it is tension
     times second derivative of length, summed over the cables.
@@ -280,6 +282,7 @@ def _balance(theta: float, to_exit: Array, h: float) -> tuple[tuple[float, float
     if abs(lift) < _OPPOSED:
         return (np.nan, np.nan), False
     tension = np.array([-u[1, 0], u[0, 0]]) / lift
+    tension[np.abs(tension) < _ROUNDED] = 0.0
     pair = (float(tension[0]), float(tension[1]))
     if np.any(tension < 0.0):
         return pair, False

@@ -176,10 +176,11 @@ def model_at(given: Path | None, robot: Robot) -> Model | None:
 
 def notes_of(model: Model | None, solution: Solution) -> tuple[str, ...]:
     """What is to be told of a robot, of commands, of a model, and of answers beyond its data."""
-    from seecr.equilibrium.strained import strained
+    from seecr.equilibrium.strained import strained, strained_rows
 
     robot = solution.robot
-    said = (*robot.notes, *strained(robot), *outside(robot, solution.command))
+    much = (*strained(robot), *strained_rows(solution))
+    said = (*robot.notes, *much, *outside(robot, solution.command))
     return said if model is None else (*said, *model.notes, *model.beyond(solution))
 
 

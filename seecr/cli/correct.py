@@ -133,7 +133,8 @@ def command(
             kept = None if own is None else kept_chance(machine, found.commands, own, **within)
             tell("corrected", 1.0)
         status = 0 if found.stays.all() and found.reached.any() else 3
-        notes = [*notes_of(own, found.solution), *wanted.notes, *tracker]
+        told = replace(found.solution, line=found.commands.line)
+        notes = [*notes_of(own, told), *wanted.notes, *tracker]
         made = made_by(machine.source, poses, model)
         document = {
             "made": made, "exit_status": status, "notes": notes, **found.as_json(kept)

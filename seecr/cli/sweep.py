@@ -142,16 +142,18 @@ def command(
                 tell(0, "errors")
             spread = None if own is None else spread_of(machine, commands, own)
             tell(len(commands), "solved")
-        bar, too_many = _bar(solution, commands, own)
-        rows = SweepRows(solution, commands.lengths, more, spread, wanted, commands.loads, bar)
+        rows = SweepRows(solution, commands.lengths, more, spread, wanted, commands.loads)
         commanded = commands.lengths is None or rows.aimed
+        bar, too_many = _bar(solution, commands, own, commanded)
+        rows = replace(rows, bar=bar)
         status = 0 if at_rest(solution) else 3
         runs = _runs(machine, given, more)
         spans, why_not = _spans(solution, commands, own, runs)
+        gave_up = _gave_up(solution, method)
         met = midline_points(solution)
         if rows.aimed:
             said = (*said, _WANTED)
-        notes = [*notes_of(own, solution), *said, *why_not, *too_many]
+        notes = [*notes_of(own, solution), *said, *gave_up, *why_not, *too_many]
         document = {
             "made": made_by(machine.source, poses, model),
             "exit_status": status,
@@ -327,8 +329,22 @@ def _spans(
     return slack_spans(solution, commands, effects=model or ()), ()
 
 
+def _gave_up(solution: Solution, method: str | None) -> tuple[str, ...]:
+    """That a search of SciPy's gave up where the robot may well rest, and what zones make of it."""
+    from seecr import Status
+    from seecr.counted import counted
+
+    lost = sum(status is Status.GAVE_UP for status in solution.status)
+    if lost == 0:
+        return ()
+    return (
+        f"The search ({method}) gave up at {lost} of {counted(len(solution), 'pose')}, where the "
+        "platform may well rest: zones come from the poses that it solved.",
+    )
+
+
 def _bar(
-    solution: Solution, commands: Commands, model: Model | None
+    solution: Solution, commands: Commands, model: Model | None, commanded: bool
 ) -> tuple[BarManifold | None, tuple[str, ...]]:
     """Of a bar as it is described, the tilts beside the manifold; and why they are not computed."""
     from seecr import bar_manifold
@@ -339,7 +355,7 @@ def _bar(
     if len(solution) > _MOST_TILTS:
         most = counted(_MOST_TILTS, "pose")
         return None, (f"Tilts of the manifold are not computed: more than {most}.",)
-    return bar_manifold(solution), ()
+    return bar_manifold(solution, commanded), ()
 
 
 def _runs(robot: Robot, given: _Commanded, more: _Columns) -> Sequence[int] | None:

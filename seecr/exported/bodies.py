@@ -19,6 +19,7 @@ from seecr.description.joints import values_of_pose
 from seecr.description.robot import Robot
 from seecr.effects.setup import Setup
 from seecr.exported.chain import HangingCable, HangingChain, hanging
+from seecr.exported.moving import drag, fastest, take_steps
 from seecr.exported.scene import cable, dot, numbers_text, scene, text_of
 from seecr.pose import Array, transform_points
 from seecr.statics.solution import Solution
@@ -48,10 +49,10 @@ def bodies_text(setup: Setup, solution: Solution, comment: str) -> str:
     root, world, body = scene(robot, comment)
     tendons = ET.Element("tendon")
     ends = transform_points(solution.pose, robot.anchor_points)[0]
-    joints: list[float] = []
-    for i in range(robot.n_cables):
-        joints += _Cable(setup, solution, i, ends[i]).write(world, body, tendons)
+    cables = [_Cable(setup, solution, i, ends[i]) for i in range(robot.n_cables)]
+    joints = [value for one in cables for value in one.write(world, body, tendons)]
     root.append(tendons)
+    take_steps(root, max(one.rate() for one in cables), any(one.chain for one in cables))
     _push(root, world, body, setup.wrench[0])
     rest = solution.pose[0]
     if robot.joints:
@@ -157,6 +158,20 @@ class _Cable:
             )  # fmt: skip
         return self.at_rest
 
+    def rate(self) -> float:
+        """Bound of the angular frequency [1/s] of its own bodies between its springs; 0 if none.
+
+        Springs of joints do not count: they are linear, so that no step is too long for them.
+        """
+        carried = [self.small] if self.yields or self.series > 0.0 else []
+        own, strain = self.length, np.array([self.tension / self.ea])
+        if self.chain is not None:
+            carried.append(self.chain.between / self.gravity)
+            own, strain = self.free / SEGMENTS, self.chain.strain
+        by, square, cube = self.law
+        slope = by + strain * (2.0 * square + 3.0 * cube * strain)
+        return max((fastest(self.ea * slope.max() / own, one) for one in carried), default=0.0)
+
     def _spring_of_cable(self, j: int) -> tuple[float, float]:
         """Unstretched and rest length [m] of the j-th spring from the exit point."""
         if self.chain is None:
@@ -247,13 +262,15 @@ class _Cable:
     ) -> list[str]:
         """Write point masses between springs and at the ends; returns the sites between."""
         start = self.exit - self._by(chain.beside) + self._given_way()
+        mass, part = self.weight / self.gravity, chain.between / self.gravity
+        slowing = numbers_text(drag(self.tension, self.free, mass, part))
         names = []
         for j, place in enumerate(chain.places, start=1):
             name = f"node{self.i + 1}-{j}"
             there = start + self._by(place)
             node = ET.SubElement(world, "body", name=name, pos=numbers_text(there))
             for axis in np.eye(3):
-                ET.SubElement(node, "joint", type="slide", axis=numbers_text(axis))
+                ET.SubElement(node, "joint", type="slide", axis=numbers_text(axis), damping=slowing)
             self._point(node, chain.between)
             ET.SubElement(node, "site", name=name, size=dot(self.robot))
             names.append(name)

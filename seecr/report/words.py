@@ -11,7 +11,7 @@ from seecr.counted import counted, figures
 from seecr.description.robot import Joint, Robot
 from seecr.equilibrium.multiple import elsewhere
 from seecr.equilibrium.passes import NO_BARRIER, TWISTED, Barrier
-from seecr.pose import Array, pose_difference, rxyz_from_quat
+from seecr.pose import Array, pose_difference, rotvec_from_quat, rxyz_from_quat
 from seecr.prediction.uncertainty import Spread
 from seecr.statics.solution import Solution, Status
 from seecr.statics.tables import Tables
@@ -266,14 +266,20 @@ def span_lines(spans: Sequence[SlackSpan]) -> Iterator[str]:
     if len(spans) == 1:
         yield f"on the whole way {spans[0].words}"
         return
+    # a run that stays at one pose is no way
+    spans = [span for span in spans if span.width > 0.0 or span.turn > _NO_TURN]
+    if not spans:
+        return
     if all(span.slack == () for span in spans):
-        yield f"on all {len(spans)} ways no cable is slack"
+        ways = "the only way" if len(spans) == 1 else f"all {len(spans)} ways"
+        yield f"on {ways} no cable is slack"
         return
     if len(spans) > _MOST_SPANS:
         yield f"{counted(len(spans), 'zone')} of slack cables, with their widths, in sweep.json"
         return
-    within = short(1e3 * max(max(span.within) for span in spans), 2)
-    yield f"zones of slack cables on the way, edges to within {within} mm:"
+    within = max(max(span.within) for span in spans)
+    near = f", edges to within {short(1e3 * within, 2)} mm" if within > 0.0 else ""
+    yield f"zones of slack cables on the way{near}:"
     ends = np.array([[span.first[:3], span.last[:3]] for span in spans]).reshape(-1, 3)
     moves = np.ptp(ends, axis=0)
     axes = [k for k in range(3) if moves[k] > 1e-6 * max(moves.max(), 1e-300)]
@@ -285,7 +291,7 @@ def span_lines(spans: Sequence[SlackSpan]) -> Iterator[str]:
         )
         wide = f"{1e3 * span.width:.3f} mm wide" if span.width > 0.0 else ""
         turn = f"turned by {np.degrees(span.turn):.4g} deg" if span.turn > _NO_TURN else ""
-        size = ", ".join(part for part in (wide, turn) if part) or "one pose"
+        size = ", ".join(part for part in (wide, turn) if part)
         name = " ".join("xyz"[k] for k in shown)
         yield f"  {name} {first} to {last} mm, {size}: {span.words}"
 
@@ -344,11 +350,20 @@ def jump_lines(solution: Solution) -> Iterator[str]:
         return
     if not any(solution.jumps):
         yield "followed from the reference pose: the platform does not jump on the path"
+    turns = _turns(solution)
     for i, jumps in enumerate(solution.jumps):
         for jump in jumps:
-            command = _three(1e3 * jump.command[:3], ".1f")
-            at = f"on the path to {solution.place(i)}, at command {command} mm"
-            yield f"{at}: {jump.words}"
+            command = f"{_three(1e3 * jump.command[:3], '.1f')} mm"
+            if turns:
+                angles = np.degrees(rotvec_from_quat(jump.command[3:]))
+                command += f", turned by {_three(angles, '.2f')} deg about x y z"
+            yield f"on the path to {solution.place(i)}, at command {command}: {jump.words}"
+
+
+def _turns(solution: Solution) -> bool:
+    """Whether the path of commands from the reference pose on turns."""
+    away = pose_difference(solution.command, solution.robot.reference_pose)[:, 3:]
+    return bool(np.any(np.linalg.norm(away, axis=1) > _NO_TURN))
 
 
 def sweep_lines(

@@ -65,6 +65,8 @@ _OF_OUTCOME = {
 }
 
 
+# Where forces balance, whether or not the equilibrium is stable.
+_BALANCED = (Status.CONVERGED, Status.UNSTABLE, Status.SINGULAR)
 _PER_ROW = (
     "command", "pose", "deviation", "tensions", "slack", "rest_lengths", "iterations", "residual",
     "energy", "status",
@@ -258,8 +260,10 @@ class Solution(Result):
             f"tensions {between(pulls.min(), pulls.max(), lead='from ')} N; slack cables: "
             f"{between(slack.min(), slack.max(), 'd')} of {self.robot.n_cables}"
         )
-        worst = float(np.max(self.residual[known]))
-        return [*out, f"forces balance to {worst:.1g} of the load or better"]
+        residuals = [self.residual[k] for k in known if self.status[k] in _BALANCED]
+        if residuals:
+            out.append(f"forces balance to {max(residuals):.1g} of the load or better")
+        return out
 
     def _furthest(self, known: NDArray[np.intp]) -> str:
         """The largest position error and the largest rotation of some rows, with their poses."""

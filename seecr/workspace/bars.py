@@ -123,7 +123,8 @@ class BarManifold(Result):
     Attributes:
         tilt: (n,) with which the bar rests.
         there: (n,) of the manifold where its middle rests: of the stable tilts the nearest.
-        at_command: (n,) of the manifold where its middle was commanded to: the most level one.
+        at_command: (n,) of the manifold where its middle was commanded to: the most level one; NaN
+            where lengths were commanded.
     """
 
     tilt: Array
@@ -154,13 +155,14 @@ class BarManifold(Result):
         ]
 
 
-def bar_manifold(solution: Solution) -> BarManifold | None:
+def bar_manifold(solution: Solution, commanded: bool = True) -> BarManifold | None:
     """How a bar on two cables rests beside the tilts at which it is in balance (Figs 3 and 4).
 
     The manifold is that of the robot as described, see :func:`bar_balances`.
 
     Args:
         solution: n poses.
+        commanded: whether poses were commanded, and not lengths.
 
     Returns:
         the tilts, or None for a robot that is no such bar.
@@ -182,9 +184,9 @@ def bar_manifold(solution: Solution) -> BarManifold | None:
         if len(stable):
             there[k] = stable[np.argmin(_apart(stable, tilt[k]))]
     asked = np.full(len(tilt), np.nan)
-    commanded = np.isfinite(solution.command).all(axis=1)
-    places = _in_plane(robot, solution.command[commanded], across)[1]
-    asked[commanded] = bar_tilt(exits, places, half)
+    known = np.isfinite(solution.command).all(axis=1) & commanded
+    places = _in_plane(robot, solution.command[known], across)[1]
+    asked[known] = bar_tilt(exits, places, half)
     return BarManifold(tilt, there, asked)
 
 

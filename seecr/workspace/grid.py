@@ -249,11 +249,16 @@ class Workspace(Result):
 
         Args:
             at_least: also report the poses held with at least this probability.
+
+        Returns:
+            the document; sizes in m^3, m^2 or m as those of a cell, None for a single pose.
         """
+        alone = self.margin.size == 1
         likely = None
         if at_least is not None:
             some = self.likely(at_least)
-            likely = {"at_least": at_least, "poses": int(some.sum()), "size": self.size(some)}
+            size = None if alone else self.size(some)
+            likely = {"at_least": at_least, "poses": int(some.sum()), "size": size}
         where = self.rests & self.feasible
         worst = {
             "deviation_m": np.linalg.norm(self.deviation[where], axis=-1),
@@ -268,8 +273,8 @@ class Workspace(Result):
             "orientation": self.orientation,
             "poses": self.margin.size,
             "feasible": int(self.feasible.sum()),
-            "cell": self.cell,
-            "size_feasible": self.size(self.feasible),
+            "cell": None if alone else self.cell,
+            "size_feasible": None if alone else self.size(self.feasible),
             "likely": likely,
             "rests": int(self.rests.sum()),
             "not_at_rest": [

@@ -49,8 +49,11 @@ class Midlines(Result):
         where = f"is at {first}" if first == last else f"goes from {first} to {last}"
         beside = 1e3 * self.beside[known]
         low, high = (round(float(end), 6) + 0.0 for end in (beside.min(), beside.max()))
-        far = f"{low:+.2f} to {high:+.2f}" if high - low > 0.01 else f"{high:+.2f}"
-        return [f"{of} {where} mm, {far} mm beside the line of the weight"]
+        if high - low > 0.01:  # the extremes need not be at the ends
+            far = f"; on the way it is between {low:+.2f} and {high:+.2f} mm"
+        else:
+            far = f", {high:+.2f} mm"
+        return [f"{of} {where} mm{far} beside the line of the weight"]
 
     def _place(self, row: int) -> str:
         point = [self.points[row]["xyz".index(axis)] for axis in self.axes]

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seecr.arguments import finite
 from seecr.commands.data import Commands
@@ -21,7 +22,7 @@ from seecr.pose import Array
 from seecr.prediction.experiment import effects_of
 from seecr.prediction.model import GivenEffects
 from seecr.result import COORDINATES, Record, Result, named
-from seecr.statics.solution import Solution, check_solution
+from seecr.statics.solution import Solution, Status, check_solution
 from seecr.statics.starts import Commanded, commands_from
 from seecr.units import millimetres
 
@@ -118,7 +119,8 @@ def slack_spans(
     """The stretches of a sweep with the same slack cables, with their widths (paper, Figs 7, 11).
 
     The command goes straight from row to row of a run. A stretch that is left again before the next
-    row is not seen, if the same cables are slack in both rows.
+    row is not seen, if the same cables are slack in both rows. Rows at which one of SciPy's
+    searches gave up are passed by: they say nothing about the robot.
 
     Args:
         solution: of the sweep's commanded poses. If it was followed, so are the changes: from the
@@ -147,9 +149,21 @@ def slack_spans(
         return ()
     setup = setup_with(effects_of(effects, robot), robot, told)
     fixed = setup.has_history or bool(setup.laws)
+    solved = np.flatnonzero([status is not Status.GAVE_UP for status in solution.status])
+    if len(solved) == 0:
+        return ()
     way = _Way(solution, told, effects)
-    changes = way.changes(np.inf if fixed else float(near))
-    return tuple(way.spans(changes))
+    if len(solved) < len(told):
+        way = _Way(solution.rows(solved), told.rows(solved), effects)
+    spans = way.spans(way.changes(np.inf if fixed else float(near)))
+    return tuple(_renumbered(span, solved, told) for span in spans)
+
+
+def _renumbered(span: SlackSpan, rows: NDArray[np.intp], commands: Commands) -> SlackSpan:
+    """A stretch of a way through some rows (k,) of commands, with the rows and runs of all."""
+    first, last = np.interp(span.rows, np.arange(len(rows)), rows)
+    runs = np.cumsum(commands.starts) - 1
+    return replace(span, rows=(float(first), float(last)), run=int(np.unique(runs[rows])[span.run]))
 
 
 @dataclass(frozen=True, eq=False)

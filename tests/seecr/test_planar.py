@@ -359,3 +359,17 @@ def test_bars_without_length_are_refused() -> None:
         bar_equilibria([[0, 1], [1, 1]], [np.nan, 0.5], 0.1)
     with pytest.raises(InputError, match="exit_points must be two places, got one"):
         bar_equilibria([[1, 1], [1, 1]], [1.0, 0.5], 0.1)
+
+
+@pytest.mark.parametrize(("x", "up"), [(0.0, -1.0), (1.0, 1.0)])
+def test_a_bar_below_one_exit_point_hangs_there_and_the_other_cable_does_not_push(
+    x: float, up: float
+) -> None:
+    """Rounding left it -2e-17 weights, and the bar was called not stable for that."""
+    rests = bar_equilibria([[0.0, 1.0], [1.0, 1.0]], [x, 0.5], 0.1)
+    upright = [one for one in rests if abs(abs(one.theta) - 0.5 * np.pi) < 1e-9]
+    assert len(upright) == 2
+    for one in upright:
+        assert sorted(one.tensions) == [0.0, pytest.approx(1.0)]
+        # it hangs from its upper end; held at the lower one it falls over
+        assert one.stable == (np.sign(one.theta) == up)

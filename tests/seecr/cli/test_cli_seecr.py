@@ -57,8 +57,8 @@ def test_a_sweep_tells_the_zones_of_slack_cables_and_the_papers_points(tmp_path:
     assert lines[at + 2] == "  x 285.143 to 296.235 mm, 11.093 mm wide: 1 slack: cable3"
     assert [x.split(": ")[1] for x in lines[at + 3 : at + 6]] == ["0 slack", "1 slack", "2 slack"]
     assert lines[at + 6].startswith(
-        "point V goes from x z 175.64 138.04 to x z 624.36 138.04 mm, -17.80 to +17.80 mm beside "
-        "the line of the weight"
+        "point V goes from x z 175.64 138.04 to x z 624.36 138.04 mm; on the way it is between "
+        "-17.80 and +17.80 mm beside the line of the weight"
     )
     document = json.loads((tmp_path / "v" / "sweep.json").read_text())
     zones = document["zones"]
@@ -101,6 +101,9 @@ def test_a_sweep_of_a_bar_is_compared_with_the_manifold(
     first = json.loads((tmp_path / "v" / "sweep.json").read_text())["rows"][0]
     assert first["tilt_rad"] == pytest.approx(-first["rotation_rad"][1], abs=1e-12)
     assert first["manifold_there_rad"] == pytest.approx(first["tilt_rad"], abs=1e-9)
+    (tmp_path / "len.csv").write_text("length_1_m,length_2_m\n0.6,0.7\n")
+    out = run("sweep", "planar_two_cable", tmp_path / "len.csv", "--out", tmp_path / "l").output
+    assert "the bar is tilted by" in out and "where it was commanded to" not in out
     monkeypatch.setattr("seecr.cli.sweep._MOST_TILTS", 2)
     many = run("sweep", "planar_two_cable", *line).output
     assert "Tilts of the manifold are not computed: more than 2 poses." in many
@@ -509,6 +512,11 @@ def test_a_search_tells_its_evaluations_when_it_is_asked_for(tmp_path: Path) -> 
         r"fsolve: \d+ to \d+ evaluations of the equations per pose, [\d.]+ the median; .* ms",
         line,
     )
+    gave_up = run(*args, *bare, "--method", "fsolve", "--cable", "25000").output
+    assert re.search(r"The search \(fsolve\) gave up at \d of 5 poses, where the platform", gave_up)
+    assert "free to move" not in gave_up
+    balance = re.search(r"forces balance to (\S+) of the load", gave_up)
+    assert balance is not None and float(balance[1]) < 1e-9
     together = run(*args, *bare, "--method", "newton", "--follow")
     assert together.exit_code == 2
     assert "--method needs every command to be solved by itself; got it together with --follow" in (

@@ -97,7 +97,8 @@ def test_where_a_rest_ends_the_platform_jumps() -> None:
     assert np.abs(pose_difference(settled.pose, jump.after)).max() < 1e-4
     (line,) = jump_lines(led)
     assert line.startswith(
-        "on the path to pose 1, at command 400.0, 250.0, 150.0 mm: its equilibrium ends"
+        f"on the path to pose 1, at command 400.0, 250.0, 150.0 mm, turned by {angle:.2f}, 0.00, "
+        "0.00 deg about x y z: its equilibrium ends"
     )
     assert SweepRows(led).as_json()[1]["jumps"][0].as_json()["energy_J"] == jump.energy
 

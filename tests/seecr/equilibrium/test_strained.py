@@ -12,9 +12,11 @@ from click.testing import CliRunner
 
 from crosscheck.planning.design import make_plan
 from seecr.cli import main
+from seecr.commands.data import Commands
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_names, model_path
-from seecr.equilibrium.strained import strained
+from seecr.equilibrium.solving import solve
+from seecr.equilibrium.strained import strained, strained_rows
 
 
 def test_what_a_rest_length_or_a_stiffness_too_small_does_is_told() -> None:
@@ -40,6 +42,44 @@ def test_one_cable_is_one() -> None:
     (note,) = strained(bob)
     assert "rope is strained by 20 % at the reference pose" in note
     assert strained(replace(bob, ea=[20.1])) == ()
+
+
+def test_of_rows_the_most_strained_one_is_told() -> None:
+    """In closed form: cables of 0.2 m stretched to the 0.4 m between exits and bar."""
+    robot = load_robot("planar_two_cable")
+    at = np.tile(robot.reference_pose, (3, 1))
+    rows = Commands(at, lengths=np.array([[0.6, 0.6], [0.2, 0.2], [0.21, 0.21]]))
+    found = solve(robot, rows)
+    (note,) = strained_rows(found)
+    assert "cable1, cable2 are strained by up to 100 % at pose 1, which is much for a rope" in note
+    (note,) = strained_rows(replace(found, line=np.array([2, 3, 4])))
+    assert "at line 3," in note
+    assert strained_rows(found.rows(np.array([0]))) == ()
+    (note,) = strained_rows(found.rows(np.array([1])))
+    assert "where the platform rests," in note
+
+
+def test_a_robot_that_is_told_to_be_strained_is_so_in_all_rows() -> None:
+    robot = replace(load_robot("demobot_cogiro"), ea=np.full(8, 3.0))
+    assert strained(robot) and strained_rows(solve(robot, robot.reference_pose)) == ()
+
+
+@pytest.mark.parametrize("command", ["sweep", "pose", "correct"])
+def test_every_command_tells_of_strained_rows_once(command: str, tmp_path: Path) -> None:
+    """Of lengths that strain cables by all their length nothing was said."""
+    (tmp_path / "len.csv").write_text("length_1_m,length_2_m\n0.6,0.6\n0.2,0.2\n")
+    (tmp_path / "cmd.csv").write_text("cmd_x_m,cmd_y_m,cmd_z_m\n0.5,0,0.9\n")
+    words, said = {
+        "sweep": ([tmp_path / "len.csv", "--out", tmp_path / "s"], " 100 % at line 3, "),
+        "pose": (["0.5", "0", "0.95", "--cable", "30", "--alone"], " % where the platform rests, "),
+        "correct": (
+            [tmp_path / "cmd.csv", "--cable", "60", "--highest", "90", "--out", tmp_path / "c"],
+            " % at line 2, ",
+        ),
+    }[command]
+    words = ["planar_two_cable", *map(str, words)]
+    out = CliRunner().invoke(main, [command, *words]).stdout
+    assert out.count("which is much for a rope") == 1 and said in out
 
 
 @pytest.mark.slow

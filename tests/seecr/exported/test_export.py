@@ -191,6 +191,32 @@ def test_hanging_cables_rest_in_mujoco_where_seecr_says(given: dict[str, dict[st
     assert least > 0.0
 
 
+def pushed(text: str) -> tuple[Array, int]:
+    """Distances (n,) [m] of the platform from its keyframe, pushed for 0.1 of 0.4 s; warnings."""
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    home, off = data.qpos[:3].copy(), []
+    while data.time < 0.4 and not any(one.number for one in data.warning):
+        data.body("platform").xfrc_applied[:2] = (0.02, 0.01) if data.time < 0.1 else (0.0, 0.0)
+        mujoco.mj_step(model, data)
+        off.append(np.linalg.norm(data.qpos[:3] - home))
+    return np.array(off), sum(one.number for one in data.warning)
+
+
+@pytest.mark.parametrize(
+    "weight", [0.05, *(pytest.param(w, marks=pytest.mark.slow) for w in (0.01, 0.02, 0.2))]
+)
+def test_a_pushed_platform_on_hanging_cables_comes_back(weight: float) -> None:
+    """With steps of 2 ms such files ran away: their cables' parts swing faster."""
+    exported = export(COGIRO, [term(COGIRO, "cable_weight", weight_N_per_m=weight)])
+    assert exported.mujoco_text is not None
+    assert "longer steps than" in exported.mujoco_text
+    off, warnings = pushed(exported.mujoco_text)
+    assert warnings == 0 and off.max() < 1e-3 * COGIRO.length
+    assert off[-1] < 0.2 * off.max()
+
+
 @pytest.mark.parametrize(("flat", "steep", "most"), [(2.0, 1.0, 1e-10), (0.05, -0.03, 1e-4)])
 def test_a_chain_starts_beside_the_exit_point_by_one_over_the_square_of_its_links(
     flat: float, steep: float, most: float

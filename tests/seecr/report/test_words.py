@@ -178,10 +178,25 @@ def test_a_pose_has_one_kind_of_minus() -> None:
 def test_ways_without_slack_cables_are_no_zones_of_them() -> None:
     """Fifteen zones of slack cables, it said of a grid on which none was slack."""
     pose = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
-    ways = [SlackSpan(k, (), (0.0, 0.0), pose, pose, 0.0, 0.0, (0.0, 0.0)) for k in range(15)]
+    ways = [SlackSpan(k, (), (0.0, 1.0), pose, pose, 0.1, 0.0, (0.0, 0.0)) for k in range(15)]
     assert list(span_lines(ways)) == ["on all 15 ways no cable is slack"]
     ways[3] = replace(ways[3], slack=("c1",))
     assert list(span_lines(ways)) == ["15 zones of slack cables, with their widths, in sweep.json"]
+
+
+def test_runs_of_one_pose_are_no_zones() -> None:
+    """Sixty runs of one row each were 60 zones of slack cables, with their widths."""
+    pose = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    points = [SlackSpan(k, ("c1",), (k, k), pose, pose, 0.0, 0.0, (0.0, 0.0)) for k in range(60)]
+    assert list(span_lines(points)) == []
+    there = pose + np.array([0.1, 0, 0, 0, 0, 0, 0])
+    way = SlackSpan(60, ("c1",), (60.0, 61.0), pose, there, 0.1, 0.0, (0.0, 0.0))
+    assert list(span_lines([*points, way])) == [
+        "zones of slack cables on the way:",
+        "  x 0.000 to 100.000 mm, 100.000 mm wide: 1 slack: c1",
+    ]
+    free = replace(way, slack=())
+    assert list(span_lines([*points, free])) == ["on the only way no cable is slack"]
 
 
 def test_frequencies_say_that_cables_have_no_inertia_where_that_matters() -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from seecr.commands.data import Commands
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
@@ -62,7 +63,7 @@ def test_they_are_all_tilts_of_the_closed_form_and_balance_the_weight(
 
 @pytest.mark.parametrize(("robot", "up"), [(BAR, 1.0), (flipped(BAR), -1.0)])
 def test_it_rests_on_the_manifold_and_not_at_its_command(robot: Robot, up: float) -> None:
-    """Tilts are upwards towards the second cable; beyond the exit points one cable holds it."""
+    """Tilts are upwards towards the second cable; beyond the exit points it hangs on one cable."""
     poses = np.tile(BAR.reference_pose, (5, 1))
     poses[:, 0], poses[:, 2] = [0.2, 0.35, 0.5, 0.65, 2.5], 0.5
     found = solve(robot, poses)
@@ -74,7 +75,8 @@ def test_it_rests_on_the_manifold_and_not_at_its_command(robot: Robot, up: float
     assert met.there[:4] == pytest.approx(met.tilt[:4], abs=1e-9)
     closed = up * bar_tilt(BAR.exit_points[:, [0, 2]], poses[:, [0, 2]], 0.1)
     np.testing.assert_allclose(met.at_command, closed, atol=1e-12)
-    assert np.isnan([met.there[4], met.at_command[4]]).all() and np.isfinite(closed[:4]).all()
+    assert met.there[4] == pytest.approx(met.tilt[4], abs=1e-9)  # the other one has no tension
+    assert np.isnan(met.at_command[4]) and np.isfinite(closed[:4]).all()
     assert up * (met.tilt[0] - met.at_command[0]) > np.radians(10.0)
 
 
@@ -86,6 +88,14 @@ def test_a_sweep_of_a_bar_in_words() -> None:
         "manifold of its equilibria to rounding",
         "to rest where it was commanded to it would tilt by -49.61 to +0.00 deg",
     ]
+
+
+def test_of_lengths_no_tilt_at_a_command_is_told() -> None:
+    """No pose was commanded, and the reference pose stood in for it."""
+    lengths = Commands(BAR.reference_pose[None], lengths=np.array([[0.6, 0.7]]))
+    met = bar_manifold(solve(BAR, lengths), commanded=False)
+    assert met is not None and np.isnan(met.at_command).all() and np.isfinite(met.there).all()
+    assert "commanded" not in str(met)
 
 
 def test_off_the_manifold_it_is_said_by_how_much() -> None:

@@ -520,6 +520,15 @@ def test_all_of_a_grid_is_as_large_as_its_box() -> None:
     assert line.as_json()["size_feasible"] == pytest.approx(0.25)
 
 
+def test_a_single_pose_has_no_size() -> None:
+    """It was 1.0, without a unit."""
+    one = workspace_map(robot_named("demobot_cogiro"), 0.4, 0.25, 0.1, elastic=False)
+    document = replace(one, chance=np.ones((1, 1, 1))).as_json(0.95)
+    assert document["feasible"] == document["likely"]["poses"] == 1
+    sizes = document["cell"], document["size_feasible"], document["likely"]["size"]
+    assert sizes == (None, None, None)
+
+
 def test_the_size_of_a_ball_is_that_of_a_ball() -> None:
     """Cut by the grid's end through its middle, too: half of it is left."""
     robot = robot_named("demobot_cogiro")

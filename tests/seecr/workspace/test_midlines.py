@@ -37,10 +37,10 @@ def test_they_are_where_the_midlines_meet(robot: object, name: str) -> None:
     assert abs(met.beside[4]) < 1e-9
     assert (np.abs(met.beside).max() < 1e-9) == (name == "H")
     most = 1e3 * met.beside.max()
-    far = f"-{most:.2f} to +{most:.2f}" if name == "V" else "+0.00"
+    far = f"; on the way it is between -{most:.2f} and +{most:.2f}" if name == "V" else ", +0.00"
     first, last = (f"x z {1e3 * x:.2f} {1e3 * z:.2f}" for x, _, z in met.points[[0, -1]])
     way = f"point {name} goes from {first} to {last} mm"
-    assert str(met) == f"{way}, {far} mm beside the line of the weight"
+    assert str(met) == f"{way}{far} mm beside the line of the weight"
     (one,) = midline_points(solve(robot, line(1))).lines()
     assert one.startswith(f"point {name} is at {first} mm, ")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +16,7 @@ from seecr.effects import Term
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import pose_add, pose_difference, quat_from_rotvec
+from seecr.statics.solution import Status
 from seecr.workspace.spans import slack_spans
 
 
@@ -55,6 +57,25 @@ def test_zones_are_those_of_a_much_finer_sweep(
     ends = [spans[0].first[0], *(span.last[0] for span in spans)]
     assert ends[1:-1] == [span.first[0] for span in spans[1:]]
     assert (ends[0], ends[-1]) == (poses[0, 0], poses[-1, 0])
+
+
+def test_rows_at_which_a_search_gave_up_are_passed_by() -> None:
+    """Each was a zone where nothing rests, a micrometre wide where the others are found again."""
+    robot, poses = load_robot("demobot_parallel"), line(0.1, 0.25, 24)
+    runs = Commands(poses, run=np.repeat([0, 1, 2], [3, 1, 20]))
+    found = solve(robot, runs)
+    status = found.status.copy()
+    status[[1, 3, 5, 23]] = Status.GAVE_UP
+    lost = slack_spans(replace(found, status=status), runs)
+    whole = slack_spans(found, runs)
+    assert [(s.run, s.slack) for s in lost] == [(s.run, s.slack) for s in whole if s.run != 1]
+    assert [lost[0].rows, lost[-1].rows[1]] == [(0.0, 2.0), 22.0]
+    assert lost[1].rows[0] == 4.0 and lost[1].first[0] == poses[4, 0]
+    for one, same in zip(lost[1:-1], [s for s in whole if s.run == 2], strict=False):
+        assert one.last == pytest.approx(same.last, abs=1e-6)
+        assert one.rows == pytest.approx(same.rows, abs=1e-3)
+    every = replace(found, status=np.full(24, Status.GAVE_UP, dtype=object))
+    assert slack_spans(every, runs) == ()
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
