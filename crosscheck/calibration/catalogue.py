@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,10 @@ from seecr.pose import Array
 
 # The position of the tracker has no plausible size, so its prior may be wider.
 TRACKER_WIDTHS = (*WIDTHS, 30.0, 100.0, 300.0)
+# Values of a size between two widths lose up to a quarter of ln evidence each. Of many values that
+# is so much that a second group that acts the same was taken in to make up for it.
+_FEW_VALUES = 12
+CLOSER_WIDTHS = tuple(sorted([*WIDTHS, *(math.sqrt(a * b) for a, b in pairwise(WIDTHS))]))
 # An effect is not seen if its plausible size moves no reading by more than this part of its noise.
 _UNSEEN = 0.02
 
@@ -55,7 +61,9 @@ class Catalogue:
 
 def widths_for(layout: Layout) -> Array:
     """Prior widths of an effect over which its evidence is averaged."""
-    return np.array(TRACKER_WIDTHS if layout.name == TRACKER else WIDTHS)
+    if layout.name == TRACKER:
+        return np.array(TRACKER_WIDTHS)
+    return np.array(CLOSER_WIDTHS if len(layout) > _FEW_VALUES else WIDTHS)
 
 
 def gram_about(setting: Setting, joint: JointFit, catalogue: Catalogue) -> Gram:

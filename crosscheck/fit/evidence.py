@@ -17,7 +17,6 @@ do not, then friction is less probable than none.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -34,17 +33,7 @@ from seecr.pose import Array
 # Family-wise false-alarm rate, over all candidates of a step.
 FALSE_ALARM = 0.01
 
-# With two to a decade, twenty-four values of a size in between lose up to six of ln evidence.
-_PER_DECADE = 4
-
-
-def widths_between(least: float, most: float) -> tuple[float, ...]:
-    """Prior widths of equal ratio, from about the least to about the most."""
-    first, last = (round(_PER_DECADE * math.log10(end)) for end in (least, most))
-    return tuple(float(f"{10.0 ** (k / _PER_DECADE):.2g}") for k in range(first, last + 1))
-
-
-WIDTHS = widths_between(0.003, 10.0)
+WIDTHS = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 """Prior standard deviations of the parameters, in plausible sizes.
 
 A good tracker resolves some effects to a hundredth of their plausible size. An effect of a robot

@@ -56,7 +56,7 @@ def test_of_friction_beside_its_cable(seen: float) -> None:
 
 
 def test_what_a_fit_did_not_find_beyond_the_bound_is_no_evidence() -> None:
-    """Cables without weight earned 243, as if a weight had been fitted that explains as much."""
+    """Cables without weight could earn 243, as if a weight were fitted that explains as much."""
     x = 10.0 * np.eye(3)[:, :2]
     joint, linear = fitted(0.0, 2.0, x, 20.0 * np.ones(3))  # friction of 2 is what is there
     assert log_absent(SETTING, joint, linear, {"exit_friction": 1.0}) < 0.0

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import integrate, special, stats
 
+from crosscheck.calibration.catalogue import widths_for
 from crosscheck.calibration.exact import widths_near
 from crosscheck.calibration.gram import (
     ColumnGroup,
@@ -18,7 +19,8 @@ from crosscheck.calibration.gram import (
     gram_of,
 )
 from crosscheck.calibration.worth import log_gain, log_gains
-from crosscheck.fit import evidence
+from seecr.description.mjcf import load_robot
+from seecr.effects import effect_named, layout_of
 
 WIDTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0])
 
@@ -249,7 +251,7 @@ def test_what_one_effect_is_needs_no_other_that_acts_like_it(size: float) -> Non
     rng = np.random.default_rng(2)
     x = 30.0 * rng.normal(size=(200, 24))
     y = x @ (size * np.sqrt(24.0 / 23.0) * stats.zscore(rng.normal(size=24))) + rng.normal(size=200)
-    widths = np.array(evidence.WIDTHS)
+    widths = widths_for(layout_of(effect_named("exit_point_error"), load_robot("demobot_cogiro")))
     parts = {f"e{k}": ColumnGroup(np.arange(24 * k, 24 * k + 24), widths) for k in range(2)}
     gram = gram_of(np.concatenate([x, x], axis=1), y, parts)
     one, both = (

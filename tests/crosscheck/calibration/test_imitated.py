@@ -61,7 +61,7 @@ def averaged_density(y: Array, columns: Array, widths: tuple[float, ...]) -> flo
 def test_the_odds_are_those_of_the_covariances() -> None:
     setting, joint = fitted(term(ROBOT, "tracker_scale", factor=1.003))
     scores = Scores(gram_of(joint.jacobian, joint.state.white, {}), 26)
-    found = field_in_place(setting, joint, {"tracker_scale": 0.32}, scores)
+    found = field_in_place(setting, joint, {"tracker_scale": 0.3}, scores)
     y = joint.state.white + joint.jacobian @ joint.z
     parts = varying(setting, joint)
     fields = [averaged_density(y, columns, FIELD_WIDTHS) for _what, columns in parts]

@@ -13,9 +13,7 @@ from crosscheck.fit.evidence import _averaged, evidence, p_value
 from crosscheck.fit.gauss_newton import Fit
 
 # Standard deviations of the prior, in plausible sizes, that the evidence is averaged over.
-LAMBDAS = (
-    0.0032, 0.0056, 0.01, 0.018, 0.032, 0.056, 0.1, 0.18, 0.32, 0.56, 1.0, 1.8, 3.2, 5.6, 10.0,
-)  # fmt: skip
+LAMBDAS = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 
 
 def small(name: str, z: float, scale: float = 0.1) -> tuple[LinearToy, Fit]:
