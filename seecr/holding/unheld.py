@@ -95,8 +95,8 @@ def _of_cable(name: str, beyond: float, low: float, high: float, of_weight: bool
         least = f"the {_newtons(low)} that it weighs" if of_weight else f"{_newtons(low)}"
         return f"{who} would have to pull {_newtons(pull)}, less than {least}"
     if low > 0.0 and not of_weight:
-        push = _newtons(-pull)
-        return f"{who} would have to push with {push} where others pull at least {_newtons(low)}"
+        push, least = _newtons(-pull), _newtons(low)
+        return f"{who} would have to push with {push} to keep the others at {least} or more"
     return f"{who} would have to push with {_newtons(-pull)}"
 
 

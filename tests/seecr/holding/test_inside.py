@@ -157,7 +157,7 @@ def test_it_is_told_what_a_cable_weighs() -> None:
     low, high = np.array([4.0, 4.0]), np.array([9.0, 9.0])
     push = why_not_held(matrix, np.array([-3.0]), low, high, names)
     assert re.fullmatch(
-        "cable [ab] would have to push with 7 N where others pull at least 4 N", push
+        "cable [ab] would have to push with 7 N to keep the others at 4 N or more", push
     )
     free = why_not_held(matrix, np.array([-3.0]), 0.0 * low, high, names)
     assert free in ("cable a would have to push with 3 N", "cable b would have to push with 3 N")
