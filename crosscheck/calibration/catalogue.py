@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,20 +11,12 @@ from numpy.typing import NDArray
 from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.joining import added_columns, amplitudes, amplitudes_at_null
 from crosscheck.calibration.joint import JointFit, Setting
-from crosscheck.fit.evidence import WIDTHS
+from crosscheck.calibration.priors import widths_for
 from crosscheck.fit.known import known_readings
-from crosscheck.fit.registration import NAME as TRACKER
 from crosscheck.fit.state import derivatives
 from seecr.effects import Term, Terms
-from seecr.effects.base import Layout
 from seecr.pose import Array
 
-# The position of the tracker has no plausible size, so its prior may be wider.
-TRACKER_WIDTHS = (*WIDTHS, 30.0, 100.0, 300.0)
-# Values of a size between two widths lose up to a quarter of ln evidence each. Of many values that
-# is so much that a second group that acts the same was taken in to make up for it.
-_FEW_VALUES = 12
-CLOSER_WIDTHS = tuple(sorted([*WIDTHS, *(math.sqrt(a * b) for a, b in pairwise(WIDTHS))]))
 # An effect is not seen if its plausible size moves no reading by more than this part of its noise.
 _UNSEEN = 0.02
 
@@ -57,13 +47,6 @@ class Catalogue:
     def names(self) -> tuple[str, ...]:
         """Names of all effects."""
         return (*self.at_once.names, *self.later.names)
-
-
-def widths_for(layout: Layout) -> Array:
-    """Prior widths of an effect over which its evidence is averaged."""
-    if layout.name == TRACKER:
-        return np.array(TRACKER_WIDTHS)
-    return np.array(CLOSER_WIDTHS if len(layout) > _FEW_VALUES else WIDTHS)
 
 
 def gram_about(setting: Setting, joint: JointFit, catalogue: Catalogue) -> Gram:

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from crosscheck.calibration.bounds import log_absent
-from crosscheck.calibration.catalogue import Catalogue, gram_about, widths_for
+from crosscheck.calibration.catalogue import Catalogue, gram_about
 from crosscheck.calibration.gram import ColumnGroup, Gram, averaged, best_widths, gram_of
 from crosscheck.calibration.joining import at_null
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.linearised import Linear, column_groups, left_to_gain, linearised
-from crosscheck.calibration.priors import SHAPES
+from crosscheck.calibration.priors import SHAPES, widths_for
 from crosscheck.calibration.sets import Names, Scores
 from crosscheck.calibration.shapes import log_shares, prices_about
 from crosscheck.fit.possible import can_be

@@ -14,12 +14,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import special
 
-from crosscheck.calibration.catalogue import widths_for
 from crosscheck.calibration.exact import own_readings
 from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN
 from crosscheck.calibration.gram import ColumnGroup, Gram, Solved, averaging, gram_of
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.linearised import column_groups, linearised
+from crosscheck.calibration.priors import widths_for
 from crosscheck.calibration.sets import Names, Scores
 from crosscheck.calibration.varying import Varying, varying
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy import linalg, special
 
 from crosscheck.calibration.joint import JointFit, Setting
+from crosscheck.calibration.priors import widths_for
 from crosscheck.calibration.worth import log_gain
 from crosscheck.fit.definite import root_beside_one
 from crosscheck.fit.problem import Problem
@@ -143,7 +144,7 @@ class _Beside:
         normal = x.T @ x - cross.T @ cross
         layout = term.layout
         one_sided = (layout.lower == layout.null)[amplitudes_at_null(term)]
-        return log_gain(normal, x.T @ self.left, one_sided=one_sided)
+        return log_gain(normal, x.T @ self.left, widths_for(layout), one_sided)
 
 
 def amplitudes(term: Term) -> NDArray[np.bool_]:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+from itertools import pairwise
+
 import numpy as np
 
+from crosscheck.fit.evidence import WIDTHS
 from crosscheck.fit.registration import NAME as TRACKER
 from seecr.effects import Terms
 from seecr.effects.base import Layout
@@ -13,6 +17,12 @@ from seecr.pose import Array
 FLAT, SHAPES = 300.0, 30.0
 # For effects: more than 1 only if that raises the evidence clearly.
 WIDER = (1.0, 3.0, 10.0)
+# The position of the tracker has no plausible size, so its prior may be wider.
+_TRACKER_WIDTHS = (*WIDTHS, 30.0, 100.0, 300.0)
+# Values of a size between two widths lose up to a quarter of ln evidence each. Of many values that
+# is so much that a second group that acts the same was taken in to make up for it.
+_FEW_VALUES = 12
+_CLOSER_WIDTHS = tuple(sorted([*WIDTHS, *(math.sqrt(a * b) for a, b in pairwise(WIDTHS))]))
 
 
 def widths_of(terms: Terms) -> Array:
@@ -26,3 +36,10 @@ def widths_of(terms: Terms) -> Array:
 def wider(layout: Layout) -> Array:
     """The prior widths that an effect may be given."""
     return np.array([FLAT] if layout.name == TRACKER else WIDER)
+
+
+def widths_for(layout: Layout) -> Array:
+    """Prior widths of an effect over which its evidence is averaged."""
+    if layout.name == TRACKER:
+        return np.array(_TRACKER_WIDTHS)
+    return np.array(_CLOSER_WIDTHS if len(layout) > _FEW_VALUES else WIDTHS)

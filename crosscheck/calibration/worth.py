@@ -12,14 +12,12 @@ prior, which multiplies the evidence by twice the probability that it is positiv
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from crosscheck.fit.evidence import WIDTHS
 from seecr.pose import Array
 
 
@@ -102,7 +100,7 @@ def gains_along(power: Array, along: Array, widths: ArrayLike) -> Array:
 
 
 def log_gain(
-    normal: Array, gradient: Array, widths: Sequence[float] = WIDTHS, one_sided: ArrayLike = False
+    normal: Array, gradient: Array, widths: ArrayLike, one_sided: ArrayLike = False
 ) -> float:
     """ln evidence that a group gains, averaged over its width."""
     gains = log_gains(normal, gradient, widths, one_sided)

@@ -37,7 +37,7 @@ _LIMIT = 400
 # If more rows than this, and than a quarter of all, are unsolved, only so many are tried first.
 _MANY, _SAMPLE = 16, 4
 # So few rows are solved at once from where a nearby prediction has them: to part them takes longer.
-_AT_ONCE = 64
+_AT_ONCE = 48
 
 # Rows by their indices, or a slice of them.
 Rows = NDArray[np.intp] | slice

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy import integrate, special, stats
 
-from crosscheck.calibration.catalogue import widths_for
 from crosscheck.calibration.exact import widths_near
 from crosscheck.calibration.gram import (
     ColumnGroup,
@@ -18,6 +17,7 @@ from crosscheck.calibration.gram import (
     best_widths,
     gram_of,
 )
+from crosscheck.calibration.priors import widths_for
 from crosscheck.calibration.worth import log_gain, log_gains
 from seecr.description.mjcf import load_robot
 from seecr.effects import effect_named, layout_of
