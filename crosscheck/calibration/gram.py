@@ -226,12 +226,11 @@ def best_widths(gram: Gram, start: Widths, price: float = 0.0) -> dict[str, floa
 def averaged(gram: Gram, chosen: Widths) -> float:
     """ln Z of a set, averaged over the width of each member about the chosen widths.
 
-    These may be far from the best ones where the linear model does not hold there. Then only the
-    member counts that gains most by others: each of them may gain the same thing.
+    These may be far from the best ones, if what others promise is far from the fit. That is no
+    evidence: a fit with those others either finds it, and is scored itself, or it is not there.
     """
     solved = gram.solved(chosen)
-    each = [averaging(solved, name) for name in chosen]
-    return solved.log_evidence + sum(min(one, 0.0) for one in each) + max([0.0, *each])
+    return solved.log_evidence + sum(min(averaging(solved, name), 0.0) for name in chosen)
 
 
 def averaging(solved: Solved, name: str) -> float:

@@ -206,8 +206,8 @@ def test_widths_are_not_chosen_for_what_a_linear_model_promises_far_from_the_fit
     assert widths_near(gram, fitted, z) == (fitted, promised)
 
 
-def test_what_several_members_gain_by_wider_priors_counts_once() -> None:
-    """Four members had 0.01 for 1 and counted 30 of ln evidence each: 100 more than the best."""
+def test_what_wider_priors_promise_is_no_evidence_before_it_is_fitted() -> None:
+    """Cables of a thousandth of a newton counted 13 for the weight that they might have had."""
     gram = gram_of(
         np.tile(np.random.default_rng(2).normal(size=(200, 1)), (1, 4)),
         np.full(200, 0.0) + 3.0 * np.random.default_rng(2).normal(size=200),
@@ -217,7 +217,7 @@ def test_what_several_members_gain_by_wider_priors_counts_once() -> None:
     narrow = dict.fromkeys(gram.names, float(min(WIDTHS)))
     alone = [averaging(gram.solved(narrow), name) for name in narrow]
     assert min(alone) > 20.0
-    assert averaged(gram, narrow) == pytest.approx(gram.solved(narrow).log_evidence + max(alone))
+    assert averaged(gram, narrow) == pytest.approx(gram.solved(narrow).log_evidence)
     assert averaged(gram, narrow) < gram.solved(best).log_evidence
     assert averaged(gram, best) < gram.solved(best).log_evidence
 
