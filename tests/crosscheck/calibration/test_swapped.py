@@ -150,7 +150,9 @@ def test_what_a_fit_did_not_find_is_no_evidence() -> None:
     scores = Scores(gram_about(fixed, joint, Catalogue(moved, Terms())), 1, frozenset())
     off = joint.terms.with_vector(joint.terms.vector + 2e-5)
     early = replace(joint, state=evaluate(problem, off, factor, plain))
-    names, widths = frozenset({"tracker_target"}), {"tracker_target": 1.0}
+    names = frozenset({"tracker_target"})
+    # with the best widths: what these promise beyond others is no evidence on the way either
+    widths = scored(fixed, joint, names, {"tracker_target": 1.0}, scores).widths
     end, way = (scored(fixed, fit, names, widths, scores).score for fit in (joint, early))
     lost = cost(fixed, WHITE, joint.weight, early.state, joint.width) - cost(
         fixed, WHITE, joint.weight, joint.state, joint.width
