@@ -132,11 +132,13 @@ def test_comments_survive_in_tables_that_a_fit_writes_anew(robot, tmp_path):
         changed(path, 'date = "2024-05-13"', 'date = "2024-05-13" # a Monday')
         changed(path, "after]", "after]\n# without the outlier")
         model = load_model(path, robot)
+        read = model.document.as_string()
         if kind == "fit":
             again = with_fit(model, one, names, SOURCE, ERRORS, covariance)
         else:
             again = calibrated(model, one, covariance, SOURCE, ERRORS)
         save_model(path, renewed(again, robot, measured(robot)))
+        assert model.document.as_string() == read  # the model that was read is as it was
         text = path.read_text()
         assert f"[{kind}]\n" in text and "after]\n# without the outlier" in text
         for remark in ("# after the new spools", "# the whole frame", "# a Monday"):
