@@ -200,6 +200,8 @@ def about_given(
     seen = scores.score(last.names) - scores.score(best.names)
     if last.score - best.score < seen + LOCAL_MINIMUM:
         return scores, best
+    if last.names <= best.names and not _gains_with(exact, scores, best, last):
+        return scores, best
     near = exact.scores_about(last.joint, own_shapes=True)
     other = _searched(exact, near, last.names, _BESIDE)
     if other.names == best.names:
@@ -207,6 +209,14 @@ def about_given(
     near = exact.scores_about(other.joint, own_shapes=True)
     best = _searched(exact, near, other.names, _BESIDE)
     return exact.scores_about(best.joint, own_shapes=True), best
+
+
+def _gains_with(exact: Exact, scores: Scores, best: Refit, part: Refit) -> bool:
+    """Whether the best set explains more from the values that its members have in a part of it."""
+    own = {term.name: term for term in part.joint.terms}
+    exact.take(scores, Terms(own.get(term.name, term) for term in best.joint.terms))
+    found = exact.fitted[best.names]
+    return found is not None and found.score > best.score + LOCAL_MINIMUM
 
 
 def looked_about(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Refit]:

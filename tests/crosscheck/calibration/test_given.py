@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -205,3 +206,47 @@ def test_about_a_given_set_with_a_shape_others_are_looked_for_at_that_shape(
     monkeypatch.setattr(refits, "plainer", lambda exact, _best: exact.possible[frozenset()])
     last = refits.compare_sets(setting, joint, catalogue, plain, given=[Terms([uneven])])
     assert last.best.names == frozenset()
+
+
+@pytest.mark.parametrize(("last", "there", "about"), [
+    ({"drum_eccentricity"}, 0.0, False),
+    ({"drum_eccentricity"}, 20.0, True),
+    ({"drum_eccentricity", "creep"}, 0.0, True),
+])  # fmt: skip
+def test_about_a_part_of_the_best_set_nothing_is_sought_unless_its_values_explain_more(
+    monkeypatch: pytest.MonkeyPatch, last: set[str], there: float, about: bool
+) -> None:
+    """Beside a kink in a cable, two minutes went to a set whose members had all been found."""
+    both = frozenset({"drum_eccentricity", "anchor_point_error"})
+    best = fitted(both, "best", 0.0)
+    given = fitted(frozenset(last), "given", -600.0)
+    begun: list[Terms] = []
+    sought: list[object] = []
+
+    def searched(_exact: object, scores: object, _begin: Names, _most: int) -> Any:
+        sought.append(scores)
+        return best
+
+    monkeypatch.setattr(refits, "_searched", searched)
+    nearby: Any = SimpleNamespace(
+        catalogue=SimpleNamespace(later=SimpleNamespace(names=("drum_eccentricity", "creep"))),
+        fitted={both: SimpleNamespace(score=there)},
+        fit=lambda _scores, names: given if names == given.names else None,
+        take=lambda _scores, start: begun.append(start),
+        scores_about=lambda joint, own_shapes: joint,
+    )
+    linear: Any = SimpleNamespace(
+        always=frozenset(), score=lambda names: -1e5 if names == given.names else 0.0
+    )
+    assert refits.about_given(nearby, linear, best, [given.names]) == (linear, best)
+    assert sought == ([given.joint] if about else [])
+    if last <= both:
+        own = {member.name: member.origin for member in begun.pop()}
+        assert own == {"drum_eccentricity": "given", "anchor_point_error": "best"}
+    assert not begun
+
+
+def fitted(names: Names, origin: str, score: float) -> Any:
+    """A fit whose values say where they are from."""
+    some = [SimpleNamespace(name=name, origin=origin) for name in sorted(names)]
+    return SimpleNamespace(names=names, score=score, joint=SimpleNamespace(terms=some))
