@@ -27,6 +27,8 @@ _STEPS = 12
 LOCAL_MINIMUM = 8.0
 # Sets up to this size are tried from more starting points.
 FEW = 5
+# Parts of the values of a linear model from which fits start: the first that explains anything.
+_PARTS = (1.0, 0.5, 0.25, 0.125)
 
 
 # The members of a set, each with the term whose shape the fit started from.
@@ -118,7 +120,10 @@ class Exact:
         Values that no robot can have are worse than any others, however much they explain: a set
         with such values is not compared.
         """
-        names = frozenset(start.names)
+        self._keep(scores, self._at(start))
+
+    def _keep(self, scores: Scores, start: State) -> None:
+        names = frozenset(start.terms.names)
         # the linear model may hold an effect near null that only acts away from there
         wide = {name: max(width, 1.0) for name, width in scores.widths(names).items()}
         found = [self.fitted.get(names), self._from(scores, names, start, wide)]
@@ -138,7 +143,7 @@ class Exact:
             self._fit(scores, names)
         elif shapes not in self._begun.get(names, set()) and self._promises_more(scores, names):
             self.report(" + ".join(sorted(names)))
-            self.take(scores, _linear_terms(self.catalogue, scores, names))
+            self._keep(scores, self._linear(scores, names))
         self._begun.setdefault(names, set()).add(shapes)
         return self.fitted[names]
 
@@ -151,21 +156,34 @@ class Exact:
     def _fit(self, scores: Scores, names: Names) -> None:
         """Fit a set from its linear values, from given ones, and from null if that ends badly."""
         linear, widths = scores.score(names), scores.widths(names)
-        best = self._from(scores, names, _linear_terms(self.catalogue, scores, names), widths)
-        self.fitted[names] = best
+        self.fitted[names] = best = self._from(scores, names, self._linear(scores, names), widths)
         if names in self.given:
             self.take(scores, self.given[names])
         few = 0 < len(names - scores.always) <= FEW
         if few and (best is None or best.score < linear - LOCAL_MINIMUM):
             self.take(scores, Terms(_off_bound(self.catalogue.start(name)) for name in names))
 
+    def _at(self, terms: Terms) -> State:
+        return evaluate(self.setting.problem, terms, self.setting.factor, self.plain)
+
+    def _linear(self, scores: Scores, names: Names) -> State:
+        """A set at the values of the linear model, or at a part of them.
+
+        Far from where the readings were linearised, a large set can have values with which it
+        explains less than no effect at all does. No fit leads back from there.
+        """
+        for part in _PARTS:
+            state = self._at(_linear_terms(self.catalogue, scores, names, part))
+            if state.chi2 <= self.plain.chi2:
+                break
+        return state
+
     def _from(
-        self, scores: Scores, names: Names, start: Terms, widths: dict[str, float]
+        self, scores: Scores, names: Names, start: State, widths: dict[str, float]
     ) -> Refit | None:
-        state = evaluate(self.setting.problem, start, self.setting.factor, self.plain)
-        if not state.valid:
+        if not start.valid:
             return None
-        refit = self._settled(scores, names, state, widths)
+        refit = self._settled(scores, names, start, widths)
         if refit.wished is None:
             return refit
         # what other widths promise is far from a fit with these: it is looked for there
@@ -181,10 +199,10 @@ class Exact:
         return scored(self.setting, found, names, widths, scores)
 
 
-def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names) -> Terms:
-    """The set with the values of the linear model."""
+def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names, part: float) -> Terms:
+    """The set with a part of the values of the linear model; 0 is null."""
     solved = scores.gram.solved(scores.widths(names))
-    out, first = [], 0
+    values, out, first = solved.values, [], 0
     for name in solved.chosen:
         term = scores.shapes.get(name, catalogue.start(name))
         layout, start = term.layout, term.vector
@@ -193,7 +211,7 @@ def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names) -> Terms:
         if count < len(own):  # only amplitudes at null are in the linear model
             own = own[start[own] == layout.null[own]]
         vector = start.copy()
-        vector[own] = layout.null[own] + solved.values[first : first + count] * layout.scale[own]
+        vector[own] = layout.null[own] + part * values[first : first + count] * layout.scale[own]
         out.append(_off_bound(term.with_vector(np.clip(vector, layout.lower, layout.upper))))
         first += count
     return Terms([*out, *(catalogue.start(name) for name in names if name not in solved.chosen)])

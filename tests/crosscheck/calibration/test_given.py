@@ -143,7 +143,7 @@ def test_sets_that_were_found_elsewhere_are_compared_from_their_values(
     """They end where they begin here: a fit from nothing may end in a hollow."""
     monkeypatch.setattr(exact, "_STEPS", 0)
     monkeypatch.setattr(
-        exact, "_linear_terms", lambda catalogue, _scores, names: nulls(catalogue, names)
+        exact, "_linear_terms", lambda catalogue, _scores, names, _part: nulls(catalogue, names)
     )
     one = frozenset(HIDDEN.names)
     without, with_ = (search_sets(problem, SIGMA, given=g).found.refit(one) for g in ([], [HIDDEN]))
