@@ -19,7 +19,7 @@ from crosscheck.calibration.own_noise import by_own_noise
 from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.refits import ROUNDS, Found, compare_sets
 from crosscheck.calibration.sets import Names
-from crosscheck.calibration.stages import Progress
+from crosscheck.calibration.stages import Progress, poor
 from crosscheck.calibration.unknown import UnknownOdds, unknown_beside
 from crosscheck.fit.problem import KINDS, Problem, kinds_read
 from crosscheck.fit.state import evaluate
@@ -124,7 +124,8 @@ def _compared(
             tried += 1
             progress(f"trying {text}", 0.5 + 0.5 * tried / (tried + most))
 
-        return compare_sets(setting, joint, catalogue, plain, report, most, rounds, [*given, *more])
+        known, grow = [*given, *more], unknown and poor(joint)
+        return compare_sets(setting, joint, catalogue, plain, report, most, rounds, known, grow)
 
     def is_structure(fit: JointFit) -> bool:
         return is_not_noise(setting, fit, kinds)

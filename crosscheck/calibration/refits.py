@@ -16,6 +16,7 @@ from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.challenge import challenge
 from crosscheck.calibration.equals import EQUAL, are_equals
 from crosscheck.calibration.exact import FEW, LOCAL_MINIMUM, Exact, Refit
+from crosscheck.calibration.grown import grown
 from crosscheck.calibration.joining import amplitudes, inside, promising_beside
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.sets import Names, Scores, explore
@@ -72,6 +73,7 @@ def compare_sets(
     most: int = _REFITTED,
     rounds: int = ROUNDS,
     given: Iterable[Terms] = (),
+    grow: bool = False,
 ) -> Found:
     """Search the sets of effects, by linear evidence and exact fits in turn.
 
@@ -84,6 +86,7 @@ def compare_sets(
         most: how many sets to refit about one linear model.
         rounds: most rounds of linearising the catalogue about the best set.
         given: sets that were found elsewhere, with their values there.
+        grow: also let sets grow member by member; the fit of all effects may mislead.
     """
     always = frozenset(plain.terms.names)
     fixed = replace(setting, frozen=True, weight=joint.weight)
@@ -97,6 +100,10 @@ def compare_sets(
             break
         begin = best.names
         scores = exact.scores_about(best.joint)
+    other = grown(exact) if grow else best
+    if other.names != best.names:
+        scores = exact.scores_about(other.joint)
+        best = _searched(exact, scores, other.names, most)
     scores, best = about_given(exact, scores, best, known)
     scores, best = looked_about(exact, scores, best)
     other = swapped(exact, scores, best)
