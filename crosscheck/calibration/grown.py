@@ -40,6 +40,6 @@ def _grow(exact: Exact, here: Refit) -> None:
         top = max(filter(exact.can_be, fits), key=lambda fit: fit.score, default=here)
         gain = top.score - here.score
         best = exact.best_of(scores, [])
-        if gain < _LEAST or top.score + gain * left < best.score:
+        if gain < _LEAST or top.score + gain * (left - 1) < best.score:
             return
         here = top

@@ -80,3 +80,33 @@ def test_beside_a_few_the_noise_is_their_own(rho: float) -> None:
     odds = unknown_beside(whole.setting, replace(whole.joint, colour=colour)).odds
     assert odds == pytest.approx(unknown_beside(whole.setting, whole.joint).odds, abs=1.0)
     assert odds < 0.0
+
+
+class ComparedError(Exception):
+    """Sets are compared: what comes after does not matter here."""
+
+
+@pytest.mark.parametrize(("scale", "rho", "surprise", "grow"), [
+    (1.0, 0.0, 9.0, False), (3.0, 0.0, 9.0, True), (1.0, 0.9, 9.0, True), (3.0, 0.0, 0.0, False),
+])  # fmt: skip
+def test_sets_grow_where_the_fit_of_all_leaves_more_than_noise(
+    monkeypatch: pytest.MonkeyPatch, scale: float, rho: float, surprise: float, grow: bool
+) -> None:
+    asked: list[bool] = []
+
+    def poorly(*given: Any) -> Calibration:
+        whole = fit_all_effects(*given)
+        noisy = replace(whole.joint, colour=Colour(np.full(3, scale), np.full(3, rho)))
+        far = replace(whole.held_out, surprise=np.array([surprise]))
+        return replace(whole, joint=noisy, held_out=far)
+
+    def compare(*given: Any) -> None:
+        asked.append(given[-1])
+        raise ComparedError
+
+    ready = prepare(ROBOT, measured(ROBOT), Terms(), considered(FEW))
+    monkeypatch.setattr(module, "fit_all_effects", poorly)
+    monkeypatch.setattr(module, "compare_sets", compare)
+    with pytest.raises(ComparedError):
+        fit_and_compare(ready.problem, SIGMA, Terms(), lambda _text, _part: None, ())
+    assert asked == [grow]
