@@ -27,11 +27,13 @@ from seecr.compiled.columns import (
     CREEP,
     CREEP_RATE,
     EA,
+    FRICTION,
     HYSTERESIS,
     LIFT,
     REST,
     SLACK,
     STRAIN,
+    STUCK,
     TENSION,
     UP,
     WEIGHT,
@@ -153,24 +155,65 @@ def pull_and_change(
 
 
 @jit_allocating
-def rest_lengths_for(cables, spans, tensions, out):
+def rest_lengths_for(cables, spans, tensions, follows, out):
     """Rest lengths (n, m) [m] at which straight cables of given spans have given tensions.
 
     They are exact for every law, with its history: l0 (1 + eps + creep) + compliance T +
     winch_side/EA T_winch is the span.
+
+    Args:
+        follows: whether tensions behind exit points are ``STUCK`` at the present rest lengths and
+            change with them; otherwise they are that at any length.
     """
     row = cables[0, 0].copy()
     for r in range(cables.shape[0]):
         for i in range(cables.shape[1]):
             copy_vector(cables[r, i], row)
-            tension = tensions[r, i]
-            behind = winch_tension(row, tension)[0]
-            rest = spans[r, i] - row[COMPLIANCE] * tension - row[WINCH_SIDE] / row[EA] * behind
             for _ in range(_ROUNDS):
-                strain = strain_of_tension(row, tension)[0]
-                grown = 1.0 + strain + row[CREEP] + row[CREEP_RATE] * tension
-                out[r, i] = rest / grown
-                done = row[HYSTERESIS] == 0.0 or abs(out[r, i] - row[REST]) <= 1e-16 * rest
+                out[r, i] = _rest_for(row, cables[r, i], spans[r, i], tensions[r, i], follows)
+                done = row[HYSTERESIS] == 0.0 or abs(out[r, i] - row[REST]) <= 1e-16 * out[r, i]
                 row[REST] = out[r, i]
                 if done:
                     break
+
+
+@jit_allocating
+def stretched_lengths(cables, tensions, out):
+    """Lengths (n, m) [m] of cables with these tensions (n, m) [N], and of all in series with them.
+
+    Of straight cables they are the spans; :func:`rest_lengths_for` is the inverse.
+    """
+    for r in range(cables.shape[0]):
+        for i in range(cables.shape[1]):
+            row, tension = cables[r, i], tensions[r, i]
+            behind = winch_tension(row, tension)[0]
+            out[r, i] = row[REST] * (1.0 + _strain(row, tension))
+            out[r, i] += row[COMPLIANCE] * tension + row[WINCH_SIDE] / row[EA] * behind
+
+
+@jit_inner
+def _strain(row, tension):
+    """Of the cable itself, with what has crept."""
+    return strain_of_tension(row, tension)[0] + row[CREEP] + row[CREEP_RATE] * tension
+
+
+@jit_inner
+def _rest_for(row, known, span, tension, follows):
+    """Rest length [m] with the strain that the cable has at its own rest length.
+
+    A cable that sticks at its exit point leaves behind it what is paid out, until the tension there
+    is low enough to slip (Euler-Eytelwein): a wanted tension lies between the two limits only where
+    it is the one that the cable has in any case.
+    """
+    strain, soft = _strain(row, tension), row[WINCH_SIDE] / row[EA]
+    left = span - row[COMPLIANCE] * tension
+    if not follows or row[FRICTION] == 0.0 or soft == 0.0:
+        return (left - soft * winch_tension(row, tension)[0]) / (1.0 + strain)
+    grip = math.exp(row[FRICTION])
+    wound_in, paid_out = left - soft * tension * grip, left - soft * tension / grip
+    stuck = left - known[REST] - soft * known[STUCK]
+    if stuck * (1.0 + strain) <= wound_in * strain:
+        return wound_in / (1.0 + strain)
+    if stuck * (1.0 + strain) >= paid_out * strain:
+        return paid_out / (1.0 + strain)
+    return stuck / strain

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from seecr.compiled.columns import ANCHOR, EXIT, GAP, REST, UP, WEIGHT
+from seecr.compiled.columns import ANCHOR, EXIT, FRICTION, GAP, REST, UP, WEIGHT
 from seecr.pose import Array, quat_to_matrix
 from seecr.statics.tables import Tables
 from seecr.threads import in_parts
@@ -58,14 +58,33 @@ def rest_for(tables: Tables, tensions: Array) -> Array:
     return _straight_rest(tables, bridged * arcs, np.maximum(mean, 0.0))
 
 
-def _straight_rest(tables: Tables, spans: Array, tensions: Array) -> Array:
+def rest_after(tables: Tables, rest: Array, tensions: Array) -> Array:
+    """(n, m) [m] rest lengths with these tensions (n, m) [N] if those behind exit points follow.
+
+    Args:
+        tables: with the history that the cables have at the rest lengths there. A cable that sticks
+            at its exit point has another tension behind it at other lengths.
+        rest: (n, m) [m] rest lengths at which they have these tensions with that history.
+        tensions: (n, m) [N].
+    """
+    if not tables.cables[..., FRICTION].any():
+        return rest
+    from seecr.compiled.lengthening import stretched_lengths  # takes a while to import
+
+    spans, there = np.empty_like(rest), tables.cables.copy()
+    there[..., REST] = rest
+    stretched_lengths(there, np.array(tensions, order="C"), spans)
+    return _straight_rest(tables, spans, tensions, follows=True)
+
+
+def _straight_rest(tables: Tables, spans: Array, tensions: Array, follows: bool = False) -> Array:
     """(n, m) [m] rest lengths with which straight cables over these spans have these tensions."""
     from seecr.compiled.lengthening import rest_lengths_for  # takes a while to import
 
     out, pulls = np.empty_like(spans), np.array(tensions, order="C")
 
     def run(part: slice) -> None:
-        rest_lengths_for(tables.cables[part], spans[part], pulls[part], out[part])
+        rest_lengths_for(tables.cables[part], spans[part], pulls[part], follows, out[part])
 
     in_parts(run, len(spans))
     return out

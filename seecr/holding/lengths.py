@@ -25,7 +25,7 @@ from seecr.holding.balance import (
     with_rest,
 )
 from seecr.holding.distribution import distribute
-from seecr.holding.hanging import bridged_lengths, rest_for
+from seecr.holding.hanging import bridged_lengths, rest_after, rest_for
 from seecr.holding.inside import HOPELESS, Inside, farthest_inside, limits_of
 from seecr.pose import Array
 from seecr.statics import batch
@@ -103,11 +103,13 @@ def hold_again(tables: Tables, held: Held, aim: Array, low: Array, high: Array) 
         out = _hold(tables, aim, *limits_of(tables, low, high), _ROUNDS, held.rest)
         lost = np.flatnonzero(~out.fine)
         if len(lost):
-            out.put(lost, hold(take(tables, lost), aim[lost], low, high))
-        return out
-    rest = rest_for(tables, held.tensions)
-    slack = _slack(tables, held.tensions, limits_of(tables, low, high)[0])
-    return Held(_loosened(tables, rest, slack & held.fine[:, None]), held.tensions, held.fine)
+            least, most = (one[lost] if one.ndim == 2 else one for one in (low, high))
+            out.put(lost, hold(take(tables, lost), aim[lost], least, most))
+    else:
+        out = Held(rest_for(tables, held.tensions), held.tensions, held.fine)
+    rest = rest_after(tables, out.rest, out.tensions)
+    slack = _slack(tables, out.tensions, limits_of(tables, low, high)[0]) & out.fine[:, None]
+    return Held(_loosened(tables, rest, slack), out.tensions, out.fine)
 
 
 def _hold_straight(tables: Tables, aim: Array, least: Array, most: Array, rounds: int) -> Held:

@@ -1,4 +1,4 @@
-"""Sequences that converge slowly, or swing: where they end (Aitken 1926)."""
+"""Sequences that converge slowly, or swing: where they end (Aitken 1926), and how to calm them."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from seecr.pose import Array
 _RATIO = 0.99
 # Changes that swing and grow by more than this ratio are cut to a third, and no further.
 _SWING = -2.0
+# Parts of changes are halved where an error does not fall by this factor, but not below the least
+# part, and grow by a factor where it does.
+_FALLS, _LEAST, _GROWS = 0.95, 0.1, 1.1
 
 
 def to_their_limit(change: Array, before: Array) -> Array:
@@ -22,3 +25,13 @@ def to_their_limit(change: Array, before: Array) -> Array:
     some = (np.abs(change) < _RATIO * np.abs(before)) | (change * before < 0.0)
     ratio = np.divide(change, before, out=np.zeros_like(change), where=some)
     return np.asarray(change / (1.0 - np.clip(ratio, _SWING, _RATIO)))
+
+
+def damped(part: Array, error: Array, before: Array) -> Array:
+    """The parts (n,) of changes to make, smaller where errors (n,) do not fall.
+
+    Args:
+        part: (n,) the parts made last. error: (n,) the errors now. before: (n,) those before.
+    """
+    halved, grown = np.maximum(0.5 * part, _LEAST), np.minimum(_GROWS * part, 1.0)
+    return np.asarray(np.where(error > _FALLS * before, halved, grown))

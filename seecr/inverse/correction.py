@@ -21,7 +21,7 @@ from seecr.holding.hanging import least_of_heavy
 from seecr.holding.inside import balances, counted_balance, holds_tightly
 from seecr.holding.lengths import Held, hold, hold_again, holds_firmly
 from seecr.holding.unheld import why_not_held
-from seecr.inverse.aitken import to_their_limit
+from seecr.inverse.aitken import damped, to_their_limit
 from seecr.inverse.nearest import Nearest, Reaching, nearest, poses_in_place
 from seecr.inverse.told import told_lengths
 from seecr.pose import Array, pose_difference
@@ -41,9 +41,12 @@ alone.
 """
 
 # Rounds for history or users' laws, and the error of the pose at which they end [robot's length].
-_ROUNDS, _MISSED = 40, 1e-10
+_ROUNDS, _MISSED = 80, 1e-10
 # Every so-many-th round ends at the limit of the last changes.
 _EVERY = 3
+# From this round on, changes of rows that come no nearer are smaller, and a larger error will do: a
+# cable between sticking and slipping may go to and fro.
+_LATE, _MISSED_LATE = 12, 1e-7
 # A pose counts as reached if it is missed by less than this [m, and rad times the length].
 _REACHED = 1e-6
 # Strain of a cable up to which the nearest poses are sought where no highest tension is given:
@@ -439,6 +442,7 @@ class _Search:
     def _lengths(self, commands: Commands, held: Held) -> tuple[Array, Prediction]:
         """Told lengths that pay out the rest lengths of ``held``, and the prediction with them."""
         limits, before = self.limits, np.zeros_like(held.rest)
+        part, last_missed = np.ones(len(held.rest)), np.full(len(held.rest), np.inf)
         for number in range(_ROUNDS):
             told = told_lengths(self.robot, commands, self.effects, held.rest)
             trial = replace(commands, lengths=told, told=True)
@@ -446,14 +450,19 @@ class _Search:
             if not (prediction.has_history or prediction.setup.laws):
                 break
             missed = np.abs(pose_difference(prediction.pose, commands.pose)).max(axis=1)
-            if np.all(missed[held.fine] <= _MISSED * self.robot.length):
+            late = number >= _LATE and prediction.has_history
+            most = _MISSED_LATE if late else _MISSED
+            if np.all(missed[held.fine] <= most * self.robot.length):
                 break
             last = held.rest
             held = hold_again(prediction.tables, held, limits.aim, limits.low, limits.high)
             change = held.rest - last
-            if number and number % _EVERY == 0:
+            if late:
+                part = damped(part, missed, last_missed)
+                held.rest = last + part[:, None] * change
+            elif number and number % _EVERY == 0:
                 held.rest = last + to_their_limit(change, before)
-            before = change
+            before, last_missed = change, missed
         return told, prediction
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from seecr.holding.unheld import why_not_held
 from seecr.inverse.correction import correct
 from seecr.inverse.told import unplay
 from seecr.pose import pose_add, pose_difference
-from seecr.prediction.experiment import predict
+from seecr.prediction.experiment import Experiment, Prediction, predict
 from seecr.workspace.zones import balance_equations, feasible
 
 TENSION_ONLY = {"tracker_frame", "tracker_target", "tracker_scale", "tension_scale"}
@@ -407,4 +408,46 @@ def test_drums_whose_run_out_is_nearly_their_radius_pay_out_what_is_wanted() -> 
     poses[:, :3] += 0.1 * np.ptp(robot.exit_points, axis=0) * apart
     drums = typical(robot, catalogue()["drum_eccentricity"])
     found = correct(robot, Commands(poses), effects=[drums])
+    assert found.held.all() and found.reached.all()
+
+
+def along_a_curve(robot: Robot, n: int) -> Commands:
+    """Small steps, back and forth in each direction."""
+    poses, part = np.tile(robot.reference_pose, (n, 1)), np.linspace(0.0, 2.0 * np.pi, n)
+    ways = [np.sin(3.0 * part), np.sin(5.0 * part + 1.0), 0.5 * np.sin(7.0 * part + 2.0)]
+    poses[:, :3] += 0.1 * np.ptp(robot.exit_points, axis=0) * np.stack(ways, axis=1)
+    return Commands(poses, time=5.0 * np.arange(n))
+
+
+def test_lengths_over_sticking_exit_points_are_found_in_a_few_rounds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of 2,000 such poses four had none after forty rounds."""
+    rounds = 0
+    predict_all = Experiment.predict
+
+    def counted(self: Experiment, *given: Any) -> Prediction:
+        nonlocal rounds
+        rounds += 1
+        return predict_all(self, *given)
+
+    monkeypatch.setattr(Experiment, "predict", counted)
+    robot = robot_named("ipanema")
+    effects = [typical(robot, catalogue()["exit_friction"])]
+    found = correct(robot, along_a_curve(robot, 400), effects=effects)
+    assert found.held.all() and found.reached.all()
+    assert np.abs(found.left).max() < 1e-9
+    assert rounds <= 5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("n", "names"), [
+    (2000, ("hysteresis",)),
+    (400, ("hysteresis", "creep", "exit_friction", "backlash", "cable_weight")),
+])  # fmt: skip
+def test_lengths_that_go_to_and_fro_come_to_rest(n: int, names: tuple[str, ...]) -> None:
+    """A tenth of the rows was not reached; with all effects limits of other rows were taken."""
+    robot = robot_named("camera")
+    effects = [typical(robot, catalogue()[name]) for name in names]
+    found = correct(robot, along_a_curve(robot, n), effects=effects)
     assert found.held.all() and found.reached.all()
