@@ -158,12 +158,12 @@ def pull_and_change(
 def rest_lengths_for(cables, spans, tensions, follows, out):
     """Rest lengths (n, m) [m] at which straight cables of given spans have given tensions.
 
-    They are exact for every law, with its history: l0 (1 + eps + creep) + compliance T +
-    winch_side/EA T_winch is the span.
+    For every law, with its history, l0 (1 + eps + creep) + compliance T + winch_side/EA T_winch is
+    the span: to rounding, but to a few micrometres where a cable with hysteresis sticks.
 
     Args:
-        follows: whether tensions behind exit points are ``STUCK`` at the present rest lengths and
-            change with them; otherwise they are that at any length.
+        follows: whether the tension behind a cable that sticks is ``STUCK`` only at the rest length
+            in the table, and changes with what is paid out; otherwise it is that at any length.
     """
     row = cables[0, 0].copy()
     for r in range(cables.shape[0]):
@@ -199,11 +199,16 @@ def _strain(row, tension):
 
 @jit_inner
 def _rest_for(row, known, span, tension, follows):
-    """Rest length [m] with the strain that the cable has at its own rest length.
+    """Rest length [m] at which a straight cable of a given span has a given tension.
 
-    A cable that sticks at its exit point leaves behind it what is paid out, until the tension there
-    is low enough to slip (Euler-Eytelwein): a wanted tension lies between the two limits only where
-    it is the one that the cable has in any case.
+    While a cable sticks, paying out changes the tension behind it and hardly that in front. So a
+    wanted tension nearly always takes a length at which the cable slips, one way or the other
+    (Euler-Eytelwein).
+
+    Args:
+        row: the cable at the present iterate, on which its hysteresis depends.
+        known: the cable as it is in the table, with the rest length at which ``STUCK`` holds.
+        span: [m]. tension: [N]. follows: as for :func:`rest_lengths_for`.
     """
     strain, soft = _strain(row, tension), row[WINCH_SIDE] / row[EA]
     left = span - row[COMPLIANCE] * tension

@@ -59,12 +59,15 @@ def rest_for(tables: Tables, tensions: Array) -> Array:
 
 
 def rest_after(tables: Tables, rest: Array, tensions: Array) -> Array:
-    """(n, m) [m] rest lengths with these tensions (n, m) [N] if those behind exit points follow.
+    """(n, m) [m] rest lengths with tensions (n, m) [N] where cables stick at their exit points.
+
+    What is paid out to a cable that sticks stays behind the exit point, and lowers the tension
+    there until the cable slips.
 
     Args:
-        tables: with the history that the cables have at the rest lengths there. A cable that sticks
-            at its exit point has another tension behind it at other lengths.
-        rest: (n, m) [m] rest lengths at which they have these tensions with that history.
+        tables: with the cables' history at the rest lengths there.
+        rest: (n, m) [m] rest lengths with which cables would have these tensions if those behind
+            exit points stayed as they are.
         tensions: (n, m) [N].
     """
     if not tables.cables[..., FRICTION].any():
@@ -73,7 +76,12 @@ def rest_after(tables: Tables, rest: Array, tensions: Array) -> Array:
 
     spans, there = np.empty_like(rest), tables.cables.copy()
     there[..., REST] = rest
-    stretched_lengths(there, np.array(tensions, order="C"), spans)
+    pulls = np.array(tensions, order="C")
+
+    def run(part: slice) -> None:
+        stretched_lengths(there[part], pulls[part], spans[part])
+
+    in_parts(run, len(spans))
     return _straight_rest(tables, spans, tensions, follows=True)
 
 

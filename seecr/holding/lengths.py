@@ -90,14 +90,18 @@ def hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int = _ROU
     )
 
 
-def hold_again(tables: Tables, held: Held, aim: Array, low: Array, high: Array) -> Held:
+def hold_again(
+    tables: Tables, held: Held, aim: Array, low: Array, high: Array, follows: bool = True
+) -> Held:
     """Rest lengths that hold poses again, after nothing but the cables' history has changed.
 
     On straight cables the tensions stay as they are: only the lengths for them are others.
 
     Args:
         tables: of n poses.
-        held: as held before. aim, low, high: as for :func:`hold`.
+        held: as held before. aim, low, high: as for :func:`hold`; limits may be (n, m).
+        follows: whether the tension behind a cable that sticks at its exit point changes with what
+            is paid out, :func:`seecr.holding.hanging.rest_after`.
     """
     if bends(tables):
         out = _hold(tables, aim, *limits_of(tables, low, high), _ROUNDS, held.rest)
@@ -107,7 +111,7 @@ def hold_again(tables: Tables, held: Held, aim: Array, low: Array, high: Array) 
             out.put(lost, hold(take(tables, lost), aim[lost], least, most))
     else:
         out = Held(rest_for(tables, held.tensions), held.tensions, held.fine)
-    rest = rest_after(tables, out.rest, out.tensions)
+    rest = rest_after(tables, out.rest, out.tensions) if follows else out.rest
     slack = _slack(tables, out.tensions, limits_of(tables, low, high)[0]) & out.fine[:, None]
     return Held(_loosened(tables, rest, slack), out.tensions, out.fine)
 

@@ -44,9 +44,13 @@ alone.
 _ROUNDS, _MISSED = 80, 1e-10
 # Every so-many-th round ends at the limit of the last changes.
 _EVERY = 3
-# From this round on, changes of rows that come no nearer are smaller, and a larger error will do: a
-# cable between sticking and slipping may go to and fro.
+# From this round on, a larger error will do: a cable between sticking and slipping may go to and
+# fro.
 _LATE, _MISSED_LATE = 12, 1e-7
+# Late rounds do one of two things, in turns of so many. They take the tension behind a cable that
+# sticks as given: it is nearly so where the cable slips on the way to the pose. Or they change by
+# less the rows that come no nearer.
+_TURNS = 14
 # A pose counts as reached if it is missed by less than this [m, and rad times the length].
 _REACHED = 1e-6
 # Strain of a cable up to which the nearest poses are sought where no highest tension is given:
@@ -443,21 +447,24 @@ class _Search:
         """Told lengths that pay out the rest lengths of ``held``, and the prediction with them."""
         limits, before = self.limits, np.zeros_like(held.rest)
         part, last_missed = np.ones(len(held.rest)), np.full(len(held.rest), np.inf)
+        length = self.robot.length
+        size = np.where(np.arange(6) < 3, 1.0 / length, 1.0)
         for number in range(_ROUNDS):
             told = told_lengths(self.robot, commands, self.effects, held.rest)
             trial = replace(commands, lengths=told, told=True)
             prediction = Experiment(self.robot, trial).predict(self.effects)
             if not (prediction.has_history or prediction.setup.laws):
                 break
-            missed = np.abs(pose_difference(prediction.pose, commands.pose)).max(axis=1)
+            missed = np.abs(pose_difference(prediction.pose, commands.pose) * size).max(axis=1)
             late = number >= _LATE and prediction.has_history
-            most = _MISSED_LATE if late else _MISSED
-            if np.all(missed[held.fine] <= most * self.robot.length):
+            most = min(_MISSED_LATE if late else _MISSED, 0.5 * _REACHED / length)
+            if np.all(missed[held.fine] <= most):
                 break
-            last = held.rest
-            held = hold_again(prediction.tables, held, limits.aim, limits.low, limits.high)
+            last, plain = held.rest, late and (number - _LATE) // _TURNS % 2 == 0
+            tables = prediction.tables
+            held = hold_again(tables, held, limits.aim, limits.low, limits.high, follows=not plain)
             change = held.rest - last
-            if late:
+            if late and not plain:
                 part = damped(part, missed, last_missed)
                 held.rest = last + part[:, None] * change
             elif number and number % _EVERY == 0:
