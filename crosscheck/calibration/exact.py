@@ -27,7 +27,7 @@ _STEPS = 12
 LOCAL_MINIMUM = 8.0
 # Sets up to this size are tried from more starting points.
 FEW = 5
-# Parts of the values of a linear model from which fits start: the first that explains anything.
+# Parts of the way to the values of a linear model at which fits may begin.
 _PARTS = (1.0, 0.5, 0.25, 0.125)
 
 
@@ -112,6 +112,11 @@ class Exact:
         """Fit these sets, and return the best of all that were ever fitted."""
         for names in some:
             self.fit(scores, names)
+        return self.best
+
+    @property
+    def best(self) -> Refit:
+        """The best of all sets that were ever fitted."""
         return max(self.possible.values(), key=lambda r: r.score)
 
     def take(self, scores: Scores, start: Terms) -> None:
@@ -167,16 +172,25 @@ class Exact:
         return evaluate(self.setting.problem, terms, self.setting.factor, self.plain)
 
     def _linear(self, scores: Scores, names: Names) -> State:
-        """A set at the values of the linear model, or at a part of them.
+        """A set at the values of the linear model, or part of the way to them.
 
         Far from where the readings were linearised, a large set can have values with which it
-        explains less than no effect at all does. No fit leads back from there.
+        explains less than the model as it stands does. No fit leads back from there. If even an
+        eighth of the way explains less, the fit begins where least is left.
         """
+        most, tried = self._left(self.plain), list[State]()
         for part in _PARTS:
-            state = self._at(_linear_terms(self.catalogue, scores, names, part))
-            if state.chi2 <= self.plain.chi2:
+            tried.append(self._at(_linear_terms(self.catalogue, scores, names, part)))
+            if tried[-1].valid and self._left(tried[-1]) <= most:
                 break
-        return state
+        return min(tried, key=self._left)
+
+    def _left(self, state: State) -> float:
+        """What a model leaves, with the noise and the weights of all fits."""
+        if not state.valid:
+            return float("inf")
+        white = self.joint.whitened(self.setting.chain, state.white)
+        return float(white @ white) + state.log_det
 
     def _from(
         self, scores: Scores, names: Names, start: State, widths: dict[str, float]
@@ -200,7 +214,7 @@ class Exact:
 
 
 def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names, part: float) -> Terms:
-    """The set with a part of the values of the linear model; 0 is null."""
+    """The set part of the way to the values of the linear model, from null or the model's own."""
     solved = scores.gram.solved(scores.widths(names))
     values, out, first = solved.values, [], 0
     for name in solved.chosen:
@@ -211,7 +225,8 @@ def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names, part: floa
         if count < len(own):  # only amplitudes at null are in the linear model
             own = own[start[own] == layout.null[own]]
         vector = start.copy()
-        vector[own] = layout.null[own] + part * values[first : first + count] * layout.scale[own]
+        linear = layout.null[own] + values[first : first + count] * layout.scale[own]
+        vector[own] = start[own] + part * (linear - start[own])
         out.append(_off_bound(term.with_vector(np.clip(vector, layout.lower, layout.upper))))
         first += count
     return Terms([*out, *(catalogue.start(name) for name in names if name not in solved.chosen)])

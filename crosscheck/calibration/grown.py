@@ -19,14 +19,14 @@ def grown(exact: Exact) -> Refit:
     """The best of all sets after the best single effects have grown."""
     none = exact.fitted[frozenset(exact.plain.terms.names)]
     if none is None:
-        return exact.best_of(exact.scores_about(exact.joint), [])
+        return exact.best
     scores = exact.scores_about(none.joint)
     names = [name for name in exact.catalogue.names if name not in none.names]
     alone = [exact.fit(scores, none.names | {name}) for name in names]
-    begun = sorted((one for one in alone if one is not None), key=lambda one: -one.score)
-    for one in begun[:_FROM]:
+    begun = [one for one in alone if one is not None and exact.can_be(one)]
+    for one in sorted(begun, key=lambda one: -one.score)[:_FROM]:
         _grow(exact, one)
-    return exact.best_of(scores, [])
+    return exact.best
 
 
 def _grow(exact: Exact, here: Refit) -> None:
@@ -39,7 +39,6 @@ def _grow(exact: Exact, here: Refit) -> None:
         fits = [fit for fit in (exact.fit(scores, names) for names in tried) if fit is not None]
         top = max(filter(exact.can_be, fits), key=lambda fit: fit.score, default=here)
         gain = top.score - here.score
-        best = exact.best_of(scores, [])
-        if gain < _LEAST or top.score + gain * (left - 1) < best.score:
+        if gain < _LEAST or top.score + gain * (left - 1) < exact.best.score:
             return
         here = top

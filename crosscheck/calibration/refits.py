@@ -112,7 +112,7 @@ def compare_sets(
         best = _searched(exact, scores, other.names, most)
     for _ in range(_CHALLENGES):
         challenge(exact, scores, best)
-        other = exact.best_of(scores, [])
+        other = exact.best
         if other.names == best.names:
             break
         scores = exact.scores_about(other.joint)
@@ -207,23 +207,26 @@ def about_given(
     seen = scores.score(last.names) - scores.score(best.names)
     if last.score - best.score < seen + LOCAL_MINIMUM:
         return scores, best
-    if last.names <= best.names and not _gains_with(exact, scores, best, last):
-        return scores, best
+    if last.names <= best.names:
+        now = _from_values_of(exact, scores, best, last)
+        if now.score < best.score + LOCAL_MINIMUM:
+            return scores, now
     near = exact.scores_about(last.joint, own_shapes=True)
     other = _searched(exact, near, last.names, _BESIDE)
-    if other.names == best.names:
+    if other is best:
         return scores, best
-    near = exact.scores_about(other.joint, own_shapes=True)
-    best = _searched(exact, near, other.names, _BESIDE)
-    return exact.scores_about(best.joint, own_shapes=True), best
+    if other.names != best.names:
+        near = exact.scores_about(other.joint, own_shapes=True)
+        other = _searched(exact, near, other.names, _BESIDE)
+    return exact.scores_about(other.joint, own_shapes=True), other
 
 
-def _gains_with(exact: Exact, scores: Scores, best: Refit, part: Refit) -> bool:
-    """Whether the best set explains more from the values that its members have in a part of it."""
+def _from_values_of(exact: Exact, scores: Scores, best: Refit, part: Refit) -> Refit:
+    """The best set, fitted also from the values that its members have in a part of it."""
     own = {term.name: term for term in part.joint.terms}
+    exact.report(" + ".join(sorted(best.names)))
     exact.take(scores, Terms(own.get(term.name, term) for term in best.joint.terms))
-    found = exact.fitted[best.names]
-    return found is not None and found.score > best.score + LOCAL_MINIMUM
+    return exact.fitted[best.names] or best
 
 
 def looked_about(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Refit]:
@@ -238,7 +241,7 @@ def looked_about(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Ref
         for names in _beside(exact, scores, best.names):
             exact.fit(scores, names)
             _begin_at(exact, scores, best, names)
-        better = exact.best_of(scores, containing(exact, exact.best_of(scores, [])))
+        better = exact.best_of(scores, containing(exact, exact.best))
         if better.names == best.names:
             return scores, best
         best = better
@@ -306,4 +309,4 @@ def swapped(exact: Exact, scores: Scores, best: Refit) -> Refit:
             if one.gain > max(least, 0.0):
                 exact.report(" + ".join(sorted(rest.names | {one.term.name})))
                 exact.take(scores, Terms([*rest.joint.terms, inside(one.term)]))
-    return exact.best_of(scores, [])
+    return exact.best

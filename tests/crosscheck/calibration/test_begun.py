@@ -55,3 +55,48 @@ def test_a_fit_begins_where_the_set_explains_more_than_nothing_does(
     assert tried == [1.0 / 2**i for i in range(len(tried))] and tried[-1] == taken
     assert found is not None
     assert found.joint.terms.vector[0] == pytest.approx(1.005, abs=2e-5)
+
+
+def test_part_of_the_way_begins_at_the_model_as_it_stands() -> None:
+    """An eighth of a tracker's place in the model was five orders of magnitude worse than all."""
+    scaled = Terms([term(ROBOT, "tracker_scale", factor=1.5)])
+    data = measured(ROBOT, [*scaled, term(ROBOT, "platform_mass", added_kg=0.02)], points=3, seed=1)
+    problem = Problem(ROBOT, data, SIGMA, np.ones(data.n_rows, dtype=bool))
+    factor = problem.noise(problem.experiment.predict(scaled.effects))
+    setting = Setting(problem, factor, chain_of(problem), frozen=True)
+    plain = evaluate(problem, scaled, factor)
+    both = Terms([*scaled, term(ROBOT, "platform_mass")])
+    joint = settle(setting, plain.of(both), widths_of(both), WHITE, 0)
+    some = Exact(setting, joint, Catalogue(both, Terms()), plain, lambda _text: None)
+    scores, names = some.scores_about(joint), frozenset(both.names)
+    none, half, all_ = (
+        exact._linear_terms(some.catalogue, scores, names, part) for part in (0.0, 0.5, 1.0)
+    )
+    assert none["tracker_scale"].vector[0] == 1.5 and none["platform_mass"].vector[0] == 0.0
+    assert half.vector == pytest.approx(0.5 * (none.vector + all_.vector), rel=1e-9)
+    assert all_["tracker_scale"].vector[0] == pytest.approx(1.5, rel=0.01)
+
+
+def test_outliers_do_not_decide_where_a_fit_begins(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What few rows far off leave changes by more than all that the others leave."""
+    data = measured(ROBOT, [term(ROBOT, "tracker_scale", factor=1.002)], points=3, seed=1)
+    data.position[:4] *= 0.3
+    problem = Problem(ROBOT, data, SIGMA, np.ones(data.n_rows, dtype=bool))
+    factor = problem.noise(problem.experiment.predict(()))
+    null = Terms([term(ROBOT, "tracker_scale")])
+    plain = evaluate(problem, Terms(), factor)
+    free = Setting(problem, factor, chain_of(problem), frozen=True)
+    joint = settle(free, plain.of(null), widths_of(null), WHITE)
+    setting = Setting(problem, factor, chain_of(problem), frozen=True, weight=joint.weight)
+    near = Terms([term(ROBOT, "tracker_scale", factor=1.001)])
+    away = Terms([term(ROBOT, "tracker_scale", factor=0.9)])
+    at = {part: near if part == 1.0 else away for part in exact._PARTS}
+    monkeypatch.setattr(exact, "_linear_terms", lambda _c, _s, _n, part: at[part])
+    some = Exact(setting, joint, Catalogue(null, Terms()), plain, lambda _text: None)
+    scores = some.scores_about(joint)
+    # with all rows alike, nothing would explain more
+    assert evaluate(problem, near, factor).chi2 > plain.chi2
+    assert some._linear(scores, SCALE).terms.vector[0] == 1.001
+    # and where no part explains more, the fit begins where least is left
+    at.update({1.0: away, 0.5: Terms([term(ROBOT, "tracker_scale", factor=0.99)])})
+    assert some._linear(scores, SCALE).terms.vector[0] == 0.99

@@ -218,32 +218,36 @@ def test_about_a_part_of_the_best_set_nothing_is_sought_unless_its_values_explai
 ) -> None:
     """Beside a kink in a cable, two minutes went to a set whose members had all been found."""
     both = frozenset({"drum_eccentricity", "anchor_point_error"})
-    best = fitted(both, "best", 0.0)
+    best, now = fitted(both, "best", 0.0), fitted(both, "now", there)
     given = fitted(frozenset(last), "given", -600.0)
     begun: list[Terms] = []
     sought: list[object] = []
 
     def searched(_exact: object, scores: object, _begin: Names, _most: int) -> Any:
         sought.append(scores)
-        return best
+        return now if last <= both else best
 
     monkeypatch.setattr(refits, "_searched", searched)
     nearby: Any = SimpleNamespace(
         catalogue=SimpleNamespace(later=SimpleNamespace(names=("drum_eccentricity", "creep"))),
-        fitted={both: SimpleNamespace(score=there)},
+        fitted={both: now},
         fit=lambda _scores, names: given if names == given.names else None,
         take=lambda _scores, start: begun.append(start),
+        report=lambda _text: None,
         scores_about=lambda joint, own_shapes: joint,
     )
     linear: Any = SimpleNamespace(
         always=frozenset(), score=lambda names: -1e5 if names == given.names else 0.0
     )
-    assert refits.about_given(nearby, linear, best, [given.names]) == (linear, best)
+    found = refits.about_given(nearby, linear, best, [given.names])
     assert sought == ([given.joint] if about else [])
-    if last <= both:
-        own = {member.name: member.origin for member in begun.pop()}
-        assert own == {"drum_eccentricity": "given", "anchor_point_error": "best"}
-    assert not begun
+    if not last <= both:
+        assert found == (linear, best) and not begun
+        return
+    # what explains more from there is the best set from now on, with scores about it
+    assert found == ((now.joint if about else linear), now)
+    own = {member.name: member.origin for member in begun.pop()}
+    assert own == {"drum_eccentricity": "given", "anchor_point_error": "best"}
 
 
 def fitted(names: Names, origin: str, score: float) -> Any:

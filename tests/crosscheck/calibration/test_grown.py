@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from types import SimpleNamespace
 from typing import Any
 
@@ -40,9 +39,8 @@ class Toy:
     def can_be(self, refit: Any) -> bool:
         return refit.names not in self.impossible
 
-    def best_of(self, scores: object, some: Iterable[Names]) -> Any:
-        for names in some:
-            self.fit(scores, names)
+    @property
+    def best(self) -> Any:
         possible = (one for one in self.fitted.values() if self.can_be(one))
         return max(possible, key=lambda one: one.score)
 
@@ -80,12 +78,14 @@ def test_values_that_no_robot_can_have_do_not_grow() -> None:
     toy: Any = Toy(GROWS)
     toy.impossible = {frozenset("bc"), frozenset("bcd")}
     assert grown(toy).names == frozenset("ae")
+    toy = Toy({**GROWS, "g": -20.0, "h": -30.0})  # two negative masses took both places
+    toy.impossible = {frozenset("g"), frozenset("h")}
+    assert grown(toy).names == frozenset("bcd")
 
 
 def test_of_a_model_without_an_equilibrium_nothing_grows() -> None:
     toy: Any = Toy(GROWS)
     toy.fitted = {frozenset(): None, frozenset("a"): toy.fit(None, frozenset("a"))}
     toy.can_be = lambda one: one is not None
-    toy.best_of = lambda _scores, _some: toy.fitted[frozenset("a")]
     assert grown(toy).names == frozenset("a")
     assert len(toy.fitted) == 2
