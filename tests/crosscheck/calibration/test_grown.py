@@ -89,3 +89,17 @@ def test_of_a_model_without_an_equilibrium_nothing_grows() -> None:
     toy.can_be = lambda one: one is not None
     assert grown(toy).names == frozenset("a")
     assert len(toy.fitted) == 2
+
+
+def test_the_member_that_promises_most_is_not_the_only_one_tried() -> None:
+    toy: Any = Toy(GROWS)
+    promise = {frozenset("bg"): -150.0, frozenset("bh"): -160.0}  # which they do not keep
+    toy.scores_about = lambda _joint: SimpleNamespace(
+        score=lambda names: promise.get(names, toy.table.get(names, toy.nothing))
+    )
+    assert grown(toy).names == frozenset("bcd")
+
+
+def test_a_member_that_adds_next_to_nothing_ends_a_set() -> None:
+    toy: Any = Toy({"a": -300.0, "ab": -298.0, "abc": -10.0})
+    assert grown(toy).names == frozenset("a")
