@@ -100,7 +100,8 @@ def test_the_member_that_promises_most_is_not_the_only_one_tried() -> None:
     assert grown(toy).names == frozenset("bcd")
 
 
-def test_a_member_that_adds_next_to_nothing_ends_a_set() -> None:
+def test_a_member_that_adds_next_to_nothing_ends_a_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(grown_module, "_FROM", 1)
     toy: Any = Toy({"a": -300.0, "ab": -298.0, "abc": -10.0})
     assert grown(toy).names == frozenset("ab")
     assert frozenset("abc") not in toy.fitted
