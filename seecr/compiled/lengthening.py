@@ -43,8 +43,9 @@ from seecr.compiled.jit import jit_allocating, jit_inner
 from seecr.compiled.law import dahl, series_length, strain_of_tension, winch_tension
 from seecr.compiled.yielding import along
 
-# Most rounds for a length that changes its own hysteresis; each is a thousand times nearer.
-_ROUNDS = 30
+# Most rounds for a length that changes its own hysteresis, of which the first are secant steps: it
+# may change it nearly as much as it was changed, if the cable sticks.
+_ROUNDS, _SECANTS = 30, 20
 
 
 @jit_inner
@@ -159,7 +160,7 @@ def rest_lengths_for(cables, spans, tensions, follows, out):
     """Rest lengths (n, m) [m] at which straight cables of given spans have given tensions.
 
     For every law, with its history, l0 (1 + eps + creep) + compliance T + winch_side/EA T_winch is
-    the span: to rounding, but to a few micrometres where a cable with hysteresis sticks.
+    the span: to rounding, or to some nanometres where a cable with hysteresis sticks.
 
     Args:
         follows: whether the tension behind a cable that sticks is ``STUCK`` only at the rest length
@@ -169,12 +170,18 @@ def rest_lengths_for(cables, spans, tensions, follows, out):
     for r in range(cables.shape[0]):
         for i in range(cables.shape[1]):
             copy_vector(cables[r, i], row)
-            for _ in range(_ROUNDS):
+            before, off_before = row[REST], 0.0
+            for k in range(_ROUNDS):
                 out[r, i] = _rest_for(row, cables[r, i], spans[r, i], tensions[r, i], follows)
-                done = row[HYSTERESIS] == 0.0 or abs(out[r, i] - row[REST]) <= 1e-16 * out[r, i]
-                row[REST] = out[r, i]
-                if done:
+                off = out[r, i] - row[REST]
+                if row[HYSTERESIS] == 0.0 or abs(off) <= 1e-16 * out[r, i]:
                     break
+                step = off
+                if 0 < k < _SECANTS:
+                    slope = (off - off_before) / (row[REST] - before)
+                    step = -off / slope if slope < 0.0 else off
+                before, off_before = row[REST], off
+                row[REST] += step
 
 
 @jit_allocating

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from seecr.commands.data import Commands
-from seecr.compiled.columns import EA, FRICTION, LIFT, REST, STUCK, TENSION, WINCH_SIDE
+from seecr.compiled.columns import (
+    EA,
+    FRICTION,
+    HYSTERESIS,
+    LIFT,
+    REST,
+    STUCK,
+    TENSION,
+    WINCH_SIDE,
+)
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term, catalogue, layout_of
@@ -98,3 +107,17 @@ def test_without_friction_lengths_stay_as_they_are() -> None:
     tables = predicted("demobot_cogiro", ("hysteresis",)).tables
     rest = rest_for(tables, np.full((5, 8), 0.7))
     assert rest_after(tables, rest, np.full((5, 8), 0.7)) is rest
+
+
+def test_lengths_are_exact_where_a_cable_with_hysteresis_sticks() -> None:
+    """Each round changed the hysteresis nearly as much as it had been changed."""
+    tables = predicted("demobot_cogiro", ("exit_friction", "hysteresis")).tables
+    tables.cables[..., HYSTERESIS] *= 1000.0
+    tables = with_rest(tables, rest_for(tables, np.full((5, 8), 0.7)))
+    tables.cables[..., STUCK] = 0.7
+    there = batch.evaluate(tables, here(tables)).states[..., TENSION]
+    wanted = there * (1.0 + 1e-5 * np.random.default_rng(0).normal(size=there.shape))
+    now = with_rest(tables, rest_after(tables, rest_for(tables, wanted), wanted))
+    paid = now.cables[..., REST] - tables.cables[..., REST]
+    now.cables[..., STUCK] -= paid * tables.cables[..., EA] / tables.cables[..., WINCH_SIDE]
+    assert batch.evaluate(now, here(now)).states[..., TENSION] == pytest.approx(wanted, rel=1e-9)
