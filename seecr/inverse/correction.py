@@ -19,11 +19,10 @@ from seecr.holding.balance import bends, is_straight
 from seecr.holding.distribution import tension_limits, wanted_tensions
 from seecr.holding.hanging import least_of_heavy
 from seecr.holding.inside import balances, counted_balance, holds_tightly
-from seecr.holding.lengths import Held, hold, hold_again, holds_firmly
+from seecr.holding.lengths import Held, hold, holds_firmly
 from seecr.holding.unheld import why_not_held
-from seecr.inverse.aitken import damped, to_their_limit
+from seecr.inverse.history import REACHED, lengths_with_history
 from seecr.inverse.nearest import Nearest, Reaching, nearest, poses_in_place
-from seecr.inverse.told import told_lengths
 from seecr.pose import Array, pose_difference
 from seecr.prediction.experiment import Experiment, Prediction, effects_of
 from seecr.result import COORDINATES, Record, Result, named
@@ -40,19 +39,6 @@ PREFERENCES = ("pose", "position")
 alone.
 """
 
-# Rounds for history or users' laws, and the error of the pose at which they end [robot's length].
-_ROUNDS, _MISSED = 80, 1e-10
-# Every so-many-th round ends at the limit of the last changes.
-_EVERY = 3
-# From this round on, a larger error will do: a cable between sticking and slipping may go to and
-# fro.
-_LATE, _MISSED_LATE = 12, 1e-7
-# Late rounds do one of two things, in turns of so many. They take the tension behind a cable that
-# sticks as given: it is nearly so where the cable slips on the way to the pose. Or they change by
-# less the rows that come no nearer.
-_TURNS = 14
-# A pose counts as reached if it is missed by less than this [m, and rad times the length].
-_REACHED = 1e-6
 # Strain of a cable up to which the nearest poses are sought where no highest tension is given:
 # steel yields before, fibres tear. Without an end, poses near the edge take any tension.
 _STRAIN = 0.05
@@ -445,32 +431,8 @@ class _Search:
 
     def _lengths(self, commands: Commands, held: Held) -> tuple[Array, Prediction]:
         """Told lengths that pay out the rest lengths of ``held``, and the prediction with them."""
-        limits, before = self.limits, np.zeros_like(held.rest)
-        part, last_missed = np.ones(len(held.rest)), np.full(len(held.rest), np.inf)
-        length = self.robot.length
-        size = np.where(np.arange(6) < 3, 1.0 / length, 1.0)
-        for number in range(_ROUNDS):
-            told = told_lengths(self.robot, commands, self.effects, held.rest)
-            trial = replace(commands, lengths=told, told=True)
-            prediction = Experiment(self.robot, trial).predict(self.effects)
-            if not (prediction.has_history or prediction.setup.laws):
-                break
-            missed = np.abs(pose_difference(prediction.pose, commands.pose) * size).max(axis=1)
-            late = number >= _LATE and prediction.has_history
-            most = min(_MISSED_LATE if late else _MISSED, 0.5 * _REACHED / length)
-            if np.all(missed[held.fine] <= most):
-                break
-            last, plain = held.rest, late and (number - _LATE) // _TURNS % 2 == 0
-            tables = prediction.tables
-            held = hold_again(tables, held, limits.aim, limits.low, limits.high, follows=not plain)
-            change = held.rest - last
-            if late and not plain:
-                part = damped(part, missed, last_missed)
-                held.rest = last + part[:, None] * change
-            elif number and number % _EVERY == 0:
-                held.rest = last + to_their_limit(change, before)
-            before, last_missed = change, missed
-        return told, prediction
+        limits = self.limits.aim, self.limits.low, self.limits.high
+        return lengths_with_history(self.robot, commands, self.effects, held, limits)
 
 
 def _largest(moved: Array) -> float:
@@ -489,7 +451,7 @@ def _rests_at(poses: Array, solution: Solution) -> NDArray[np.bool_]:
     """(n,) whether the platform is at rest at poses (n, 7), to within a micrometre."""
     size = np.where(np.arange(6) < 3, 1.0, solution.robot.length)
     off = np.abs(pose_difference(solution.pose, poses) * size).max(axis=1)
-    return np.asarray(solution.converged & (off < _REACHED))
+    return np.asarray(solution.converged & (off < REACHED))
 
 
 def _without(solution: Solution, rows: NDArray[np.bool_]) -> Solution:

@@ -1,0 +1,83 @@
+"""Lengths to command where what a cable pulls depends on its history: found in rounds.
+
+The lengths for a wanted pose depend on the history that the cables have there, and that on the
+lengths of all rows before. So the path is predicted, the poses are held again with the history that
+the cables then have, and so on, until the prediction is at the wanted poses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from seecr.commands.data import Commands
+from seecr.description.robot import Robot
+from seecr.effects.base import Effect
+from seecr.holding.lengths import Held, hold_again
+from seecr.inverse.aitken import damped, to_their_limit
+from seecr.inverse.told import told_lengths
+from seecr.pose import Array, pose_difference
+from seecr.prediction.experiment import Experiment, Prediction
+
+REACHED = 1e-6
+"""A pose counts as reached if it is missed by less than this [m, and rad times the length]."""
+
+# Most rounds, and the error of the pose at which they end [robot's length].
+_ROUNDS, _MISSED = 80, 1e-10
+# Every so-many-th round ends at the limit of the last changes.
+_EVERY = 3
+# From this round on, a larger error will do where there is a history: a cable between sticking and
+# slipping may go to and fro.
+_LATE, _MISSED_LATE = 12, 1e-7
+# Late rounds do one of two things, in turns of so many. They take the tension behind a cable that
+# sticks as given: it is nearly so where the cable slips on the way to the pose. Or they change by
+# less the rows that come no nearer.
+_TURNS = 14
+
+
+def lengths_with_history(
+    robot: Robot,
+    commands: Commands,
+    effects: Sequence[Effect],
+    held: Held,
+    limits: tuple[Array, Array, Array],
+) -> tuple[Array, Prediction]:
+    """Told lengths (n, m) [m] that pay out what holds the poses, and the prediction with them.
+
+    Without history and users' laws they are those of ``held`` at once.
+
+    Args:
+        robot: as described. commands: of the n poses; their lengths are ignored.
+        effects: of the robot.
+        held: rest lengths that hold the poses without a history.
+        limits: aim and limits of the tensions, as for :func:`seecr.holding.lengths.hold_again`.
+    """
+    size = np.where(np.arange(6) < 3, 1.0 / robot.length, 1.0)
+    before, part = np.zeros_like(held.rest), np.ones(len(held.rest))
+    last_missed = np.full(len(held.rest), np.inf)
+    for number in range(_ROUNDS):
+        told = told_lengths(robot, commands, effects, held.rest)
+        prediction = Experiment(robot, replace(commands, lengths=told, told=True)).predict(effects)
+        if not (prediction.has_history or prediction.setup.laws):
+            break
+        missed = np.abs(pose_difference(prediction.pose, commands.pose) * size).max(axis=1)
+        late = number >= _LATE and prediction.has_history
+        if np.all(missed[held.fine] <= _enough(late, robot)):
+            break
+        last, given = held.rest, late and (number - _LATE) // _TURNS % 2 == 0
+        held = hold_again(prediction.tables, held, *limits, follows=not given)
+        change = held.rest - last
+        if late and not given:
+            part = damped(part, missed, last_missed)
+            held.rest = last + part[:, None] * change
+        elif number and number % _EVERY == 0:
+            held.rest = last + to_their_limit(change, before)
+        before, last_missed = change, missed
+    return told, prediction
+
+
+def _enough(late: bool, robot: Robot) -> float:
+    """The error [robot's length, rad] at which rounds end; half of what counts as reached."""
+    return min(_MISSED_LATE if late else _MISSED, 0.5 * REACHED / robot.length)
