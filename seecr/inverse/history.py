@@ -46,7 +46,8 @@ def lengths_with_history(
 ) -> tuple[Array, Prediction]:
     """Told lengths (n, m) [m] that pay out what holds the poses, and the prediction with them.
 
-    Without history and users' laws they are those of ``held`` at once.
+    If the rounds do not converge, those of the round that misses fewest poses are taken. Without
+    history and users' laws they are those of ``held`` at once.
 
     Args:
         robot: as described. commands: of the n poses; their lengths are ignored.
@@ -57,14 +58,18 @@ def lengths_with_history(
     size = np.where(np.arange(6) < 3, 1.0 / robot.length, 1.0)
     before, part = np.zeros_like(held.rest), np.ones(len(held.rest))
     last_missed = np.full(len(held.rest), np.inf)
+    least, best = (np.inf, np.inf), None
     for number in range(_ROUNDS):
         told = told_lengths(robot, commands, effects, held.rest)
         prediction = Experiment(robot, replace(commands, lengths=told, told=True)).predict(effects)
         if not (prediction.has_history or prediction.setup.laws):
-            break
+            return told, prediction
         missed = np.abs(pose_difference(prediction.pose, commands.pose) * size).max(axis=1)
         late = number >= _LATE and prediction.has_history
-        if np.all(missed[held.fine] <= _enough(late, robot)):
+        left = _left(missed[held.fine], robot)
+        if best is None or left < least:
+            least, best = left, (told, prediction)
+        if left[1] <= _enough(late, robot):
             break
         last, given = held.rest, late and (number - _LATE) // _TURNS % 2 == 0
         held = hold_again(prediction.tables, held, *limits, follows=not given)
@@ -75,7 +80,14 @@ def lengths_with_history(
         elif number and number % _EVERY == 0:
             held.rest = last + to_their_limit(change, before)
         before, last_missed = change, missed
-    return told, prediction
+    assert best is not None
+    return best
+
+
+def _left(missed: Array, robot: Robot) -> tuple[float, float]:
+    """How many poses are missed, and the largest error [robot's length]; NaN misses a pose."""
+    error = np.nan_to_num(missed, nan=np.inf)
+    return float(np.sum(error >= REACHED / robot.length)), float(np.max(error, initial=0.0))
 
 
 def _enough(late: bool, robot: Robot) -> float:

@@ -449,7 +449,8 @@ def test_lengths_are_found_where_cables_slip_only_on_the_way(
     robot = robot_named(name)
     curve = along_a_curve(robot, n)
     poses = np.repeat(curve.pose[::stands], stands, axis=0)[:n]
-    for names in (("exit_friction",), ("exit_friction", "hysteresis")):
+    every = ("exit_friction", "hysteresis", "creep")
+    for names in (every[:1], every[:2], every):
         effects = [typical(robot, catalogue()[one]) for one in names]
         found = correct(robot, Commands(poses, time=curve.time), effects=effects)
         assert found.held.all() and found.reached.all()
