@@ -40,6 +40,8 @@ _ZONES = {1: "#F0E442", 2: "#E69F00", 4: "#D55E00"}
 # The ends of its sweep [m], and what its text says was measured there: along z [mm], tilt [deg].
 ENDS, SUNK, TILTED = (0.17, 0.63), -15.0, 20.0
 _SAID, _PIECE = "parallel, measured at the ends", np.array([-0.015, 0.015])
+# Figure 9: a level platform at these x [m].
+LEVEL = (("planar_horizontal", 0.25), ("planar_vertical", 0.4), ("planar_vertical", 0.25))
 EXITS, HALF = np.array([[0.0, 1.0], [1.0, 1.0]]), 0.1
 
 
@@ -197,6 +199,36 @@ def _along(path: Path, name: str, z: float, workspace: bool, tops: tuple[str, ..
         right.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
+def figure_9(path: Path) -> None:
+    """Why the horizontal arrangement stays level and the vertical one tilts."""
+    with figure(path, 1, 3, figsize=(12.0, 3.0), sharey=True) as axes:
+        for ax, (name, x) in zip(axes[0], LEVEL, strict=True):
+            _midlines(ax, robot(name), x)
+        axes[0, 0].set_ylabel("z [m]")
+        _legend(axes[0, 2], loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def _midlines(ax: Any, one: Robot, x: float) -> None:
+    """The level platform there, its cables with their midlines, and the line of its weight."""
+    ends = one.anchor_points[:, [0, 2]] + [x, 0.2]
+    exits = one.exit_points[:, [0, 2]]
+    for way in np.stack([exits, ends], axis=1):
+        ax.plot(*way.T, lw=1.2, color=COLOURS[0], label="cables")
+    ax.fill_between([ends[:, 0].min(), ends[:, 0].max()], 0.182, 0.218, color=COLOURS[1], lw=0)
+    met = midline_point(exits, ends)
+    for pair in (slice(0, 2), slice(2, 4)):
+        middles = np.array([exits[pair].mean(axis=0), ends[pair].mean(axis=0), met])
+        ax.plot(*middles.T, "--", lw=1.0, color=COLOURS[4], label="midlines of parallel cables")
+    ax.plot(*met, "x", color=COLOURS[4], markersize=7, mew=2, zorder=5, label="where they meet")
+    ax.plot([x, x], [0.05, 0.3], ":", color="black", label="line of the weight")
+    ax.plot(x, 0.2, "o", color="black", markersize=3.5, label="centre of mass")
+    point, off = ("V" if "vertical" in one.name else "H"), 1e3 * (met[0] - x)
+    side = "right" if off > 0.0 else "left"
+    where = "on" if abs(off) < 1e-6 else f"{abs(off):.0f} mm {side} of"
+    ax.set_title(f"{point} {where} the line of the weight", fontsize=9)
+    ax.set(xlabel="x [m]", aspect="equal", xlim=(0.0, 0.8), ylim=(0.05, 0.52))
+
+
 def _feasible(ax: Any, one: Robot) -> None:
     """The static-feasible workspace in the plane of the sweep, platform level."""
     x, z = np.linspace(0.05, 0.75, 141), np.linspace(0.0, 0.47, 95)
@@ -232,6 +264,7 @@ FIGURES = {
     "figure-4": figure_4,
     "figure-7": lambda path: _along(path, "planar_vertical", 0.2, False, ("V",)),
     "figure-8": lambda path: _along(path, "planar_horizontal", 0.2, False, ("H",)),
+    "figure-9": figure_9,
     "figure-10": lambda path: _along(path, "demobot_cogiro", 0.1, True),
     "figure-11": lambda path: _along(path, "demobot_parallel", 0.1, True),
     "figure-12": figure_12,

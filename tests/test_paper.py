@@ -87,6 +87,28 @@ def test_figure_12_shows_what_was_measured_where_it_was(kept: list[Any], tmp_pat
     assert sum(len(ax.get_legend().texts) for ax in kept[0] if ax.get_legend()) == 5
 
 
+@pytest.mark.slow
+def test_figure_9_shows_where_equal_tensions_of_a_pair_pull(
+    kept: list[Any], tmp_path: Path
+) -> None:
+    """Their moment about the centre of mass is their lift at the distance that the title says."""
+    make_paper.figure_9(tmp_path / "9.png")
+    titles = []
+    for ax, (name, x) in zip(kept[0], make_paper.LEVEL, strict=True):
+        one = make_paper.robot(name)
+        arms = one.anchor_points[:, [0, 2]]
+        ways = one.exit_points[:, [0, 2]] - arms - [x, 0.2]
+        pull = np.repeat(ways.reshape(2, 2, 2).mean(axis=1), 2, axis=0)
+        pull *= np.array([1.0, -pull[0, 0] / pull[2, 0]])[[0, 0, 1, 1], None]
+        assert np.sum(pull[:, 0]) == pytest.approx(0.0, abs=1e-12)
+        moment = np.sum(arms[:, 0] * pull[:, 1] - arms[:, 1] * pull[:, 0])
+        (shown,) = (k.get_xydata() for k in ax.lines if k.get_label() == "where they meet")
+        off = float(shown[0, 0]) - x
+        assert off == pytest.approx(moment / np.sum(pull[:, 1]), abs=1e-12)
+        titles.append(ax.get_title().partition(" the line")[0])
+    assert titles == ["H on", "V on", "V 25 mm left of"]
+
+
 def test_curves_of_what_explains_figure_12_have_no_kinks_of_few_points(
     kept: list[Any], tmp_path: Path
 ) -> None:

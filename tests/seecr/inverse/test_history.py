@@ -21,7 +21,10 @@ POSES = np.tile(ROBOT.reference_pose, (3, 1))
 
 
 def played(
-    monkeypatch: pytest.MonkeyPatch, errors: list[list[float]], has_history: bool = True
+    monkeypatch: pytest.MonkeyPatch,
+    errors: list[list[float]],
+    has_history: bool = True,
+    seen: list[np.ndarray] | None = None,
 ) -> tuple[list[int], Any]:
     """The rounds that were played and what was found, with these errors [m] of three poses."""
     rounds: list[int] = []
@@ -41,7 +44,12 @@ def played(
     monkeypatch.setattr(
         history, "Experiment", lambda *_given: SimpleNamespace(predict=lambda e: predict(None, e))
     )
-    monkeypatch.setattr(history, "told_lengths", lambda _robot, _commands, _effects, rest: rest)
+    told = [] if seen is None else seen
+    monkeypatch.setattr(
+        history,
+        "told_lengths",
+        lambda _robot, _commands, _effects, rest: (told.append(rest), rest)[1],
+    )
     monkeypatch.setattr(history, "hold_again", hold_again)
     held = Held(np.ones((3, 8)), np.ones((3, 8)), np.array([True, True, False]))
     aim = np.ones((3, 8))
@@ -61,6 +69,21 @@ def test_the_round_that_misses_fewest_poses_is_taken(monkeypatch: pytest.MonkeyP
 def test_of_as_many_missed_poses_the_nearest_are_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     rounds, found = played(monkeypatch, [[1e-3, 1e-3, 0.0], [2e-5, np.nan, 0.0], [3e-5, 2e-5, 0.0]])
     assert found[1].number == 2 and len(rounds) == history._ROUNDS
+
+
+def test_late_rounds_change_less_the_rows_that_come_no_nearer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Row 1 comes nearer by a third each round, row 0 does not: half, a quarter, ... a tenth."""
+    told: list[np.ndarray] = []
+    errors = [[1e-3, 1e-3 * 0.66**k, 0.0] for k in range(history._ROUNDS)]
+    played(monkeypatch, errors, seen=told)
+    change = np.diff([rest[:2, 0] for rest in told], axis=0) / 1e-6
+    first = history._LATE + history._TURNS
+    damped = change[first : first + history._TURNS]
+    np.testing.assert_allclose(damped[:, 0], [0.5, 0.25, 0.125] + [0.1] * 11, rtol=1e-6)
+    np.testing.assert_allclose(damped[:, 1], 1.0, rtol=1e-6)
+    assert np.all(change[history._LATE + 1 : first] > 0.9), "and not where tensions are as given"
 
 
 @pytest.mark.parametrize(("has_history", "ends"), [(True, True), (False, False)])
