@@ -101,7 +101,7 @@ def at_null(term: Term) -> Term:
 def inside(term: Term) -> Term:
     """Move a start off its bound, where laws with history have two-sided derivatives."""
     layout = term.layout
-    at_bound = (term.vector <= layout.lower) & ~layout.shape
+    at_bound = (term.vector <= layout.lower) & ~layout.shape & ~term.knowledge.fixed
     return term.with_vector(np.where(at_bound, term.vector + 0.1 * layout.scale, term.vector))
 
 

@@ -171,7 +171,8 @@ def _from_nearby(trials: Trials, nodes: Sequence[Node], progress: Progress) -> l
         best = node.fit
         for _ in range(_TIMES):
             terms = best.terms
-            values = terms.vector + _AWAY * terms.scale * rng.normal(size=len(terms))
+            away = np.where(terms.knowledge.fixed, 0.0, rng.normal(size=len(terms)))
+            values = terms.vector + _AWAY * terms.scale * away
             near = terms.with_vector(np.clip(values, terms.lower, terms.upper))
             progress("fitting again from nearby values", 0.5)
             found = trials.refit(near, best.state, iterations=_AGAIN_ITERATIONS, quick=True)

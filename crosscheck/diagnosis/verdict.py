@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from crosscheck.calibration.judgement import SURE, too_large
 from crosscheck.calibration.search import search_sets
 from crosscheck.diagnosis.chances import PROBABLE
+from crosscheck.diagnosis.doubtful import doubtful_values
 from crosscheck.diagnosis.explained import explained
 from crosscheck.diagnosis.importance import weighed
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
@@ -87,7 +88,8 @@ def diagnose(
             base = found.search.steps[0].fit
             return replace(no_verdict(ready.problem, base, found.notes, rows), sight=found.sight)
         others = thin.note_on_others(found.search.last.fit.terms, found.search.problem.sigma)
-    return replace(found, notes=(*found.notes, *others))
+        doubts = doubtful_values(found)
+        return replace(found, notes=(*doubts, *found.notes, *others))
 
 
 def _may_be_noise(found: Diagnosis, problem: Problem) -> bool:
