@@ -14,7 +14,8 @@ from crosscheck.errors import CrosscheckError, UnsolvedError
 from crosscheck.fit.candidates import Trials, candidates_for, try_candidate
 from crosscheck.fit.gauss_newton import Fit, fit
 from crosscheck.fit.known import firmer
-from crosscheck.fit.prepare import Progress, outlying_rows, prepare
+from crosscheck.fit.outliers import outlying_rows
+from crosscheck.fit.prepare import Progress, prepare
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Why
 from crosscheck.fit.state import State

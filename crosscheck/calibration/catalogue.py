@@ -68,7 +68,7 @@ def gram_with(
         term, seen = _in_linear_model(joint, catalogue, name)
         one_sided = (term.layout.lower == term.layout.null)[seen]
         own = np.arange(first, first + count)
-        groups[name] = ColumnGroup(own, widths_for(term.layout), one_sided)
+        groups[name] = ColumnGroup(own, widths_for(term.layout, setting.free), one_sided)
         first += count
     white = joint.state.white
     x = np.concatenate([np.zeros((len(white), 0)), *columns.values()], axis=1)

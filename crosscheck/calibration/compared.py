@@ -70,7 +70,10 @@ class Compared:
         def of(one: JointFit, width: Array) -> float:
             return cost(self.whole.setting, joint.colour, joint.weight, one.state, width)
 
-        return of(best, widths_of(best.terms)) < of(joint, joint.width) - 2.0 * EQUAL
+        return (
+            of(best, widths_of(best.terms, self.whole.setting.free))
+            < of(joint, joint.width) - 2.0 * EQUAL
+        )
 
 
 def fit_and_compare(

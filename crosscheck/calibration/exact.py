@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -253,7 +254,7 @@ def scored(
     What the linear model would still gain there, the fit did not find: it is taken off.
     """
     linear = linearised(setting, joint)
-    gram = own_gram(linear, joint)
+    gram = own_gram(linear, joint, setting.free)
     # what moves readings at this fit need not have been in the linear model of the search
     inside = {n: widths.get(n, 1.0) for n in gram.names}
     better, wished = widths_near(gram, inside, joint.z)
@@ -283,9 +284,9 @@ def widths_near(
     return best, None
 
 
-def own_gram(linear: Linear, joint: JointFit) -> Gram:
+def own_gram(linear: Linear, joint: JointFit, free: Collection[str] = ()) -> Gram:
     """Normal equations of a fit's own effects about its optimum, without parameters on a bound."""
-    groups = column_groups(joint, widths_for)
+    groups = column_groups(joint, partial(widths_for, free=free))
     return gram_of(linear.x, own_readings(linear, joint, groups), groups)
 
 

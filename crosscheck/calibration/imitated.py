@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from scipy import special
@@ -204,7 +205,10 @@ class _Sets:
 
 def _with_fields(setting: Setting, joint: JointFit) -> tuple[Gram, dict[str, Varying]]:
     """Normal equations of a fit's own effects and of all fields; what each field varies."""
-    linear, groups = linearised(setting, joint), column_groups(joint, widths_for)
+    linear, groups = (
+        linearised(setting, joint),
+        column_groups(joint, partial(widths_for, free=setting.free)),
+    )
     y = own_readings(linear, joint, groups)
     fields, first = dict[str, ColumnGroup](), linear.x.shape[1]
     named = {f"field {k}": one for k, one in enumerate(varying(setting, joint))}

@@ -144,7 +144,7 @@ class _Beside:
         normal = x.T @ x - cross.T @ cross
         layout = term.layout
         one_sided = (layout.lower == layout.null)[amplitudes_at_null(term)]
-        return log_gain(normal, x.T @ self.left, widths_for(layout), one_sided)
+        return log_gain(normal, x.T @ self.left, widths_for(layout, self.setting.free), one_sided)
 
 
 def amplitudes(term: Term) -> NDArray[np.bool_]:

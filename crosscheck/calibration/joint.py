@@ -85,6 +85,11 @@ class Setting:
     watch: Callable[[float], None] = lambda _chi2: None
     weight: Array | None = None
 
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Effects whose values belong to the data."""
+        return self.problem.data.free
+
     def weight_at(self, colour: Colour, state: State) -> Array:
         """(N,) weight of each reading."""
         return row_weights(self.chain, colour, state.white) if self.weight is None else self.weight

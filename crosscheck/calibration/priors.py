@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from itertools import pairwise
 
 import numpy as np
@@ -26,21 +27,30 @@ _FEW_VALUES = 12
 _CLOSER_WIDTHS = tuple(sorted([*WIDTHS, *(math.sqrt(a * b) for a, b in pairwise(WIDTHS))]))
 
 
-def widths_of(terms: Terms) -> Array:
-    """(p,) prior standard deviations in plausible sizes; 0 for values that are fixed."""
-    parts = [
-        np.where(t.layout.shape, SHAPES, FLAT if t.name == TRACKER else 1.0) for t in terms
-    ]  # fmt: skip
+def widths_of(terms: Terms, free: Collection[str] = ()) -> Array:
+    """(p,) prior standard deviations in plausible sizes; 0 for values that are fixed.
+
+    Args:
+        terms: effects. free: those whose values belong to the data, which no size is expected of.
+    """
+    flat = {TRACKER, *free}
+    parts = [np.where(t.layout.shape, SHAPES, FLAT if t.name in flat else 1.0) for t in terms]
     return np.where(terms.knowledge.fixed, 0.0, np.concatenate([np.zeros(0), *parts]))
 
 
-def wider(layout: Layout) -> Array:
-    """The prior widths that an effect may be given."""
-    return np.array([FLAT] if layout.name == TRACKER else WIDER)
+def wider(layout: Layout, free: Collection[str] = ()) -> Array:
+    """The prior widths that an effect may be given; ``free`` as for :func:`widths_of`."""
+    return np.array([FLAT] if layout.name in {TRACKER, *free} else WIDER)
 
 
-def widths_for(layout: Layout) -> Array:
-    """Prior widths of an effect over which its evidence is averaged."""
+def widths_for(layout: Layout, free: Collection[str] = ()) -> Array:
+    """Prior widths of an effect over which its evidence is averaged.
+
+    If it is ``free``, as for :func:`widths_of`, it has one. Otherwise sets in which others do what
+    its values did would be preferred: a narrower prior would suffice there.
+    """
+    if layout.name in free:
+        return np.array([FLAT])
     if layout.name == TRACKER:
         return np.array(_TRACKER_WIDTHS)
     return np.array(_CLOSER_WIDTHS if len(layout) > _FEW_VALUES else WIDTHS)

@@ -53,4 +53,4 @@ def _with(setting: Setting, plain: JointFit, term: Term) -> JointFit | None:
     state = evaluate(setting.problem, terms, setting.factor, plain.state)
     if not state.valid:
         return None
-    return settle(setting, state, widths_of(terms), plain.colour, _STEPS)
+    return settle(setting, state, widths_of(terms, setting.free), plain.colour, _STEPS)

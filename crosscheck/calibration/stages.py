@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -71,7 +72,7 @@ def fit_everything(
     at_once, later = layouts(setting.problem)
     progress("fitting all effects", 0.05)
     start = start_of(setting, terms, Terms(Term(a, a.null) for a in at_once))
-    joint = with_noise(setting, tempered(setting, start, widths_of(start.terms)))
+    joint = with_noise(setting, tempered(setting, start, widths_of(start.terms, setting.free)))
     wanted = [a for a in later if a.name not in terms]
     frozen = replace(setting, frozen=True)
     if given is not None:
@@ -176,7 +177,7 @@ def noise_of(setting: Setting, joint: JointFit) -> Colour:
 def widened(setting: Setting, joint: JointFit) -> JointFit:
     """The fit with wider priors for effects that are clearly larger than plausible."""
     linear = linearised(setting, joint)
-    groups = column_groups(joint, wider)
+    groups = column_groups(joint, partial(wider, free=setting.free))
     gram = gram_of(linear.x, linear.y, groups)
     start = {name: float(group.widths[0]) for name, group in groups.items()}
     width = joint.width.copy()
@@ -194,9 +195,8 @@ def _from_alone(
 ) -> JointFit:  # fmt: skip
     """The joint fit, or a better one that starts from a fit of a single effect."""
     few = start.terms.only([*terms.names, TRACKER])
-    plain = settle(
-        setting, evaluate(setting.problem, few, setting.factor, start), widths_of(few), WHITE
-    )  # fmt: skip
+    begun = evaluate(setting.problem, few, setting.factor, start)
+    plain = settle(setting, begun, widths_of(few, setting.free), WHITE)
     found = [joint]
     for alone in fitted_alone(setting, plain, *may_be):
         others = (t for t in start.terms if t.name not in alone.terms)
@@ -204,7 +204,7 @@ def _from_alone(
             setting.problem, Terms([*alone.terms, *others]), setting.factor, alone.state
         )
         if state.valid:
-            fitted = tempered(setting, state, widths_of(state.terms))
+            fitted = tempered(setting, state, widths_of(state.terms, setting.free))
             found.append(with_noise(setting, fitted))
             if not poor(found[-1]):
                 break
@@ -222,7 +222,7 @@ def from_given(setting: Setting, joint: JointFit, start: State, given: Terms) ->
     state = evaluate(setting.problem, every, setting.factor, start)
     if not state.valid:
         return joint
-    width = widths_of(every)
+    width = widths_of(every, setting.free)
     here = cost(setting, joint.colour, joint.weight, joint.state, joint.width)
     if cost(setting, joint.colour, joint.weight, state, width) > _COMPARABLE * here:
         return joint
@@ -257,7 +257,7 @@ def _with_more(setting: Setting, joint: JointFit, first: Terms, added: list[Term
         state = evaluate(setting.problem, terms, setting.factor, joint.state)
         if not state.valid:
             continue
-        width = widths_of(terms)
+        width = widths_of(terms, setting.free)
         if k == 0:
             fitted = settle(setting, state, width, joint.colour)
         else:

@@ -13,7 +13,8 @@ from crosscheck.comparison.result import Comparison, Coordinate, Group, Unsolved
 from crosscheck.comparison.tracking import tracking
 from crosscheck.comparison.travel import Travel, regions_of, travel
 from crosscheck.fit.noise import as_table, whiteness
-from crosscheck.fit.prepare import noise_floor, outlying_rows, prepare
+from crosscheck.fit.outliers import outlying_rows
+from crosscheck.fit.prepare import noise_floor, prepare
 from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.state import State, evaluate
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of

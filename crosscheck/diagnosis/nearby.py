@@ -47,7 +47,7 @@ def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
     problem, fit = found.problem, found.last.fit
     setting = Setting(problem, found.factor, chain_of(problem), frozen=True)
     state = evaluate(problem, fit.terms, found.factor, fit.state)
-    joint = settle(setting, state, widths_of(fit.terms), WHITE, _STEPS)
+    joint = settle(setting, state, widths_of(fit.terms, setting.free), WHITE, _STEPS)
     catalogue = _catalogue(setting, joint)
     always, names = frozenset(found.base), frozenset(fit.terms.names)
     effects = [n for n in catalogue.names if n not in always]

@@ -9,7 +9,8 @@ from crosscheck.fit.candidates import Trials, null_fit
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.known import free_derivatives
 from crosscheck.fit.noise import whiteness
-from crosscheck.fit.prepare import Progress, outlying_rows
+from crosscheck.fit.outliers import outlying_rows
+from crosscheck.fit.prepare import Progress
 from crosscheck.fit.problem import Problem
 from seecr.pose import Array
 

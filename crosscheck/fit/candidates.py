@@ -121,7 +121,7 @@ class Trials:
 
     def evidence(self, found: Fit) -> Evidence:
         """Evidence of a fit."""
-        return evidence(found)
+        return evidence(found, self.problem.data.free)
 
     def whiteness(self, found: Fit, parameters: int) -> Whiteness:
         """Test the residuals of a fit with this many parameters for being white noise."""

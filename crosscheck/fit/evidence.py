@@ -17,7 +17,7 @@ do not, then friction is less probable than none.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,8 +58,12 @@ class Evidence:
     parameters: int
 
 
-def evidence(fit: Fit) -> Evidence:
-    """Evidence of a fit."""
+def evidence(fit: Fit, flat: Collection[str] = ()) -> Evidence:
+    """Evidence of a fit; the prior of effects that are ``flat`` has the largest width alone.
+
+    No size is expected of values that belong to the data. A narrower prior would only be a reward
+    for models in which another effect does what theirs did.
+    """
     white = fit.state.white
     p = fit.jacobian.shape[1]
     if p == 0:
@@ -74,8 +78,10 @@ def evidence(fit: Fit) -> Evidence:
     x, absent = x[:, kept], absent[kept]
     normal, gradient = x.T @ x, x.T @ y
     power = np.linalg.eigvalsh(normal[np.ix_(~absent, ~absent)])
-    own = (fit.terms.own(n)[kept] for n in fit.terms.names)
-    gain = _averaged(normal, gradient, [one for one in own if one.any()], absent)
+    widest = [fit.terms.own(n)[kept] for n in fit.terms.names if n in flat]
+    own = (fit.terms.own(n)[kept] for n in fit.terms.names if n not in flat)
+    held = np.any([np.zeros(kept.sum(), dtype=bool), *widest], axis=0)
+    gain = _averaged(normal, gradient, [one for one in own if one.any()], absent, held)
     log = gain - 0.5 * (float(y @ y) + fit.state.log_det)
     return Evidence(log, fit.chi2, int(np.sum(power > 1e-4)))
 
@@ -102,12 +108,14 @@ def half_gaussian(power: Array, along: Array, width: Array) -> Array:
 
 
 def _averaged(
-    normal: Array, gradient: Array, groups: Sequence[NDArray[np.bool_]], absent: NDArray[np.bool_]
-) -> float:
+    normal: Array, gradient: Array, groups: Sequence[NDArray[np.bool_]], absent: NDArray[np.bool_],
+    widest: NDArray[np.bool_],
+) -> float:  # fmt: skip
     """ln of the evidence over that of no effects, averaged over the prior width of each effect.
 
     With several effects, one is averaged at a time while the others keep their best widths. These
-    are searched one effect at a time, from the best width that all share.
+    are searched one effect at a time, from the best width that all share. Parameters that are
+    ``widest`` (p,) have the largest width.
     """
 
     def gains(widths: Array) -> Array:
@@ -117,7 +125,7 @@ def _averaged(
         """(k,) ln evidence with one effect at each of its widths, the others at their best."""
         return gains(np.where(own, np.array(WIDTHS)[:, None], best))
 
-    shared = np.tile(np.array(WIDTHS)[:, None], (1, len(gradient)))
+    shared = np.where(widest, WIDTHS[-1], np.array(WIDTHS)[:, None])
     logs = gains(shared)
     if len(groups) == 1:
         return float(special.logsumexp(logs) - np.log(len(WIDTHS)))

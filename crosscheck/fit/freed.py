@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.gauss_newton import fit
+from crosscheck.fit.gauss_newton import Fit, fit
+from crosscheck.fit.outliers import outlying_rows
 from crosscheck.fit.parts import LaidOut
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.registration import NAME as TRACKER
@@ -57,13 +58,24 @@ def freed(problem: Problem, laid: LaidOut) -> Freed:
     free = _free(every, names, laid.fresh)
     factor = problem.noise(problem.experiment.predict(every.effects))
     state = _registered(problem, every, factor, free)
-    best = fit(problem, state.terms, factor, state, free=free)
+    best = _fitted(problem, state, factor, free)
     found = best.terms
     moved = free & ~found.knowledge.fixed
     # if the model leaves more than noise, standard errors grow accordingly
     error = best.stderr * max(1.0, np.sqrt(best.state.chi2 / problem.n_readings))
     told = [_told(found, name, moved, error, problem, name in names) for name in found.names]
     return Freed(found, moved, tuple(filter(None, told)))
+
+
+def _fitted(problem: Problem, state: State, factor: Array, free: NDArray[np.bool_]) -> Fit:
+    """The fit of the free parameters, without rows that are far off all others.
+
+    A single reading that is metres off would turn the frame in which all are compared.
+    """
+    rows = outlying_rows(problem, state)
+    if not rows.any():
+        return fit(problem, state.terms, factor, state, free=free)
+    return fit(problem.only(~rows), state.terms, factor, free=free)
 
 
 def _new(problem: Problem, name: str) -> Term:

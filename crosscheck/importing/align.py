@@ -19,10 +19,10 @@ from crosscheck.measurements.dwells import mean_rotation
 from seecr.counted import counted
 from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate, rotvec_from_quat
 
-# Largest residual relative to the spread of the points, for commands and for named points.
-_LEFT, _LEFT_OF_POINTS = 0.2, 0.05
-# This part of the dwells must be within that; others may be far off.
-_MOST = 0.8
+LEFT, MOST = 0.2, 0.8
+"""Largest residual relative to the spread of the commands, and the part of dwells within it."""
+# The same of named points, each of which must be within it.
+_LEFT_OF_POINTS = 0.05
 # Commands with smaller rotations about their mean do not show where the target is.
 _TURNED = np.radians(3.0)
 _ROUNDS = 10
@@ -84,7 +84,7 @@ def by_points(names: Sequence[str], there: Array, here: Array) -> Frames:
         )
     shift = here.mean(axis=0) - quat_rotate(turn, there).mean(axis=0)
     left = np.linalg.norm(quat_rotate(turn, there) + shift - here, axis=1)
-    worst, spread = int(np.argmax(left)), _spread(here)
+    worst, spread = int(np.argmax(left)), size_of_cloud(here)
     if left[worst] > _LEFT_OF_POINTS * spread:
         raise CrosscheckError(
             f"the frames cannot be aligned: point {names[worst]} is {left[worst]:.3g} m from "
@@ -185,13 +185,14 @@ def _aside(points: Array) -> float:
     return float(np.sqrt(np.sum(sizes[1:] ** 2) / len(points)))
 
 
-def _spread(points: Array) -> float:
+def size_of_cloud(points: Array) -> float:
+    """The rms distance of points (n, 3) from their mean."""
     return float(np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1))))
 
 
 def _check(left: Array, told: Array) -> None:
-    most, spread = float(np.quantile(left, _MOST)), _spread(told[:, :3])
-    if most > _LEFT * spread:
+    most, spread = float(np.quantile(left, MOST)), size_of_cloud(told[:, :3])
+    if most > LEFT * spread:
         raise CrosscheckError(
             f"the frames cannot be aligned: errors of {1e3 * most:.3g} mm remain, and the commands "
             f"spread by {1e3 * spread:.3g} mm; expected the commands and the tracker's log of one "

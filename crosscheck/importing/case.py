@@ -22,6 +22,7 @@ from crosscheck.importing.align import (
 from crosscheck.importing.choices import ImportChoices
 from crosscheck.importing.join import commanded, joined
 from crosscheck.importing.logged import Logged
+from crosscheck.importing.strays import without_strays
 from crosscheck.importing.take import READERS, Take, take_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import load_commands
@@ -160,13 +161,16 @@ def import_case(
         for file, log in zip(files, logs, strict=True)
     ]
     frames = _frames(robot, takes, choices)
+    takes, strays = without_strays(robot, takes, frames)
+    if strays:
+        frames = _frames(robot, takes, choices)
     parts = [_measured(take, frames) for take in takes]
     measured = _one([part for part, _noise in parts])
     sigma = _sigma(takes, [noise for _part, noise in parts])
     measured = replace(
         measured, sigma=sigma, free=frames.free, stands=np.ones(measured.n_rows, dtype=bool)
     )
-    notes = (*said, frames.how, _noise(measured))
+    notes = (*said, *strays, frames.how, _noise(measured))
     found = Imported(robot, measured, frames, tuple(takes), notes)
     if source is not None:
         write_case(found, source, Path(str(out)))

@@ -23,6 +23,9 @@ _MOST = 40
 # Distances that are off by this part of their usual size still match. An offset is accepted if all
 # others are worse by this factor, and no offset is preferred unless it is worse by as much.
 _ALIKE, _CLEAR = 0.2, 1.5
+# If the clocks match as they are, moves must begin late or early by times that differ by less than
+# this part of the shift, for most commands, to say what the shift is.
+_STEADY, _BULK = 0.25, 0.75
 
 
 @dataclass(frozen=True)
@@ -38,25 +41,34 @@ class Clock:
     said: tuple[str, ...] = ()
 
 
-def find_clock(held: HeldCommands, told: Array, rests: Dwells) -> Clock:
+def find_clock(held: HeldCommands, told: Array, rests: Dwells, least: float = 0.0) -> Clock:
     """The offset that matches the rests with the commands.
+
+    A small offset leaves most rests with their commands, but the end of each counts as a rest at
+    the next command. So also where the clocks match, moves have to begin when they are commanded.
 
     Args:
         held: by the clock of the commands. told: (k, 3) [m] where they should bring the platform.
         rests: of the whole stream, not cut where commands begin.
+        least: [s] offsets smaller than this do not matter.
     """
-    assert held.begin_s is not None
+    assert held.begin_s is not None and held.end_s is not None
     if min(len(held.row), len(rests)) < _LEAST:
         return Clock(0.0)
     shifts = _likely(held.begin_s, rests.end_s)
     whose = [owners(held.shifted(shift), rests) for shift in shifts]
     off = np.array([_off(told, rests.position, number) for number in whose])
     best = int(np.argmin(off))
-    others = [o for o, number in zip(off, whose, strict=True) if (number != whose[best]).any()]
-    clear = off[best] < _ALIKE and off[best] * _CLEAR < min(others, default=np.inf)
-    if not clear or off[0] <= _CLEAR * off[best]:
+    if off[0] <= _CLEAR * off[best]:
+        best = 0
+    others = [o for o, number in zip(off, whose, strict=True) if _other(number, whose[best])]
+    if off[best] >= _ALIKE or off[best] * _CLEAR >= min(others, default=np.inf):
         return Clock(0.0)
-    shift, n = _leaves(held.begin_s, rests, whose[best])
+    late = _late(held.end_s, rests, whose[best])
+    shift, n = float(np.median(late)), len(late)
+    unsteady = float(np.quantile(np.abs(late - shift), _BULK)) > _STEADY * abs(shift)
+    if best == 0 and (abs(shift) < max(least, 1e-9) or unsteady):
+        return Clock(0.0)
     sign = "more" if shift > 0.0 else "less"
     return Clock(
         shift,
@@ -102,7 +114,16 @@ def _distances(points: Array) -> Array:
     return np.asarray(np.linalg.norm(points[:, None] - points[None], axis=-1))
 
 
-def _leaves(begin: Array, rests: Dwells, number: NDArray[np.int64]) -> tuple[float, int]:
-    """Median time [s] from a command to the end of the rest before it, and the number of these."""
-    k = 1 + np.flatnonzero((number[:-1] >= 0) & (number[1:] >= 0))
-    return float(np.median(rests.end_s[number[k - 1]] - begin[k])), len(k)
+def _other(number: NDArray[np.int64], best: NDArray[np.int64]) -> bool:
+    """Whether rests belong to other commands, not only one more or less at an end."""
+    both = (number >= 0) & (best >= 0)
+    return bool(np.any(number[both] != best[both]) or 2 * both.sum() < (best >= 0).sum())
+
+
+def _late(end: Array, rests: Dwells, number: NDArray[np.int64]) -> Array:
+    """Times [s] from the end of each held command to that of its rest, if another one follows.
+
+    A command ends with the next set point, which may only be passed on the way to the next rest.
+    """
+    k = np.flatnonzero((number[:-1] >= 0) & (number[1:] >= 0))
+    return np.asarray(rests.end_s[number[k]] - end[k])

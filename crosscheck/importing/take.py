@@ -92,7 +92,7 @@ def _clock(
     held = held_commands(log, choices.rest_for, apart, np.inf)
     told = commanded(robot, log.rows(held.row))[:, :3]
     rests = find_dwells(stream, np.zeros(0), choices.rest_for, choices.rest_speed, arm)
-    found = find_clock(held, told, rests)
+    found = find_clock(held, told, rests, 0.5 * choices.rest_for)
     return Clock(apart + found.shift, found.said)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +25,7 @@ def small(name: str, z: float, scale: float = 0.1) -> tuple[LinearToy, Fit]:
     return made, made.fit(made.problem, made.terms(name))
 
 
-def log_integral(found: Fit) -> float:
+def log_integral(found: Fit, lambdas: Sequence[float] = LAMBDAS) -> float:
     """ln of the mean over lambda of the likelihood integrated over the prior, by quadrature."""
     x = found.jacobian
     y = found.state.white + x @ found.terms.sizes
@@ -39,14 +40,14 @@ def log_integral(found: Fit) -> float:
         return float(np.exp(-0.5 * (off @ off - floor)) * prior)
 
     total = 0.0
-    for width in LAMBDAS:
+    for width in lambdas:
         ranges = []
         for k in range(len(best)):
             # the product of likelihood and prior is narrow about where either is
             middle = best[k] / (1.0 + (spread[k] / width) ** 2)
             ranges.append((middle - 12.0 * spread[k], middle + 12.0 * spread[k]))
         total += integrate.nquad(value, ranges, opts={"epsrel": 1e-9, "epsabs": 0.0})[0]
-    return float(np.log(total / len(LAMBDAS)) - 0.5 * floor)
+    return float(np.log(total / len(lambdas)) - 0.5 * floor)
 
 
 @pytest.mark.parametrize("size", [0.0, 0.5, 3.0])
@@ -54,6 +55,24 @@ def test_of_one_parameter(size: float) -> None:
     _made, found = small("tracker_scale", size)
     expected = log_integral(found)
     assert evidence(found).log == pytest.approx(expected, abs=1e-4)
+
+
+@pytest.mark.parametrize("size", [0.0, 3.0])
+def test_of_values_that_belong_to_the_data(size: float) -> None:
+    """One width: that they would fit into a narrower one is no merit of the model."""
+    _made, found = small("tracker_scale", size)
+    expected = log_integral(found, LAMBDAS[-1:])
+    assert evidence(found, ("tracker_scale",)).log == pytest.approx(expected, abs=1e-4)
+
+
+def test_beside_values_that_belong_to_the_data_others_are_averaged_as_ever() -> None:
+    made = toy({"tracker_scale": 2.0, "platform_mass": 3.0}, ("tracker_scale", "platform_mass"))
+    found = made.fit(made.problem, made.terms("tracker_scale", "platform_mass"))
+    flat, both = evidence(found, ("tracker_scale",)), evidence(found)
+    alone = [evidence(found, names).log for names in (("platform_mass",), found.terms.names)]
+    assert flat.log != pytest.approx(both.log, abs=0.1) and flat.chi2 == both.chi2
+    # each group is averaged beside the others at their best widths: what it gains adds up
+    assert flat.log - alone[1] == pytest.approx(both.log - alone[0], abs=0.2)
 
 
 @pytest.mark.slow
@@ -111,7 +130,8 @@ def test_widths_of_effects_that_go_together_are_found_beside_each_other() -> Non
         best = np.linalg.solve(inside, scaled[..., None])[..., 0]
         logs = 0.5 * np.sum(scaled * best, axis=1) - 0.5 * np.linalg.slogdet(inside)[1]
         exact = float(special.logsumexp(logs) - np.log(len(pairs)))
-        off.append(abs(_averaged(normal, gradient, [own, ~own], own & ~own) - exact))
+        none = own & ~own
+        off.append(abs(_averaged(normal, gradient, [own, ~own], none, none) - exact))
     assert max(off) < 0.6
 
 

@@ -50,6 +50,14 @@ def test_free_values_are_told_with_errors_that_what_is_missing_widens():
     assert errors[0] < 0.03 < 5.0 * errors[0] < errors[1]
 
 
+def test_a_reading_metres_off_does_not_turn_the_frame():
+    """One of 17 dwells, 1.8 m off, had moved it by 0.6 m."""
+    data = far_away()
+    data.position[7] += [1.0, -0.5, 0.3]
+    frame = prepare(ROBOT, data, Terms()).terms["tracker_frame"]
+    assert frame.vector[:3] == pytest.approx([0.4, 0.0, -0.2], abs=1e-4)
+
+
 @pytest.mark.slow
 def test_a_diagnosis_finds_what_is_missing_beside_the_frame_and_not_the_frame():
     gain = term(ROBOT, "pulley_radius", radius_m=0.01)

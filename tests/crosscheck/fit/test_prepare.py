@@ -11,7 +11,8 @@ from made_data import measured, term
 from crosscheck.fit.candidates import candidates_for, null_fit
 from crosscheck.fit.gauss_newton import FitStatus
 from crosscheck.fit.imitation import basis, beside, imitated, left_over
-from crosscheck.fit.prepare import outlying_rows, prepare
+from crosscheck.fit.outliers import outlying_rows
+from crosscheck.fit.prepare import prepare
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Reason, Refusal, Unfit, Why
 from crosscheck.fit.state import evaluate

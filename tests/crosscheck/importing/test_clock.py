@@ -34,7 +34,7 @@ def taken(made, folder, clock, choices=None):
     )
 
 
-@pytest.mark.parametrize("clock", [37.3, -5.2, 2.0, -1000.0])
+@pytest.mark.parametrize("clock", [37.3, -5.2, 2.0, -1000.0, 0.8, -0.7])
 def test_the_shift_is_found_and_said(made, tmp_path, clock):
     found = taken(made, tmp_path, clock)
     truth, measured = made.truth, found.measured
@@ -48,6 +48,18 @@ def test_the_shift_is_found_and_said(made, tmp_path, clock):
 def test_one_clock_stays_one(made, tmp_path):
     found = taken(made, tmp_path, 0.0)
     assert found.takes[0].held.clock == 0.0 and "clock shows" not in str(found)
+
+
+def test_a_shift_that_leaves_most_rests_with_their_commands_is_found_too():
+    """The last rest, of a run that crashed as it was to move on, had gone to the next command."""
+    told = np.random.default_rng(1).uniform(0.0, 1.0, (12, 3))
+    held, rests = going_round(told, 0.4)
+    assert find_clock(held, told, rests).shift == pytest.approx(0.4, abs=0.1)
+    assert find_clock(held, told, rests, least=0.6).shift == 0.0
+    held, rests = going_round(told, 0.0)
+    begin = held.begin_s - np.tile([0.1, 0.5], 6)
+    late = replace(held, begin_s=begin, end_s=np.append(begin[1:], np.inf))
+    assert find_clock(late, told, rests).shift == 0.0, "as late as it happens"
 
 
 def test_times_of_day_are_one_clock(made, tmp_path):

@@ -1,0 +1,76 @@
+"""Leaves out dwells at which the platform was nowhere near where its command would bring it.
+
+A run that crashes ends with a platform that does not move any more, whatever is commanded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.importing.align import LEFT, MOST, Frames, size_of_cloud
+from crosscheck.importing.join import commanded
+from crosscheck.importing.take import Take
+from seecr.counted import counted
+from seecr.description.robot import Robot
+from seecr.pose import Array
+
+# A dwell is not far from its command unless it is so many times as far as most.
+_USUAL = 10.0
+
+
+def without_strays(
+    robot: Robot, takes: Sequence[Take], frames: Frames
+) -> tuple[list[Take], list[str]]:
+    """The recordings without dwells far from their commands, and a note for each that has some.
+
+    Dwells are far from their commands by the same measure by which frames cannot be aligned, and
+    much farther than most. If more than a few are, it is no matter of single dwells: all stay.
+    """
+    off = [_off(robot, take, frames) for take in takes]
+    every = np.concatenate(off)
+    told = np.concatenate([_told(robot, take) for take in takes])
+    usual = float(np.median(every))
+    limit = max(LEFT * size_of_cloud(told), _USUAL * usual)
+    if not 0.0 < np.mean(every > limit) <= 1.0 - MOST:
+        return list(takes), []
+    notes = [
+        _note(take, own > limit, own, usual)
+        for take, own in zip(takes, off, strict=True)
+        if np.any(own > limit)
+    ]
+    return [_without(take, own > limit) for take, own in zip(takes, off, strict=True)], notes
+
+
+def _told(robot: Robot, take: Take) -> Array:
+    """Commanded positions (n, 3) [m] of the dwells that are used."""
+    rows = take.held.log.rows(take.held.row[take.number >= 0])
+    return commanded(robot, rows)[:, :3]
+
+
+def _off(robot: Robot, take: Take, frames: Frames) -> Array:
+    """Distances (n,) [m] of the dwells that are used from where they are commanded."""
+    quat = take.dwells.quat_wxyz
+    place, _turned = frames.poses(
+        take.dwells.position[take.used], None if quat is None else quat[take.used]
+    )
+    return np.asarray(np.linalg.norm(place - _told(robot, take), axis=1))
+
+
+def _without(take: Take, far: NDArray[np.bool_]) -> Take:
+    number = take.number.copy()
+    number[np.flatnonzero(number >= 0)[far]] = -1
+    return replace(take, number=number)
+
+
+def _note(take: Take, far: NDArray[np.bool_], off: Array, usual: float) -> str:
+    dwells, gone = take.dwells, take.used[far]
+    lines = ", ".join(str(int(line)) for line in take.stream.line[dwells.start[gone]])
+    return (
+        f"{take.stream.path.name}: {counted(len(gone), 'dwell')} left out, from line {lines} on: "
+        f"up to {1e3 * float(np.max(off[far])):.4g} mm from where it is commanded, other dwells "
+        f"{1e3 * usual:.3g} mm; did the platform stop moving, or do the clocks disagree (--clock)?"
+    )
