@@ -17,7 +17,7 @@ from seecr.effects.base import Effect
 from seecr.errors import InputError
 from seecr.holding.balance import bends, is_straight
 from seecr.holding.distribution import tension_limits, wanted_tensions
-from seecr.holding.hanging import least_of_heavy
+from seecr.holding.hanging import bridged_lengths, least_of_heavy
 from seecr.holding.inside import balances, counted_balance, holds_tightly
 from seecr.holding.lengths import Held, hold, holds_firmly
 from seecr.holding.unheld import why_not_held
@@ -342,6 +342,8 @@ class _Search:
         there = mixed._held(commands)[0] if len(lost) else held
         found &= there.fine
         lengths, prediction = mixed._lengths(commands, there)
+        # beside its exit point a cable could pull any way, but there is none to wind in
+        found &= lengths.min(axis=1) > 0.0
         lengths[~found] = np.nan
         solution = prediction.solution()
         return Correction(
@@ -407,12 +409,15 @@ class _Search:
             tables = self._tables(replace(self.given.rows(rows[some]), pose=poses))
             return holds_firmly(tables, limits.aim[rows[some]], limits.low, limits.high)
 
+        def spans(poses: Array, some: NDArray[np.intp]) -> Array:
+            return bridged_lengths(self._tables(replace(self.given.rows(rows[some]), pose=poses)))
+
         def holds(poses: Array, some: NDArray[np.intp]) -> NDArray[np.bool_]:
             tables = self._tables(replace(self.given.rows(rows[some]), pose=poses))
             return holds_tightly(tables, limits.low, limits.high)
 
         return Reaching.within(
-            self.robot, self.given.pose[rows], balance, stays, (limits.low, limits.high),
+            self.robot, self.given.pose[rows], balance, stays, spans, (limits.low, limits.high),
             scale[rows], fix_position=fix_position, straight=own if straight else None,
             holds=holds if bends(own) and self.robot.n_cables >= self.robot.n_dof else None,
         )  # fmt: skip

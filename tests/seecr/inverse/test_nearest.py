@@ -5,18 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import score_nearest
+from slab import long_cables
 
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects.cable import CableWeight
+from seecr.effects.terms import Term
 from seecr.errors import InputError
 from seecr.inverse.correction import correct
 from seecr.inverse.nearest import search
 from seecr.inverse.nearest.problem import Curved, Reaching
 from seecr.inverse.nearest.screen import spread
 from seecr.planar import bar_equilibria
-from seecr.pose import pose_difference
+from seecr.pose import pose_difference, transform_points
 from seecr.prediction.model import load_model
 from seecr.workspace.zones import balance_equations
 
@@ -173,7 +175,8 @@ def test_a_turn_about_a_hinge_is_as_far_as_its_shorter_way() -> None:
     none = np.zeros((1, 4))
     problem = Reaching(
         robot, want[None], values[:1], lambda poses, *_: balance_equations(robot, poses),
-        lambda _, rows: np.ones(len(rows), dtype=bool), none, none, np.ones(1), np.ones(3),
+        lambda _, rows: np.ones(len(rows), dtype=bool), long_cables,
+        none, none, np.ones(1), np.ones(3),
     )  # fmt: skip
     (away,) = problem.to(problem.coordinates(there[None]), np.zeros(1, dtype=np.intp))
     assert away == pytest.approx((values[1] - values[0]) * [1.0, 1.0, robot.length])
@@ -184,7 +187,8 @@ def test_balance_bends_as_its_rates_change() -> None:
     none = np.zeros((1, 8))
     problem = Reaching(
         robot, robot.reference_pose[None], None, lambda poses, *_: balance_equations(robot, poses),
-        lambda _, rows: np.ones(len(rows), dtype=bool), none, none, np.array([200.0]), np.ones(6),
+        lambda _, rows: np.ones(len(rows), dtype=bool), long_cables,
+        none, none, np.array([200.0]), np.ones(6),
     )  # fmt: skip
     random, row = np.random.default_rng(0), np.zeros(1, dtype=np.intp)
     away, pulls = 0.3 * random.normal(size=(1, 6)), random.uniform(50.0, 900.0, (1, 8))
@@ -241,7 +245,7 @@ def test_starts_are_the_nearest_that_differ_in_rotation() -> None:
     rows = random.permutation(np.repeat([0, 2], 60))
     away = robot.length * random.normal(size=(len(rows), 6))
     problem = Reaching.within(
-        robot, np.tile(robot.reference_pose, (3, 1)), none_balances, none_stays,
+        robot, np.tile(robot.reference_pose, (3, 1)), none_balances, none_stays, long_cables,
         (np.zeros(8), np.ones(8)), np.ones(3),
     )  # fmt: skip
     expected = []
@@ -266,3 +270,30 @@ def none_balances(*_: object) -> tuple[np.ndarray, np.ndarray]:
 
 def none_stays(*_: object) -> np.ndarray:
     raise AssertionError("nothing has to stay here")
+
+
+@pytest.mark.parametrize("name", ["planar_vertical", "planar_horizontal"])
+def test_no_nearest_pose_is_at_a_winch(name: str) -> None:
+    """A cable of 0.1 mm may pull any way: corrections had ended there, with lengths below zero."""
+    robot = load_robot(model_path(name))
+    wanted = np.tile(robot.reference_pose, (2, 1))
+    wanted[:, [0, 2]] = [[0.05, 0.45], [0.09, 0.47]]
+    found = correct(robot, wanted, lowest=0.2, highest=40.0)
+    assert found.found.all() and found.stays.all() and not found.held.any()
+    ends = transform_points(found.aimed, robot.anchor_points)
+    spans = np.linalg.norm(ends - robot.exit_points, axis=2)
+    least = 0.01 * robot.reference_lengths.min()
+    assert np.all(spans.min(axis=1) > 0.999 * least) and np.all(found.lengths > 0.0)
+    # and they are at that border, not elsewhere
+    assert np.all(spans.min(axis=1) < 1.1 * least)
+
+
+def test_where_a_cable_would_have_no_length_there_is_no_answer() -> None:
+    """The winch pays out 50 mm more than it is told: it cannot be told less than nothing."""
+    robot = load_robot(model_path("planar_vertical"))
+    offset = Term.of(robot, "cable_length_offset", offset_1_m=0.05)
+    wanted = np.tile(robot.reference_pose, (2, 1))
+    wanted[1, [0, 2]] = [0.12, 0.45]
+    found = correct(robot, wanted, effects=[offset], lowest=0.2, highest=40.0)
+    assert found.held.all() and found.found.tolist() == [True, False]
+    assert np.isnan(found.lengths[1]).all() and found.reached.tolist() == [True, False]
