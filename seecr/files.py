@@ -212,25 +212,30 @@ def check_writable(path: Path) -> None:
 
 
 def check_replaces(
-    out: str | Path, names: Sequence[str], mark: str, same: Mapping[str, Path] | None = None
-) -> None:
+    out: str | Path, names: Sequence[str], mark: str, same: Mapping[str, Path] | None = None,
+    read: Iterable[Path | None] = (),
+) -> None:  # fmt: skip
     """Check that files in a folder belong to an older result before new ones replace them.
 
-    Measurements cannot be made again.
+    Measurements, and poses that somebody wrote by hand, cannot be made again.
 
     Args:
         out: the folder; it need not exist yet.
         names: of the files to be written. mark: a file that only such a result has.
         same: by name, the file that it is a copy of; it may already be that file.
+        read: files that :func:`staged` is told of; it says what is wrong with them.
 
     Raises:
         InputFileError: there are files of these names without the mark.
     """
     out = Path(out)
     there = [name for name in names if (out / name).exists()]
-    if mark in there:
+    if (out / mark).exists():
         return
+    said = [path for path in read if path is not None and path.exists()]
     for name in there:
+        if any((out / name).samefile(path) for path in said):
+            continue
         copied = (same or {}).get(name)
         if copied is None or not copied.exists() or not (out / name).samefile(copied):
             raise InputFileError.at(

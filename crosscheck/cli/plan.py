@@ -104,7 +104,7 @@ def command(
     from crosscheck.report import write_page
     from crosscheck.terminal import print_plan
     from seecr import load_robot
-    from seecr.files import json_text, staged, with_toml, write_text
+    from seecr.files import check_replaces, json_text, staged, with_toml, write_text
 
     machine = load_robot(robot)
     room = box_of(box) if box else None
@@ -113,6 +113,8 @@ def command(
     limits = (lowest, highest)
     given = None if poses is None else load_commands(poses, machine)
     sigma = stated(Sigma() if given is None else given.sigma, sigmas)
+    if poses is None:
+        check_replaces(out, ("poses.csv",), NAME)
     sometimes = sometimes_written(out, poses)
     with staged(out, sometimes=sometimes, read=with_toml(poses)) as folder:
         with progress_share("planning") as progress:

@@ -105,7 +105,7 @@ def command(
     """  # fmt: skip
     from seecr import InputFileError, correct, kept_chance
     from seecr.columns.command_file import read_commands
-    from seecr.files import json_text, staged, with_toml, write_texts
+    from seecr.files import check_replaces, json_text, staged, with_toml, write_texts
     from seecr.report.corrections import chance_lines, corrected_csv, corrected_toml
 
     machine = robot_at(robot, cable)
@@ -121,6 +121,7 @@ def command(
     limits = float("inf") if highest is None else highest
     near = _aim(aim, machine.n_cables)
     commands_of_it = ("corrected.csv", "corrected.toml")
+    check_replaces(out, commands_of_it, "correction.json", read=with_toml(poses))
     with staged(out, sometimes=commands_of_it, read=with_toml(poses)) as folder:
         with progress_share("correcting") as tell:
             found = correct(

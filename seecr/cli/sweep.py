@@ -124,7 +124,7 @@ def command(
     is free to move.
     """
     from seecr import midline_points, spread_of
-    from seecr.files import json_text, staged, with_toml, write_text
+    from seecr.files import check_replaces, json_text, staged, with_toml, write_text
     from seecr.report.commanded import toml_beside
     from seecr.report.rows import SweepRows
     from seecr.report.sweep_panels import sweep_figure
@@ -134,6 +134,7 @@ def command(
     own = model_at(model, machine)
     given = _Commanded(**ways)
     commands, more, said, wanted = _commands(machine, poses, given)
+    check_replaces(out, ("sweep.csv", "sweep.toml"), "sweep.json", read=with_toml(poses))
     sometimes = ("sweep.toml", *files_of_pictures("sweep"))
     with staged(out, sometimes=sometimes, read=with_toml(poses)) as folder:
         with progress_bar("solving", len(commands)) as tell:

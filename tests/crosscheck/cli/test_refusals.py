@@ -238,6 +238,11 @@ def test_measurements_are_not_replaced_by_those_of_a_twin(
         *words, "--out", tmp_path
     )
     assert mine.read_bytes() == data.read_bytes()
+    poses = tmp_path / "poses.csv"
+    poses.write_text("cmd_x_m\n0.4\n")
+    said = refused("plan", robot, "--rows", 8, "--out", tmp_path)
+    assert f"{poses}: would be overwritten, but is not part of an older result" in said
+    assert poses.read_text() == "cmd_x_m\n0.4\n"
 
 
 @pytest.mark.parametrize("column", ["cmd_x", "meas_x", "meas_y"])

@@ -222,3 +222,21 @@ def test_no_command_removes_what_it_reads(tmp_path: Path, words: str, read: str,
     got = CliRunner().invoke(main, [*words.format(poses).split(), "--out", str(tmp_path)])
     assert got.exit_code == 2 and f"{lost}: would be overwritten, but was read" in got.output
     assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize(("command", "own"), [("sweep", "sweep.csv"), ("correct", "corrected.csv")])
+def test_files_that_no_older_result_made_are_not_replaced(
+    tmp_path: Path, command: str, own: str
+) -> None:
+    poses, out = tmp_path / "poses.csv", tmp_path / "out"
+    poses.write_text("cmd_x_m,cmd_z_m\n0.4,0.3\n")
+    out.mkdir()
+    (out / own).write_text("mine\n")
+    words = [command, "planar_vertical", str(poses), "--out", str(out)]
+    got = CliRunner().invoke(main, words)
+    assert got.exit_code == 2 and got.stderr.count("\n") == 1
+    assert f"{out / own}: would be overwritten, but is not part of an older result" in got.stderr
+    assert [path.name for path in out.iterdir()] == [own] and (out / own).read_text() == "mine\n"
+    (out / own).unlink()
+    for _again in range(2):
+        assert CliRunner().invoke(main, words).exit_code == 0
