@@ -55,7 +55,7 @@ Examples:
 @click.option(
     "--box",
     metavar="X0,Y0,Z0,X1,Y1,Z1",
-    help="Where to choose poses [m].  [default: inside the exit points]",
+    help="Where poses are chosen and proposed [m].  [default: inside the exit points]",
 )
 @figures_option
 @out_option("crosscheck-plan")
@@ -122,7 +122,9 @@ def command(
                 machine, rows or 0, sigma=sigma, reads=reads, limits=limits, progress=progress,
                 box=room,
             )  # fmt: skip
-            plan = make_plan(machine, commands, sigma, progress, reads=reads, limits=limits)
+            plan = make_plan(
+                machine, commands, sigma, progress, reads=reads, limits=limits, box=room
+            )
         made = made_by(machine.source, poses)
         status = 0 if plan.converged else 3
         files = write_plan(plan, folder, own=given is None)

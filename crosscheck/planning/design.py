@@ -40,6 +40,7 @@ def make_plan(
     *,
     reads: Collection[str] = (),
     limits: Limits = NO_LIMITS,
+    box: Array | None = None,
 ) -> Plan:
     """Predict what planned commands will show of each effect.
 
@@ -52,6 +53,7 @@ def make_plan(
         reads: kinds of readings there will be, of "position", "orientation" and "tension"; by
             default the pose, and tensions if their noise is stated.
         limits: lowest and highest tension [N] of poses that are proposed.
+        box: (2, 3) [m] lowest and highest position of these.
 
     Raises:
         CrosscheckError: there is an unknown kind of reading.
@@ -73,7 +75,7 @@ def make_plan(
     effects = all_visible(own)
     progress("what could be added", 0.4)
     suggestions = propose(
-        [*extensions(plan, limits), *detours(plan)],
+        [*extensions(plan, limits, box), *detours(plan)],
         own,
         _wanted(own, effects),
         lambda there: signals_like(there, own),

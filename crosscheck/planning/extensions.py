@@ -19,6 +19,7 @@ from crosscheck.planning.planned import (
 )
 from seecr.commands.loads import Loads
 from seecr.description.robot import Robot
+from seecr.pose import Array
 
 # A known payload, relative to the platform's mass.
 PAYLOAD = 0.25
@@ -26,18 +27,23 @@ PAYLOAD = 0.25
 _AN_HOUR = 3600.0
 
 
-def extensions(plan: Planned, limits: Limits = NO_LIMITS) -> Iterator[Extension]:
+def extensions(
+    plan: Planned, limits: Limits = NO_LIMITS, box: Array | None = None
+) -> Iterator[Extension]:
     """All that can be added to measurements that were made or planned, one after the other.
 
     Args:
         plan: what is read so far, with the model that predicts it.
         limits: lowest and highest tension [N] of added poses.
+        box: (2, 3) [m] lowest and highest position of added poses.
     """
     ways = ~plan.problem.data.read & ~plan.unsolved
     data = plan.problem.data.rows(plan.problem.use | ways)
     for make in (_sensors, _payload, _way_back, _later):
         yield from make(plan, data)
-    yield from _more_poses(plan, limits)
+    found = more_poses(plan, limits, box)
+    if found is not None:
+        yield found
 
 
 def _sensors(plan: Planned, data: Measurements) -> Iterator[Extension]:
@@ -116,9 +122,3 @@ def _backwards(data: Measurements) -> Measurements:
     order = np.concatenate([np.flatnonzero(data.run == name)[::-1] for name in data.runs])
     turned = data.rows(order)
     return replace(turned, run=named_again(turned), t_s=data.t_s)
-
-
-def _more_poses(plan: Planned, limits: Limits) -> Iterator[Extension]:
-    found = more_poses(plan, limits)
-    if found is not None:
-        yield found

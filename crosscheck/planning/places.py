@@ -24,10 +24,20 @@ _JOINT_POSES = 60
 _SOFT = 0.05
 
 
-def more_poses(plan: Planned, limits: Limits = NO_LIMITS) -> Extension | None:
-    """Poses in and around the planned region, some tilted, at which the robot can hold still."""
+def more_poses(
+    plan: Planned, limits: Limits = NO_LIMITS, box: Array | None = None
+) -> Extension | None:
+    """Poses in and around the planned region, some tilted, at which the robot can hold still.
+
+    Args:
+        plan: what is planned. limits: lowest and highest tension [N].
+        box: (2, 3) [m] lowest and highest position; by default anywhere near what is planned.
+    """
     robot = plan.problem.robot
-    poses = held_within(robot, _jointed(plan) if robot.joints else _grid(plan), limits)
+    poses = _jointed(plan) if robot.joints else _grid(plan, box)
+    if box is not None:
+        poses = poses[np.all((poses[:, :3] >= box[0]) & (poses[:, :3] <= box[1]), axis=1)]
+    poses = held_within(robot, poses, limits)
     if len(poses) == 0:
         return None
     poses = poses[trustworthy(like(plan, commands_at(plan.problem, poses)), plan)]
@@ -77,10 +87,13 @@ def _planned_poses(plan: Planned) -> Array:
     return pose[problem.use]
 
 
-def _grid(plan: Planned) -> Array:
-    """Positions on a grid, each level and with two tilts."""
+def _grid(plan: Planned, box: Array | None) -> Array:
+    """Positions on a grid, in the box if there is one, each level and with two tilts."""
     robot, pose = plan.problem.robot, _planned_poses(plan)
-    return tilted_grid(robot, *_box(robot, pose[:, :3]), _GRID)
+    low, high = _box(robot, pose[:, :3])
+    if box is not None:
+        low, high = np.clip(low, *box), np.clip(high, *box)
+    return tilted_grid(robot, low, high, _GRID)
 
 
 def tilted_grid(robot: Robot, low: Array, high: Array, steps: tuple[int, int, int]) -> Array:

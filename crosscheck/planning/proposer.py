@@ -22,7 +22,7 @@ from crosscheck.planning.visibility import EXACT, Signal, signal_left, signals_t
 from seecr.counted import counted
 from seecr.effects import Term
 from seecr.effects.base import Layout
-from seecr.pose import Array
+from seecr.pose import Array, rotvec_from_quat
 
 # Squared signal, in units of the noise, that tells two effects apart (docs/diagnosis.md).
 NEEDED = 15.0
@@ -83,6 +83,16 @@ class Suggestion:
     def reached(self) -> tuple[Gain, ...]:
         """The gains that a test finds."""
         return tuple(g for g in self.gains if g.enough)
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """The poses to add, in words."""
+        out = []
+        for pose in self.poses if self.poses is not None else ():
+            turn = " ".join(f"{angle:.3g}" for angle in np.degrees(rotvec_from_quat(pose[3:])))
+            x, y, z = pose[:3]
+            out.append(f"({x:.4g} {y:.4g} {z:.4g}) m, turned by ({turn}) deg")
+        return tuple(out)
 
     def as_json(self) -> dict[str, Any]:
         """The content in ``plan.json``."""

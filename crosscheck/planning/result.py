@@ -152,7 +152,10 @@ class Plan(Result):
 
     def lines(self) -> list[str]:
         """The sentence, what to add, and the notes."""
-        add = [f"add: {item.words}" for item in self.suggestions if item.reached]
+        add = []
+        for item in self.suggestions:
+            if item.reached:
+                add += [f"add: {item.words}", *(f"     {place}" for place in item.places)]
         return [self.sentence, *add, *(f"note: {note}" for note in self.notes)]
 
     def records(self) -> list[Record]:

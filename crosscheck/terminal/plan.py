@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -14,7 +13,6 @@ from crosscheck.planning.result import Plan
 from crosscheck.planning.words import alike, gain_words
 from crosscheck.terminal.lines import console_for, say
 from seecr.counted import some
-from seecr.pose import rotvec_from_quat
 
 _MOST_GAINS, _MOST_SLACK = 3, 5
 
@@ -70,11 +68,5 @@ def _print_suggestion(console: Console, item: Suggestion) -> None:
         return
     words = some([gain_words(g) for g in reached], _MOST_GAINS, "; ")
     say(console, f"add: {item.words}: {words}")
-    for pose in item.poses if item.poses is not None else ():
-        turn = np.degrees(rotvec_from_quat(pose[3:]))
-        x, y, z = pose[:3]
-        say(
-            console,
-            f"     ({x:.4g} {y:.4g} {z:.4g}) m, turned by ({turn[0]:.3g} {turn[1]:.3g} "
-            f"{turn[2]:.3g}) deg",
-        )
+    for place in item.places:
+        say(console, f"     {place}")

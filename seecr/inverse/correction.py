@@ -270,15 +270,18 @@ def correct(
 
 
 def margins_in_place(
-    robot: Robot, poses: Array, effects: GivenEffects, lowest: ArrayLike, highest: ArrayLike
-) -> Array:
+    robot: Robot, poses: Array, effects: GivenEffects, lowest: ArrayLike, highest: ArrayLike,
+    thorough: bool = True,
+) -> Array:  # fmt: skip
     """(n,) [N] how far inside their limits the tensions are that hold positions: for maps.
 
     Like :func:`correct` with ``prefer="position"``, but any orientation will do, and no other
     positions are tried. Of the orientations found, that with the largest margin counts, so a larger
     one may exist. Minus infinity if none was found that holds and in which the platform stays.
+    Searches that are not ``thorough`` begin where straight cables or neighbours lead, no more.
     """
-    return _search_of(robot, poses, effects, lowest, highest, "minimum").margins_in_place()
+    search = _search_of(robot, poses, effects, lowest, highest, "minimum")
+    return search.margins_in_place(thorough)
 
 
 def _search_of(
@@ -353,11 +356,11 @@ class _Search:
             _STRAIN if np.isinf(self.limits.high).any() else None,
         )  # fmt: skip
 
-    def margins_in_place(self) -> Array:
+    def margins_in_place(self, thorough: bool) -> Array:
         """(n,) [N] margins of positions; minus infinity if they are not held or not stable."""
         tables, rows = self._tables(self.given), np.arange(len(self.given))
         problem = self._reaching(rows, tables.scale, fix_position=True)
-        aimed, found = poses_in_place(problem, tables)
+        aimed, found = poses_in_place(problem, tables, thorough)
         margins, rows = np.full(len(rows), -np.inf), np.flatnonzero(found)
         if len(rows) == 0:
             return margins

@@ -138,7 +138,10 @@ def held_chance(
     seen = np.zeros((0, len(places)))
     for count, sure in _STAGES:
         drawn = [terms.with_vector(one).effects for one in vectors[len(seen) : count]]
-        more = [margins_at(robot, places[rows], *limits, one) for one in drawn]
+        # where full searches find no orientation for the first few, none is found for the others
+        # either, unless that of a neighbour is nearly one
+        thorough = count == _STAGES[0][0]
+        more = [margins_at(robot, places[rows], *limits, one, thorough) for one in drawn]
         seen = np.concatenate([seen, more])
         out[rows] = (seen >= edge).mean(axis=0)
         near = ~(np.isin(out[rows], (0.0, 1.0)) & _far(seen, sure, solved))

@@ -18,11 +18,12 @@ from seecr.workspace.zones import load_scale, tension_margin
 
 def margins_at(
     robot: Robot, poses: Array, lowest: ArrayLike, highest: ArrayLike,
-    wrenches: ArrayLike | None, effects: GivenEffects,
+    wrenches: ArrayLike | None, effects: GivenEffects, thorough: bool = True,
 ) -> Array:  # fmt: skip
     """Margins (n,) [N]; robots with too few cables are solved for the orientation.
 
-    Theirs are those of the best orientation found, and minus infinity if there is none.
+    Theirs are those of the best orientation found, and minus infinity if there is none, after a
+    search that is ``thorough`` or not.
     """
     acting = effects_of(effects, robot)
     if robot.n_cables >= robot.n_dof:
@@ -34,7 +35,7 @@ def margins_at(
             f"{robot.name} has fewer cables than degrees of freedom, so it holds no set of "
             "wrenches; expected none"
         )
-    return margins_in_place(robot, poses, acting, lowest, highest)
+    return margins_in_place(robot, poses, acting, lowest, highest, thorough)
 
 
 def is_held(robot: Robot, margin: Array) -> NDArray[np.bool_]:

@@ -24,11 +24,15 @@ from seecr.statics.tables import Tables
 _NEIGHBOURS, _AT_ONCE = 3, 8
 
 
-def poses_in_place(problem: Reaching, tables: Tables) -> tuple[Array, NDArray[np.bool_]]:
+def poses_in_place(
+    problem: Reaching, tables: Tables, thorough: bool = True
+) -> tuple[Array, NDArray[np.bool_]]:
     """Stable poses (n, 7) at the wanted positions, and (n,) whether one was found.
 
     Args:
         problem: one in which positions may not change. tables: of its wanted poses.
+        thorough: whether full searches are made where no straight cable and no neighbour leads to
+            an orientation.
     """
     turned = turned_in_place(problem.robot, tables, problem.least, problem.most)
     if not np.any(tables.cables[..., [RADIUS, WEIGHT, LIFT]]):
@@ -42,6 +46,8 @@ def poses_in_place(problem: Reaching, tables: Tables) -> tuple[Array, NDArray[np
     while left.any():
         if len(fresh):
             fresh = _from_neighbours(best, np.flatnonzero(left), fresh)
+        elif not thorough:
+            break
         else:
             some = _apart(np.flatnonzero(left))
             best.take(some, any_that_stays(part_of(problem, some)))

@@ -284,3 +284,31 @@ def test_an_hour_later_is_on_the_clock_of_each_file(robot, few):
     alone = np.concatenate([signals(_later(robot, day))[0]["creep"].columns for day in days])
     assert np.abs(creep).max() > 1e-3
     assert creep == pytest.approx(alone, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["demobot_cogiro", "planar_vertical"])
+def test_poses_to_add_are_in_the_box(name):
+    """They had been proposed below the floor."""
+    robot = load_robot(model_path(name))
+    poses = np.tile(robot.reference_pose, (6, 1))
+    poses[:, 0] += np.linspace(-0.05, 0.05, 6)
+    plan = make_plan(robot, poses, SIGMA).planned
+    free, home = more_poses(plan).poses[:, :3], robot.reference_pose[:3]
+    box = np.array([home - [0.03, 0.1, 0.0], home + np.array([0.06, 0.1, 0.05])])
+    (one,) = (o for o in extensions(plan, box=box) if o.kind is Adding.POSES)
+    there = one.poses[:, :3]
+    assert np.all((there >= box[0] - 1e-12) & (there <= box[1] + 1e-12)) and len(there) > 5
+    assert np.any((free < box[0]) | (free > box[1]))
+
+
+def test_poses_to_add_are_listed_where_they_are_said_to_be(robot, commands):
+    plan = make_plan(robot, commands.rows(np.arange(10)), SIGMA)
+    listed = [item for item in plan.suggestions if item.poses is not None and item.reached]
+    for item in listed:
+        lines = str(plan).splitlines()
+        at = lines.index(f"add: {item.words}")
+        assert "listed below" in item.words and len(item.places) == len(item.poses)
+        assert [line.strip() for line in lines[at + 1 : at + 1 + len(item.places)]] == [
+            *item.places
+        ]
+    assert listed
