@@ -117,8 +117,8 @@ def workspace_map(
             the poses of a grid are in no order.
         elastic: whether to solve for the elastic robot's equilibrium at each pose.
         chance: whether to compute the probability that each pose can be held. That needs a model
-            with a covariance, and takes a millisecond or so per pose near the edge; half a second
-            where the orientation has to be found.
+            with a covariance, and takes a millisecond or so per pose near the edge; a tenth of a
+            second where the orientation has to be found.
         progress: called as poses are done.
 
     Returns:

@@ -408,7 +408,7 @@ def test_an_orientation_from_which_the_platform_goes_elsewhere_does_not_hold(
     poses = np.tile([*below, 1.0, 0.0, 0.0, 0.0], (2, 1))
     poses[1, :3] = above  # the cables' ends are above their exit points: balanced, but not stable
     both = np.ones(2, dtype=bool)
-    monkeypatch.setattr(correction, "poses_in_place", lambda problem, _: (problem.wanted, both))
+    monkeypatch.setattr(correction, "poses_in_place", lambda problem, *_: (problem.wanted, both))
     held = margins_in_place(robot, poses, (), 0.0, 6.0)
     assert held[0] > 0.0 and held[1] == -np.inf
 

@@ -101,6 +101,26 @@ def test_others_start_from_the_results_of_their_nearest() -> None:
     np.testing.assert_allclose(problem.placed(best.away, np.arange(9)), poses, atol=1e-9)
 
 
+@pytest.mark.parametrize("thorough", [True, False])
+def test_full_searches_are_made_only_if_they_are_asked_for(
+    monkeypatch: pytest.MonkeyPatch, thorough: bool
+) -> None:
+    """Above all exit points nothing is found: 256 models of a map each searched there in full."""
+    searched: list[int] = []
+    own = in_place.any_that_stays
+
+    def counted(problem: Reaching) -> Best:
+        searched.append(len(problem.wanted))
+        return own(problem)
+
+    monkeypatch.setattr(in_place, "any_that_stays", counted)
+    poses = np.tile(ROBOT.reference_pose, (3, 1))
+    poses[:, 0], poses[2, 2] = [0.4, 0.5, 0.6], 10.0
+    margins = correction.margins_in_place(ROBOT, poses, HEAVY, 0.0, np.inf, thorough)
+    assert np.isneginf(margins).tolist() == [False, False, True]
+    assert searched == ([1] if thorough else [])
+
+
 def test_searched_rows_are_spread_evenly_from_the_first_to_the_last() -> None:
     rows = np.arange(100, 171)
     assert in_place._apart(rows).tolist() == [100, 110, 120, 130, 140, 150, 160, 170]
