@@ -190,19 +190,24 @@ class Comparison(Result):
                 return said
             return f"{said} The errors are {w.scale:.3g} times the noise."
         if w.is_noise:
-            stated = kinds_stated(self.problem) == kinds_read(self.problem)
-            times = f"{w.scale:.2f} times the {'stated' if stated else 'estimated'} noise"
+            times = f"{w.scale:.2f} times the {self._known_as} noise"
             return f"Model and data agree: the residuals are noise ({times})."
         if self.coloured is not None:
             return f"Model and data agree: the residuals are noise ({self.coloured.words})."
         size = f"the errors are {w.scale:.3g} times the noise"
         if not w.structured:
             return (
-                f"The residuals look random, but {size}: either the noise is stated too small, or "
-                "many small effects are missing."
+                f"The residuals look random, but {size}: either it is {self._known_as} too small, "
+                "or many small effects are missing."
             )
         goes = self._goes_with()
         return f"The model misses something: {size} and correlated between neighbouring rows{goes}."
+
+    @property
+    def _known_as(self) -> str:
+        """How the size of the noise is known."""
+        stated = kinds_stated(self.problem) == kinds_read(self.problem)
+        return "stated" if stated else "estimated"
 
     def _goes_with(self) -> str:
         strongest = next((a for a in self.associations if a.significant), None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
 
@@ -13,13 +14,15 @@ from crosscheck.importing.logged import Logged
 from crosscheck.importing.rows import unit_quaternions
 from seecr.columns.table import Table, read_table, show
 from seecr.columns.times import began, times_of_day
+from seecr.counted import some
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.units import UNITS, Unit, of_columns
 
 _TIMES = re.compile(r"(t|time|timestamp)(?:_(\w+)|\s*\[(\w+)\])?", re.IGNORECASE)
 _LABEL = re.compile(
-    r"(?:meas_|pose_|pos_|position_)?(q[wxyz]|r[xyz]|t?[xyz])(?:_(\w+)|\s*\[(\w+)\]|\s*\((\w+)\))?",
+    r"(?:(?:meas|pose|pos|position)[_ ])?(q[wxyz]|r[xyz]|t?[xyz])"
+    r"(?:_(\w+)|\s*\[(\w+)\]|\s*\((\w+)\))?",
     re.IGNORECASE,
 )
 
@@ -45,14 +48,28 @@ def read_poses(path: Path, unit: str | None = None) -> Logged:
     lacking = [axis for axis in "xyz" if axis not in found]
     if lacking:
         raise table.error(
-            f"expected columns of a pose such as x_mm y_mm z_mm, got no {', '.join(lacking)}; "
-            "rename them"
+            f"expected columns of a pose such as x_mm y_mm z_mm, got no {', '.join(lacking)} among "
+            f"{some(table.names, 8)}; rename them"
         )
     if unit is not None and all(found[axis][1] for axis in "xyz"):
         raise InputError(f"--unit {unit}: the columns of {path.name} state their own; leave it out")
     position = np.stack([_length(table, *found[axis], unit) for axis in "xyz"], axis=1)
     bodies = {path.stem: (position, _turns(table, found))}
-    return Logged(path, t_s, table.line, bodies, {}, began=first)
+    return Logged(path, t_s, table.line, bodies, {}, notes=_unread(table, found), began=first)
+
+
+def _unread(table: Table, found: Mapping[str, tuple[int, str]]) -> tuple[str, ...]:
+    """A note on columns that are not read, if there are any."""
+    read = {table.names[column] for column, _unit in found.values()}
+    others = [name for name in table.names if name not in read and not _TIMES.fullmatch(name)]
+    if not others:
+        return ()
+    turned = (
+        ""
+        if any(name[0] in "qr" for name in found)
+        else ("; rotations are read from qw qx qy qz or rx_deg ry_deg rz_deg")
+    )
+    return (f"columns not read: {some(others, 6)}{turned}",)
 
 
 def _columns(table: Table) -> dict[str, tuple[int, str]]:

@@ -68,16 +68,17 @@ def _check_robot(path: Path, document: Mapping[str, Any], robot: Robot) -> tuple
 
 
 def _document(path: Path) -> Mapping[str, Any]:
+    text = read_text(path, _EXPECTED)
     try:
-        document = json.loads(read_text(path, _EXPECTED))
+        document = json.loads(text)
     except RecursionError:
         raise InputFileError.at(path, f"nests too deeply; {_EXPECTED}") from None
     except json.JSONDecodeError as error:
-        text = f"is not JSON: {error.msg}; {_EXPECTED}"
-        raise InputFileError.at(path, text, line=error.lineno) from None
+        said = f"is not JSON: {error.msg}; {_EXPECTED}"
+        raise InputFileError.at(path, said, line=error.lineno) from None
     except ValueError:
-        text = f"has a whole number of thousands of digits; {_EXPECTED}"
-        raise InputFileError.at(path, text) from None
+        said = f"has a whole number of thousands of digits; {_EXPECTED}"
+        raise InputFileError.at(path, said) from None
     return document if isinstance(document, Mapping) else {}
 
 

@@ -271,7 +271,8 @@ def _commands(
         raise InputError(f"expected one of POSES.csv, --line, --grid; got {got or 'none'}")
     if poses is not None and given.turned:
         raise InputError(
-            f"--turned applies to --line and --grid; {poses} has its own orientations; leave it out"
+            "--turned applies to --line and --grid; commands of a file are turned by columns such "
+            f"as cmd_rx_deg; leave it out, or add them to {poses}"
         )
     if given.count and not given.line:
         raise InputError(

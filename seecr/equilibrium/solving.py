@@ -51,9 +51,11 @@ def solve(
 
     Args:
         robot: from :func:`seecr.load_robot`, its MJCF, or made by hand.
-        poses: (n, 7) or (7,) commanded poses; the winches pay out the straight lengths from A_i to
-            B_i at these poses (eqs 1, 2). Or :class:`seecr.Commands` with runs, times or lengths,
-            or ``crosscheck.Measurements``, of which only the commands count.
+        poses: (n, 7) or (7,) commanded poses; the winches change the rest lengths of the MJCF by
+            what the straight lengths from A_i to B_i change from the reference pose. Without
+            pretension these are then the straight lengths (eqs 1, 2). Or :class:`seecr.Commands`
+            with runs, times or lengths, or ``crosscheck.Measurements``, of which only the commands
+            count.
         rest_lengths: (n, m) or (m,) [m] absolute lengths instead of poses. Poses given as well are
             only where the search starts; by default it starts at the poses whose straight lengths
             fit these best, found from the reference pose.

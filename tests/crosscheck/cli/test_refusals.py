@@ -203,6 +203,11 @@ def saved(folder: Path, stiff: tuple[Path, Path]) -> Path:
 def test_an_effect_beside_all_from(stiff: tuple[Path, Path], tmp_path: Path) -> None:
     words = ("add", "stiffness", *stiff, "--model", tmp_path / "m.toml", "--all-from", "d.json")
     assert "expected EFFECT or --all-from, not both; got stiffness and" in refused(*words)
+    gone = tmp_path / "gone.json"
+    said = refused("add", "--all-from", gone, *stiff, "--model", tmp_path / "m.toml")
+    assert (
+        f"{gone}: " in said and "thousands of digits" not in said and "no such file" in said.lower()
+    )
 
 
 def test_what_else_had_no_effect(stiff: tuple[Path, Path], tmp_path: Path) -> None:

@@ -19,7 +19,13 @@ def log(folder: Path, *lines: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    "head", ["t_s,x_mm,y_mm,z_mm", "time [s],tx [mm],ty [mm],tz [mm]", "t,pos_x (mm),y_mm,z_mm"]
+    "head",
+    [
+        "t_s,x_mm,y_mm,z_mm",
+        "time [s],tx [mm],ty [mm],tz [mm]",
+        "t,pos_x (mm),y_mm,z_mm",
+        "Time [s],Pos X (mm),Pos Y (mm),Pos Z (mm)",
+    ],
 )
 def test_units_are_read_from_names(tmp_path: Path, head: str) -> None:
     found = read_poses(log(tmp_path, head, "0,1,2,3", "0.5,4,5,6"))
@@ -35,6 +41,18 @@ def test_a_unit_is_stated_where_names_have_none(tmp_path: Path) -> None:
         read_poses(path)
     with pytest.raises(InputError, match=r"the columns of log\.csv state their own"):
         read_poses(log(tmp_path, "t,x_m,y_m,z_m", "0,1,2,3"), "mm")
+
+
+def test_columns_that_are_not_read_are_said(tmp_path: Path) -> None:
+    """All orientations were lost without a word."""
+    path = log(tmp_path, "t_s,x_mm,y_mm,z_mm,Roll [deg],Yaw [deg]", "0,1,2,3,4,5")
+    (note,) = read_poses(path).notes
+    assert note.startswith("columns not read: Roll [deg], Yaw [deg]; rotations are read from")
+    turned = log(tmp_path, "t_s,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg,frame", "0,1,2,3,4,5,6,7")
+    assert read_poses(turned).notes == ("columns not read: frame",)
+    assert read_poses(log(tmp_path, "t_s,x_mm,y_mm,z_mm", "0,1,2,3")).notes == ()
+    with pytest.raises(InputFileError, match="got no x, y, z among t_s, North, East; rename them"):
+        read_poses(log(tmp_path, "t_s,North,East", "0,1,2"))
 
 
 def test_three_angles_turn_about_moving_axes(tmp_path: Path) -> None:

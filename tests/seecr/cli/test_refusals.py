@@ -54,7 +54,8 @@ ROBOT = "planar_vertical"
         ("sweep demobot_parallel --line 0.1 0.2 0.1 0.4 0.2 0.1 --count 100000000 --out o",
          "--count: expected at most 1e+07 poses, got 1.0e+08"),
         ("sweep demobot_parallel here.csv --turned 1 0 0 0 --out o",
-         "--turned applies to --line and --grid; here.csv has its own orientations"),
+         "--turned applies to --line and --grid; commands of a file are turned by columns such as "
+         "cmd_rx_deg; leave it out, or add them to here.csv"),
         ("sweep demobot_parallel --line 0.3 0.2 0.1 0.4 0.2 0.1 --turned 1 1 0 0 --out o",
          "--turned: expected a unit quaternion, scalar first, got one of norm 1.414"),
         ("map demobot_parallel --turned 0.97 0 0.2 0 --out o",
