@@ -21,6 +21,8 @@ from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate, rotvec
 
 LEFT, MOST = 0.2, 0.8
 """Largest residual relative to the spread of the commands, and the part of dwells within it."""
+# Positions that spread so many times as far as the commands, or as little, are in another unit.
+_UNITS = 8.0
 # The same of named points, each of which must be within it.
 _LEFT_OF_POINTS = 0.05
 # Commands with smaller rotations about their mean do not show where the target is.
@@ -128,7 +130,7 @@ def to_commands(position: Array, quat: Array | None, told: Array, target: Array 
     away = told[:, :3] + quat_rotate(home, shift) - quat_rotate(turn, position)
     frames = Frames(turn, np.median(away, axis=0), _NONE, shift, "", ("tracker_frame",))
     left = np.linalg.norm(away - frames.shift, axis=1)
-    _check(left, told)
+    _check(left, told, position)
     if np.median(left) > _aside(told[:, :3]):
         raise CrosscheckError(_ONE_LINE)
     how = (
@@ -190,11 +192,20 @@ def size_of_cloud(points: Array) -> float:
     return float(np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1))))
 
 
-def _check(left: Array, told: Array) -> None:
+def _check(left: Array, told: Array, position: Array) -> None:
     most, spread = float(np.quantile(left, MOST)), size_of_cloud(told[:, :3])
     if most > LEFT * spread:
         raise CrosscheckError(
             f"the frames cannot be aligned: errors of {1e3 * most:.3g} mm remain, and the commands "
             f"spread by {1e3 * spread:.3g} mm; expected the commands and the tracker's log of one "
             "recording; are they of the same robot, and do their clocks agree (--clock)?"
+            f"{_of_units(size_of_cloud(position) / spread)}"
         )
+
+
+def _of_units(larger: float) -> str:
+    """A question about the unit of readings that spread so many times as far as the commands."""
+    if 1.0 / _UNITS < larger < _UNITS:
+        return ""
+    many = f"{larger:.0f} times as far" if larger > 1.0 else f"{larger:.2g} of that"
+    return f" The tracker's positions spread by {many}: are they in the unit that the file states?"

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from crosscheck.importing.logged import Logged
 from crosscheck.importing.rows import unit_quaternions
+from crosscheck.measurements.sentinels import is_nines
 from seecr.columns.table import Table, read_table, show
 from seecr.columns.times import began, times_of_day
 from seecr.counted import some
@@ -20,6 +21,8 @@ from seecr.pose import Array
 from seecr.units import UNITS, Unit, of_columns
 
 _TIMES = re.compile(r"(t|time|timestamp)(?:_(\w+)|\s*\[(\w+)\])?", re.IGNORECASE)
+# A number of nines in so many rows stands for "not seen".
+_NINES = 4
 _LABEL = re.compile(
     r"(?:(?:meas|pose|pos|position)[_ ])?(q[wxyz]|r[xyz]|t?[xyz])"
     r"(?:_(\w+)|\s*\[(\w+)\]|\s*\((\w+)\))?",
@@ -53,9 +56,25 @@ def read_poses(path: Path, unit: str | None = None) -> Logged:
         )
     if unit is not None and all(found[axis][1] for axis in "xyz"):
         raise InputError(f"--unit {unit}: the columns of {path.name} state their own; leave it out")
+    for axis in "xyz":
+        _refuse_nines(table, found[axis][0])
     position = np.stack([_length(table, *found[axis], unit) for axis in "xyz"], axis=1)
     bodies = {path.stem: (position, _turns(table, found))}
     return Logged(path, t_s, table.line, bodies, {}, notes=_unread(table, found), began=first)
+
+
+def _refuse_nines(table: Table, column: int) -> None:
+    """Refuse what programs write where nothing is seen, if it is there in several rows."""
+    given = table.numbers(column, blank_is_nan=True)
+    values, count = np.unique(given[np.isfinite(given)], return_counts=True)
+    for value in values[count >= _NINES]:
+        if is_nines(float(value)):
+            row = int(np.argmax(given == value))
+            text = (
+                f"expected a position, got {value:.10g}, as in {int((given == value).sum())} rows; "
+                "leave the cells empty where the body was not seen"
+            )
+            raise table.error(text, row=row, column=table.names[column])
 
 
 def _unread(table: Table, found: Mapping[str, tuple[int, str]]) -> tuple[str, ...]:

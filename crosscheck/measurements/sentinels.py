@@ -43,14 +43,14 @@ def _refuse_beyond(
         return
     column, values = columns.known[quantity], columns.numbers(quantity, blank_is_nan=True)
     given = columns.table.numbers(column.index, blank_is_nan=True)
-    columns.refuse(
-        np.abs(values - home) > most,
-        quantity,
-        lambda row: (
-            f"expected a reading {where}, got {given[row]:.10g} {column.unit.suffix}; "
-            f"{_REMEDY}{more}"
-        ),
-    )
+
+    def said(row: int) -> str:
+        text = f"expected a reading {where}, got {given[row]:.10g} {column.unit.suffix}; "
+        if column.unit.suffix == "m" and abs(1e-3 * values[row] - home) <= most / _FAR:
+            text += f"if it is in mm, name the column {quantity}_mm; "
+        return f"{text}{_REMEDY}{more}"
+
+    columns.refuse(np.abs(values - home) > most, quantity, said)
 
 
 def _refuse_nines(columns: Columns, quantity: str) -> None:
@@ -58,7 +58,7 @@ def _refuse_nines(columns: Columns, quantity: str) -> None:
     column = columns.known[quantity]
     given = columns.table.numbers(column.index, blank_is_nan=True)
     read = given[np.isfinite(given)]
-    if len(read) < _ROWS or np.ptp(read) > 0.0 or not _is_nines(float(read[0])):
+    if len(read) < _ROWS or np.ptp(read) > 0.0 or not is_nines(float(read[0])):
         return
     columns.refuse(
         np.isfinite(given),
@@ -67,6 +67,7 @@ def _refuse_nines(columns: Columns, quantity: str) -> None:
     )
 
 
-def _is_nines(value: float) -> bool:
+def is_nines(value: float) -> bool:
+    """Whether a number is what programs write for "not read"."""
     digits = f"{abs(value):.12g}"
     return len(digits) >= _NINES and set(digits) == {"9"}

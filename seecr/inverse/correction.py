@@ -131,7 +131,8 @@ class Correction(Result):
             ),
         ):
             if np.any(rows):
-                out.append(f"{int(rows.sum())} {text}")
+                places = rows_words(np.flatnonzero(rows).tolist(), self.commands.line)
+                out.append(f"{int(rows.sum())} {text}: {places}")
         if np.any(self.found & ~self.stays) and self.robot.weight == 0.0 and self._idle:
             out[-1] += (
                 ": without gravity, slack cables leave it free; give a lowest tension above 0"

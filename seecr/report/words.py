@@ -306,7 +306,7 @@ def other_lines(
         others: those of the first command.
         passes: barriers to each of the other equilibria, if they were computed.
     """
-    if others is None:
+    if others is None or not solution.converged[0]:
         return
     away = elsewhere(solution, others)
     # why some have no barrier takes long to say, and mostly is the same for all

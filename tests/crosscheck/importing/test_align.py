@@ -105,3 +105,13 @@ def test_for_a_known_frame_one_wrong_dwell_does_not_move_the_body() -> None:
 def test_a_tracker_in_the_base_frame_leaves_positions_as_they_are() -> None:
     place, quat = as_they_are(None).poses(np.ones((1, 3)), NONE[None])
     assert place.tolist() == [[1, 1, 1]] and quat is not None and quat.tolist() == [[1, 0, 0, 0]]
+
+
+@pytest.mark.parametrize(("times", "said"), [(1e3, "1000 times as far"), (1e-3, "0.001 of that")])
+def test_readings_in_another_unit_are_asked_about(times: float, said: str) -> None:
+    poses = told()
+    position, quat = tracked(poses, 0.0 * TARGET)
+    with pytest.raises(CrosscheckError, match=f"spread by {said}: are they in the unit that"):
+        to_commands(times * position, quat, poses, None)
+    with pytest.raises(CrosscheckError, match=r"\(--clock\)\?$"):
+        to_commands(position[::-1], quat, poses, None)

@@ -36,14 +36,16 @@ def test_readings_are_within_a_hundred_frames_and_ten_turns(
     assert refusal(name, "0", inside) == ""
     said = refusal(name, "0", inside, outside)
     assert f"line 4, column {name}: expected a reading " in said
-    assert f"got {outside} {name.rpartition('_')[2]}{REMEDY}" in said
+    assert f"got {outside} {name.rpartition('_')[2]}; " in said and REMEDY[2:] in said
 
 
 def test_only_of_positions_a_survey_is_said() -> None:
-    assert refusal("meas_x_m", "600").endswith(
-        f"within 500 m of the robot, got 600 m{REMEDY}, and subtract a constant from coordinates "
+    assert refusal("meas_x_m", "-8000").endswith(
+        f"within 500 m of the robot, got -8000 m{REMEDY}, and subtract a constant from coordinates "
         "in a survey's grid"
     )
+    assert "got 1200 m; if it is in mm, name the column meas_x_mm; " in refusal("meas_x_m", "1200")
+    assert "in mm" not in refusal("meas_x_mm", "1200000")
     assert refusal("meas_ry_rad", "600").endswith(f"of at most ten turns, got 600 rad{REMEDY}")
 
 

@@ -354,8 +354,8 @@ def test_without_gravity_slack_cables_are_named_as_what_leaves_the_platform_free
     robot = replace(robot_named("ipanema"), gravity=np.zeros(3))
     found = correct(robot, robot.reference_pose)
     assert not found.stays.any() and found.lines()[-1] == (
-        "1 where forces balance but the platform does not come to rest: without gravity, slack "
-        "cables leave it free; give a lowest tension above 0"
+        "1 where forces balance but the platform does not come to rest: pose 0: without gravity, "
+        "slack cables leave it free; give a lowest tension above 0"
     )
     assert correct(robot, robot.reference_pose, lowest=1.0).reached.all()
 

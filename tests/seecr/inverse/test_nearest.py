@@ -154,7 +154,7 @@ def test_a_pose_from_which_the_platform_goes_elsewhere_is_told(
     monkeypatch.setattr(Reaching, "rests", every)
     found = correct(robot, want, **limits)
     assert found.found.all() and found.solution.converged.all() and not found.stays.any()
-    assert "1 where forces balance but the platform does not come to rest" in str(found)
+    assert "1 where forces balance but the platform does not come to rest: pose " in str(found)
 
 
 @pytest.mark.slow
@@ -165,7 +165,7 @@ def test_an_answer_that_is_no_local_minimum_is_told(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(search, "inward", lambda _problem, start: start)
     cut = correct(robot, want)
     assert cut.found[0] and not cut.settled[0]
-    assert "1 of them: a nearer pose that can be held may exist" in str(cut)
+    assert "1 of them: a nearer pose that can be held may exist: pose 0" in str(cut)
 
 
 def test_a_turn_about_a_hinge_is_as_far_as_its_shorter_way() -> None:
