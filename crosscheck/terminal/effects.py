@@ -6,6 +6,7 @@ import inspect
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
 
+import numpy as np
 from rich.table import Table
 
 from crosscheck.fit.words import belongs, shown
@@ -96,12 +97,15 @@ def _plain_sizes(effect: type[Effect]) -> Iterator[str]:
 def _sizes_for(effect: type[Effect], robot: Robot) -> Iterator[str]:
     """A line for each parameter of a robot, with its plausible size."""
     layout = layout_of(effect, robot)
-    for name, si, null, scale, shape in zip(
-        layout.names, layout.units, layout.null, layout.scale, layout.shape, strict=True
-    ):
+    for name, si, null, scale, upper, shape in zip(
+        layout.names, layout.units, layout.null, layout.scale, layout.upper, layout.shape,
+        strict=True,
+    ):  # fmt: skip
         factor, unit = in_unit(si)
         size, absent = factor * scale, factor * null
         words = f"absent at {absent:.4g}, plausible size {size:.3g} {unit}"
+        if np.isfinite(upper):
+            words = f"{words.rstrip()}, at most {factor * upper:.4g} {unit}"
         if shape:
             words = f"modifies the others, starts at {absent:.3g} {unit}"
         yield f"{parameter_name(name, si)}: {words}".rstrip()

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.counted import between, counted
 from seecr.errors import InputError, RobotError
 from seecr.pose import LARGEST, Array, all_finite, quat_rotate, transform_points
 
@@ -49,7 +50,7 @@ class Joint:
     point: Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Robot:
     """A platform on elastic cables. Arrays are read-only; use ``dataclasses.replace``.
 
@@ -113,6 +114,24 @@ class Robot:
         if not self.cable_names:
             object.__setattr__(self, "cable_names", tuple(f"cable{i + 1}" for i in range(m)))
         self._check_values()
+
+    def __repr__(self) -> str:
+        """The robot in a few lines, for people."""
+        held = ", ".join(f"{joint.kind} {joint.name}" for joint in self.joints)
+        platform = f"a platform on joints ({held})" if self.joints else "a free platform"
+        ends = zip("xyz", self.exit_points.min(axis=0), self.exit_points.max(axis=0), strict=True)
+        frame = ", ".join(f"{axis} {between(*ends_)}" for axis, *ends_ in ends)
+        place = " ".join(f"{part:.4g}" for part in self.reference_pose[:3])
+        lengths = self.reference_lengths
+        return "\n".join(
+            (
+                f"{self.name}: {counted(len(self.ea), 'cable')}, {platform} of {self.mass:.4g} kg",
+                f"exit points: {frame} m",
+                f"at the reference pose, x y z {place} m, cables are "
+                f"{between(lengths.min(), lengths.max())} m long",
+                f"E S: {between(self.ea.min(), self.ea.max())} N",
+            )
+        )
 
     def _not_finite(self, name: str, value: Array, m: int) -> InputError:
         """The error about a number that is none; it names the cable if each has one."""

@@ -24,8 +24,9 @@ def test_one_effect_has_its_formula_and_its_size_for_a_robot() -> None:
     result = run("effects", "pulley_radius", "--robot", COGIRO)
     assert result.exit_code == 0, result.output
     assert "r (pi - psi)" in result.stdout
-    size = 1e3 * layout_of(catalogue()["pulley_radius"], load_robot(COGIRO)).scale[0]
-    assert f"plausible size {size:.3g} mm" in result.stdout
+    layout = layout_of(catalogue()["pulley_radius"], load_robot(COGIRO))
+    assert f"plausible size {1e3 * layout.scale[0]:.3g} mm" in result.stdout
+    assert f", at most {1e3 * layout.upper[0]:.4g} mm" in result.stdout
     assert "check by hand: measure a sheave with a caliper" in result.stdout
 
 

@@ -164,3 +164,14 @@ def test_a_point_mass_on_a_free_joint_is_told_its_cure() -> None:
     apart = loose.anchor_points.copy()
     apart[0, 0] += 0.05
     assert not replace(loose, anchor_points=apart).is_point
+
+
+def test_a_robot_prints_as_a_few_lines() -> None:
+    """It had been all of its arrays."""
+    assert str(load_robot(model_path("planar_vertical"))).splitlines() == [
+        "planar_vertical: 4 cables, a platform on joints (slide x, slide z, hinge tilt) of 0.4 kg",
+        "exit points: x 0.04 to 0.76, y 0, z 0.45 to 0.486 m",
+        "at the reference pose, x y z 0.4 0 0.15 m, cables are 0.4431 m long",
+        "E S: 3000 N",
+    ]
+    assert "8 cables, a free platform of 0.4 kg" in repr(load_robot(model_path("demobot_cogiro")))
