@@ -11,9 +11,10 @@ from seecr.pose import Array
 _RATIO = 0.99
 # Changes that swing and grow by more than this ratio are cut to a third, and no further.
 _SWING = -2.0
-# Parts of changes are halved where an error does not fall by this factor, but not below the least
-# part, and grow by a factor where it does.
-_FALLS, _LEAST, _GROWS = 0.95, 0.1, 1.1
+# Parts of changes are halved where these do not fall by this factor, but not below the least part,
+# and grow by a factor where they do. They are whole where changes fall by what was made of them, to
+# this part: then all of it would have been right.
+_FALLS, _LEAST, _GROWS, _NEARLY = 0.95, 0.1, 1.1, 0.09
 
 
 def to_their_limit(change: Array, before: Array) -> Array:
@@ -27,11 +28,14 @@ def to_their_limit(change: Array, before: Array) -> Array:
     return np.asarray(change / (1.0 - np.clip(ratio, _SWING, _RATIO)))
 
 
-def damped(part: Array, error: Array, before: Array) -> Array:
-    """The parts (n,) of changes to make, smaller where errors (n,) do not fall.
+def damped(part: Array, size: Array, before: Array) -> Array:
+    """The parts (n,) of changes to make, smaller where changes do not become smaller.
 
     Args:
-        part: (n,) the parts made last. error: (n,) the errors now. before: (n,) those before.
+        part: (n,) the parts made last. size: (n,) of the changes now. before: (n,) of those before;
+            infinite where the changes before were of another kind.
     """
     halved, grown = np.maximum(0.5 * part, _LEAST), np.minimum(_GROWS * part, 1.0)
-    return np.asarray(np.where(error > _FALLS * before, halved, grown))
+    some = np.where(size > _FALLS * before, halved, grown)
+    whole = np.isfinite(before) & (size <= (1.0 + _NEARLY - part) * before)
+    return np.asarray(np.where(whole, 1.0, some))

@@ -24,8 +24,9 @@ from seecr.prediction.experiment import Experiment, Prediction
 REACHED = 1e-6
 """A pose counts as reached if it is missed by less than this [m, and rad times the length]."""
 
-# Most rounds, and the error of the pose at which they end [robot's length].
-_ROUNDS, _MISSED = 80, 1e-10
+# Rounds, and the error of the pose at which they end [robot's length]. As long as the first missed
+# pose is a later one than so many rounds ago, they go on, up to the most.
+_ROUNDS, _MISSED, _PATIENCE, _MOST = 80, 1e-10, 40, 400
 # Every so-many-th round ends at the limit of the last changes.
 _EVERY = 3
 # From this round on, a larger error will do where there is a history: a cable between sticking and
@@ -33,8 +34,10 @@ _EVERY = 3
 _LATE, _MISSED_LATE = 12, 1e-7
 # Late rounds do one of two things, in turns of so many. They take the tension behind a cable that
 # sticks as given: it is nearly so where the cable slips on the way to the pose. Or they change by
-# less the rows that come no nearer.
+# less the rows whose changes do not get smaller. They leave what comes before the first missed row.
 _TURNS = 14
+# Such changes are made in so many rows at a time: what comes later depends on what they lead to.
+_AHEAD = 8
 
 
 def lengths_with_history(
@@ -57,9 +60,10 @@ def lengths_with_history(
     """
     size = np.where(np.arange(6) < 3, 1.0 / robot.length, 1.0)
     before, part = np.zeros_like(held.rest), np.ones(len(held.rest))
-    last_missed = np.full(len(held.rest), np.inf)
+    last_size = np.full(len(held.rest), np.inf)
     least, best = (np.inf, np.inf), None
-    for number in range(_ROUNDS):
+    farthest, improved = 0, 0
+    for number in range(_MOST):
         told = told_lengths(robot, commands, effects, held.rest)
         prediction = Experiment(robot, replace(commands, lengths=told, told=True)).predict(effects)
         if not (prediction.has_history or prediction.setup.laws):
@@ -69,19 +73,35 @@ def lengths_with_history(
         left = _left(missed[held.fine], robot)
         if best is None or left < least:
             least, best = left, (told, prediction)
-        if left[1] <= _enough(late, robot):
+        first = _first_missed(missed, held, robot)
+        if first > farthest:
+            farthest, improved = first, number
+        if left[1] <= _enough(late, robot) or number + 1 >= max(_ROUNDS, improved + _PATIENCE):
             break
         last, given = held.rest, late and (number - _LATE) // _TURNS % 2 == 0
         held = hold_again(prediction.tables, held, *limits, follows=not given)
-        change = held.rest - last
+        change, size_now = held.rest - last, np.full(len(held.rest), np.inf)
         if late and not given:
-            part = damped(part, missed, last_missed)
+            size_now = np.abs(change).max(axis=1)
+            part = damped(part, size_now, last_size)
             held.rest = last + part[:, None] * change
+            held.rest[first + _AHEAD :] = last[first + _AHEAD :]
         elif number and number % _EVERY == 0:
             held.rest = last + to_their_limit(change, before)
-        before, last_missed = change, missed
+        if late:
+            held.rest[:first] = last[:first]
+        before, last_size = change, size_now
     assert best is not None
     return best
+
+
+def _first_missed(missed: Array, held: Held, robot: Robot) -> int:
+    """The first row that is missed, if any: what comes before it is as it should be.
+
+    To change that a little would change the history of all that come after it.
+    """
+    rows = np.flatnonzero(held.fine & (np.nan_to_num(missed, nan=np.inf) >= REACHED / robot.length))
+    return int(rows[0]) if len(rows) else 0
 
 
 def _left(missed: Array, robot: Robot) -> tuple[float, float]:

@@ -22,11 +22,20 @@ def test_what_grows_has_no_limit_and_what_swings_further_is_damped() -> None:
     assert to_their_limit(before, np.zeros(3)) == pytest.approx(before)
 
 
-def test_changes_get_smaller_where_the_error_does_not_fall() -> None:
+def test_changes_get_smaller_where_the_last_did_not() -> None:
     part, before = np.array([1.0, 0.6, 0.4, 0.15]), np.ones(4)
-    error = np.array([0.99, 0.5, 0.9, 2.0])
-    assert damped(part, error, before) == pytest.approx([0.5, 0.66, 0.44, 0.1])
+    size = np.array([0.99, 0.5, 0.9, 2.0])
+    assert damped(part, size, before) == pytest.approx([0.5, 0.66, 0.44, 0.1])
     assert damped(part, np.full(4, 0.1), before).max() == 1.0
+
+
+def test_changes_are_whole_where_all_of_the_last_would_have_been_right() -> None:
+    """A tenth made of each leaves nine tenths, round after round, and no error falls until the
+    cable slips.
+    """
+    part = np.array([0.5, 0.1, 0.1])
+    assert damped(part, np.array([0.5, 0.9, 1.0]), np.ones(3)).tolist() == [1.0, 1.0, 0.1]
+    assert damped(part, np.ones(3), np.full(3, np.inf)) == pytest.approx(1.1 * part)
 
 
 def test_damped_changes_end_a_cycle() -> None:

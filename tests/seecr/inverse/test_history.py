@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -25,6 +26,7 @@ def played(
     errors: list[list[float]],
     has_history: bool = True,
     seen: list[np.ndarray] | None = None,
+    change: Callable[[int], Any] = lambda _round: 1e-6,
 ) -> tuple[list[int], Any]:
     """The rounds that were played and what was found, with these errors [m] of three poses."""
     rounds: list[int] = []
@@ -39,7 +41,7 @@ def played(
         )
 
     def hold_again(_tables: object, held: Held, *_limits: object, follows: bool) -> Held:
-        return replace(held, rest=held.rest + 1e-6)
+        return replace(held, rest=held.rest + change(rounds[-1]))
 
     monkeypatch.setattr(
         history, "Experiment", lambda *_given: SimpleNamespace(predict=lambda e: predict(None, e))
@@ -71,19 +73,48 @@ def test_of_as_many_missed_poses_the_nearest_are_taken(monkeypatch: pytest.Monke
     assert found[1].number == 2 and len(rounds) == history._ROUNDS
 
 
-def test_late_rounds_change_less_the_rows_that_come_no_nearer(
+def test_late_rounds_change_less_the_rows_whose_changes_do_not_get_smaller(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Row 1 comes nearer by a third each round, row 0 does not: half, a quarter, ... a tenth."""
+    """Those of row 1 do: they are whole. Row 0: half, a quarter, ... a tenth."""
     told: list[np.ndarray] = []
-    errors = [[1e-3, 1e-3 * 0.66**k, 0.0] for k in range(history._ROUNDS)]
-    played(monkeypatch, errors, seen=told)
-    change = np.diff([rest[:2, 0] for rest in told], axis=0) / 1e-6
+    shrinks = [np.array([1.0, 0.66**k, 1.0])[:, None] * 1e-6 for k in range(history._ROUNDS)]
+    played(monkeypatch, [[1e-3, 1e-3, 0.0]], seen=told, change=lambda k: shrinks[k])
+    change = np.diff([rest[:2, 0] for rest in told], axis=0)
+    made = change / np.array([one[:2, 0] for one in shrinks])[: len(change)]
     first = history._LATE + history._TURNS
-    damped = change[first : first + history._TURNS]
-    np.testing.assert_allclose(damped[:, 0], [0.5, 0.25, 0.125] + [0.1] * 11, rtol=1e-6)
-    np.testing.assert_allclose(damped[:, 1], 1.0, rtol=1e-6)
-    assert np.all(change[history._LATE + 1 : first] > 0.9), "and not where tensions are as given"
+    damped = made[first : first + history._TURNS]
+    # the first of a turn knows of none before
+    assert damped[:, 0] == pytest.approx([1.0, 0.5, 0.25, 0.125] + [0.1] * 10, rel=1e-4)
+    assert damped[:, 1] == pytest.approx(1.0, rel=1e-2)
+    assert np.all(made[history._LATE + 1 : first] > 0.9), "and not where tensions are as given"
+
+
+def test_late_rounds_leave_what_is_before_the_first_missed_row(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And where they change less, all that is far after it, which depends on what comes of it."""
+    told: list[np.ndarray] = []
+    played(monkeypatch, [[0.1 * REACHED, 1e-3, 0.0]], seen=told)
+    late = [rest[:, 0] for rest in told[history._LATE :]]
+    assert np.ptp([rest[0] for rest in late]) == 0.0 < np.ptp([rest[1] for rest in late])
+    monkeypatch.setattr(history, "_AHEAD", 1)
+    told.clear()
+    played(monkeypatch, [[1e-3, 1e-3, 0.0]], seen=told)
+    first = history._LATE + history._TURNS
+    turn = np.array([rest[:, 0] for rest in told[first : first + history._TURNS]])
+    assert np.ptp(turn[:, 1]) == 0.0 < np.ptp(turn[:, 0])
+
+
+def test_rounds_go_on_as_long_as_the_first_missed_pose_comes_later(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    one, two = [1e-3, 1e-3, 0.0], [0.1 * REACHED, 1e-3, 0.0]
+    rounds, _found = played(monkeypatch, [*[one] * 70, two])
+    assert len(rounds) == 70 + history._PATIENCE
+    monkeypatch.setattr(history, "_MOST", 90)
+    assert len(played(monkeypatch, [*[one] * 70, two])[0]) == 90
+    assert len(played(monkeypatch, [one])[0]) == history._ROUNDS
 
 
 @pytest.mark.parametrize(("has_history", "ends"), [(True, True), (False, False)])

@@ -467,3 +467,18 @@ def test_lengths_that_go_to_and_fro_come_to_rest(n: int, names: tuple[str, ...])
     effects = [typical(robot, catalogue()[name]) for name in names]
     found = correct(robot, along_a_curve(robot, n), effects=effects)
     assert found.held.all() and found.reached.all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ipanema", "cogiro_large"])
+def test_lengths_are_found_where_poses_are_repeated_with_every_history(name: str) -> None:
+    """A third of these rows was not reached: each change disturbed all that come after it."""
+    robot = robot_named(name)
+    curve = along_a_curve(robot, 200)
+    effects = [
+        typical(robot, catalogue()[one])
+        for one in ("hysteresis", "creep", "exit_friction", "backlash")
+    ]
+    poses = np.repeat(curve.pose[::4], 4, axis=0)
+    found = correct(robot, Commands(poses, time=curve.time), effects=effects)
+    assert found.held.all() and found.reached.all()
