@@ -15,7 +15,7 @@ from crosscheck.importing.rows import unit_quaternions
 from crosscheck.measurements.sentinels import is_nines
 from seecr.columns.table import Table, read_table, show
 from seecr.columns.times import began, times_of_day
-from seecr.counted import some
+from seecr.counted import counted, some
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.units import UNITS, Unit, of_columns
@@ -71,7 +71,8 @@ def _refuse_nines(table: Table, column: int) -> None:
         if is_nines(float(value)):
             row = int(np.argmax(given == value))
             text = (
-                f"expected a position, got {value:.10g}, as in {int((given == value).sum())} rows; "
+                f"expected a position, got {value:.10g}, as in "
+                f"{counted(int((given == value).sum()), 'row')}; "
                 "leave the cells empty where the body was not seen"
             )
             raise table.error(text, row=row, column=table.names[column])

@@ -306,8 +306,8 @@ def other_lines(
         others: those of the first command.
         passes: barriers to each of the other equilibria, if they were computed.
     """
-    if others is None or not solution.converged[0]:
-        return
+    if others is None or np.isnan(solution.tensions[0]).any():
+        return  # there is none to be another of
     away = elsewhere(solution, others)
     # why some have no barrier takes long to say, and mostly is the same for all
     whys = dict.fromkeys(one.why_not for one in passes if one.why_not)

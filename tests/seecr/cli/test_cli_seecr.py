@@ -589,3 +589,12 @@ def test_a_pose_at_which_cables_give_way_is_exported_without_their_law(tmp_path:
     assert found.exit_code == 0, found.output
     assert "not in any file: nonlinear_elasticity; at this pose" in " ".join(found.output.split())
     assert out.exists() and not (tmp_path / "soft-mujoco.xml").exists()
+
+
+def test_where_there_is_no_answer_no_others_are_spoken_of() -> None:
+    """At an exit point itself a cable would have no length."""
+    robot = load_robot(model_path("camera"))
+    place = [str(v) for v in robot.exit_points[0] - robot.anchor_points[0]]
+    result = CliRunner().invoke(main, ["pose", "camera", *place])
+    assert result.exit_code == 3 and "no answer: a cable would have no length" in result.output
+    assert "other stable equilibrium" not in result.output
