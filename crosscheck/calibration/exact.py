@@ -256,12 +256,17 @@ def scored(
     linear = linearised(setting, joint)
     gram = own_gram(linear, joint, setting.free)
     # what moves readings at this fit need not have been in the linear model of the search
-    inside = {n: widths.get(n, 1.0) for n in gram.names}
+    inside = {n: widths.get(n, _only(gram.groups[n].widths)) for n in gram.names}
     better, wished = widths_near(gram, inside, joint.z)
     share = sum(log_shares(joint, linear).values()) + log_absent(setting, joint, linear, better)
     score = averaged(gram, better) + share + scores.log_prior(names)
     score -= 0.5 * (joint.state.log_det + left_to_gain(linear, joint.z))
     return Refit(names, joint, widths | better, score, wished)
+
+
+def _only(widths: Array) -> float:
+    """The width of an effect that the search knows none of: one size, or the only one it has."""
+    return float(widths[0]) if len(widths) == 1 else 1.0
 
 
 def widths_near(

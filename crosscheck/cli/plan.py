@@ -100,11 +100,11 @@ def command(
     from crosscheck import Sigma, choose_poses, load_commands, make_plan, write_plan
     from crosscheck.measurements.stated import stated
     from crosscheck.planning import box_of
-    from crosscheck.planning.write import NAME, sometimes_written
+    from crosscheck.planning.write import NAME, check_own, sometimes_written
     from crosscheck.report import write_page
     from crosscheck.terminal import print_plan
     from seecr import load_robot
-    from seecr.files import check_replaces, json_text, staged, with_toml, write_text
+    from seecr.files import json_text, staged, with_toml, write_text
 
     machine = load_robot(robot)
     room = box_of(box) if box else None
@@ -114,7 +114,7 @@ def command(
     given = None if poses is None else load_commands(poses, machine)
     sigma = stated(Sigma() if given is None else given.sigma, sigmas)
     if poses is None:
-        check_replaces(out, ("poses.csv",), NAME)
+        check_own(out)
     sometimes = sometimes_written(out, poses)
     with staged(out, sometimes=sometimes, read=with_toml(poses)) as folder:
         with progress_share("planning") as progress:

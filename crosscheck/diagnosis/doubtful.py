@@ -19,6 +19,7 @@ from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.words import value_lines
 from seecr.effects import Term
 from seecr.effects.knowledge import Knowledge
+from seecr.errors import InputError
 
 _SOMETHING = (
     DiagnosisVerdict.EFFECTS_FOUND,
@@ -35,17 +36,30 @@ def doubtful_values(found: Diagnosis) -> Iterator[str]:
     if found.search is None or found.verdict not in _SOMETHING:
         return
     trials, base = found.search.trials, found.search.steps[0].fit
-    least = max(trials.evidence(one).log for one in (base, found.search.last.fit)) + LEAST_GAIN
+    best = max(trials.evidence(one).log for one in (base, found.search.last.fit))
     for term in base.terms:
         freed = _freed(trials, base, term) if term.knowledge.any else None
+        least = best + _of_readings(term) + LEAST_GAIN
         if freed is not None and trials.evidence(freed).log > least:
             yield _note(found, term, freed)
+
+
+def _of_readings(term: Term) -> float:
+    """ln of the density that independent readings have by themselves, per plausible size.
+
+    The evidence of a fit leaves such constants out; without the readings there are none.
+    """
+    own, known = term.knowledge.measured, term.knowledge
+    return float(np.sum(np.log(term.layout.scale[own] / known.stderr[own])))
 
 
 def _freed(trials: Trials, base: Fit, term: Term) -> Fit | None:
     """The model as it stands, with an effect fitted as if nothing were known of it."""
     free = replace(term, knowledge=Knowledge.nothing(len(term.layout)))
-    out = trials.refit(base.terms.with_term(free), base.state)
+    try:
+        out = trials.refit(base.terms.with_term(free), base.state)
+    except (InputError, np.linalg.LinAlgError):  # a law of the user's own that refuses values
+        return None
     plain = out.valid and can_be(trials.problem.robot, out.terms, base.terms)
     return out if plain and out.settled else None
 

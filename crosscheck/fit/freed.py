@@ -28,6 +28,9 @@ from seecr.pose import Array
 
 __all__ = ["Freed", "freed"]
 
+# Rows are left out if that brings most of the others nearer, to this part.
+_NEARER = 0.5
+
 
 @dataclass(frozen=True, eq=False)
 class Freed:
@@ -68,14 +71,20 @@ def freed(problem: Problem, laid: LaidOut) -> Freed:
 
 
 def _fitted(problem: Problem, state: State, factor: Array, free: NDArray[np.bool_]) -> Fit:
-    """The fit of the free parameters, without rows that are far off all others.
+    """The fit of the free parameters; without rows far off all others, if most are nearer then.
 
-    A single reading that is metres off would turn the frame in which all are compared.
+    A single reading that is metres off would turn the frame in which all are compared. But a row
+    may stick out because it alone shows what is free, such as where the target is.
     """
+    every = fit(problem, state.terms, factor, state, free=free)
     rows = outlying_rows(problem, state)
     if not rows.any():
-        return fit(problem, state.terms, factor, state, free=free)
-    return fit(problem.only(~rows), state.terms, factor, free=free)
+        return every
+    others = problem.only(~rows)
+    few = fit(others, state.terms, factor, free=free)
+    whole = evaluate(others, every.terms, factor, every.state)
+    nearer = np.median(np.abs(few.state.white)) < _NEARER * np.median(np.abs(whole.white))
+    return few if few.valid and nearer else every
 
 
 def _new(problem: Problem, name: str) -> Term:

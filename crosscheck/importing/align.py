@@ -199,13 +199,14 @@ def _check(left: Array, told: Array, position: Array) -> None:
             f"the frames cannot be aligned: errors of {1e3 * most:.3g} mm remain, and the commands "
             f"spread by {1e3 * spread:.3g} mm; expected the commands and the tracker's log of one "
             "recording; are they of the same robot, and do their clocks agree (--clock)?"
-            f"{_of_units(size_of_cloud(position) / spread)}"
+            f"{_of_units(size_of_cloud(position), spread)}"
         )
 
 
-def _of_units(larger: float) -> str:
-    """A question about the unit of readings that spread so many times as far as the commands."""
-    if 1.0 / _UNITS < larger < _UNITS:
+def _of_units(here: float, spread: float) -> str:
+    """A question about the unit of readings that spread far more or less than the commands."""
+    larger = here / max(spread, 1e-9)
+    if 1.0 / _UNITS < larger < _UNITS or min(here, spread) <= 0.0:
         return ""
     many = f"{larger:.0f} times as far" if larger > 1.0 else f"{larger:.2g} of that"
     return f" The tracker's positions spread by {many}: are they in the unit that the file states?"

@@ -44,8 +44,8 @@ class Clock:
 def find_clock(held: HeldCommands, told: Array, rests: Dwells, least: float = 0.0) -> Clock:
     """The offset that matches the rests with the commands.
 
-    A small offset leaves most rests with their commands, but the end of each counts as a rest at
-    the next command. So also where the clocks match, moves have to begin when they are commanded.
+    A small offset leaves most rests with their commands, and so does a robot that begins to move
+    late, or slowly. Readings do not tell which it is: that is said, and the offset is left alone.
 
     Args:
         held: by the clock of the commands. told: (k, 3) [m] where they should bring the platform.
@@ -65,10 +65,13 @@ def find_clock(held: HeldCommands, told: Array, rests: Dwells, least: float = 0.
     if off[best] >= _ALIKE or off[best] * _CLEAR >= min(others, default=np.inf):
         return Clock(0.0)
     late = _late(held.end_s, rests, whose[best])
+    if len(late) == 0:
+        return Clock(float(shifts[best]))
     shift, n = float(np.median(late)), len(late)
-    unsteady = float(np.quantile(np.abs(late - shift), _BULK)) > _STEADY * abs(shift)
-    if best == 0 and (abs(shift) < max(least, 1e-9) or unsteady):
-        return Clock(0.0)
+    if best == 0:
+        unsteady = float(np.quantile(np.abs(late - shift), _BULK)) > _STEADY * abs(shift)
+        small = abs(shift) < max(least, 1e-9)
+        return Clock(0.0, () if small or unsteady else (_late_words(shift),))
     sign = "more" if shift > 0.0 else "less"
     return Clock(
         shift,
@@ -77,6 +80,14 @@ def find_clock(held: HeldCommands, told: Array, rests: Dwells, least: float = 0.
             f"estimated from {counted(n, 'command')} at which the platform starts to move (--clock "
             f"{shift:.3f})",
         ),
+    )
+
+
+def _late_words(shift: float) -> str:
+    when = "after" if shift > 0.0 else "before"
+    return (
+        f"moves begin about {abs(shift):.3f} s {when} they are commanded; if that is the clocks "
+        f"and not the robot, give --clock {shift:.3f}"
     )
 
 

@@ -128,7 +128,8 @@ def joined(
     number = number[:last]
     middle = 0.5 * (dwells.begin_s + dwells.end_s)
     if rows.t_s is None:
-        t_s = middle[number]
+        there = np.flatnonzero(number >= 0)
+        t_s = np.interp(np.arange(len(number)), there, middle[number[there]])
     else:
         t_s = np.where(number >= 0, middle[number], rows.t_s + held.clock)
     tensions, error = np.full_like(rows.tensions, np.nan), np.zeros(last)

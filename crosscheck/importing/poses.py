@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 
@@ -56,32 +56,30 @@ def read_poses(path: Path, unit: str | None = None) -> Logged:
         )
     if unit is not None and all(found[axis][1] for axis in "xyz"):
         raise InputError(f"--unit {unit}: the columns of {path.name} state their own; leave it out")
-    for axis in "xyz":
-        _refuse_nines(table, found[axis][0])
+    _refuse_nines(table, [found[axis][0] for axis in "xyz"])
     position = np.stack([_length(table, *found[axis], unit) for axis in "xyz"], axis=1)
     bodies = {path.stem: (position, _turns(table, found))}
     return Logged(path, t_s, table.line, bodies, {}, notes=_unread(table, found), began=first)
 
 
-def _refuse_nines(table: Table, column: int) -> None:
-    """Refuse what programs write where nothing is seen, if it is there in several rows."""
-    given = table.numbers(column, blank_is_nan=True)
-    values, count = np.unique(given[np.isfinite(given)], return_counts=True)
-    for value in values[count >= _NINES]:
-        if is_nines(float(value)):
-            row = int(np.argmax(given == value))
-            text = (
-                f"expected a position, got {value:.10g}, as in "
-                f"{counted(int((given == value).sum()), 'row')}; "
-                "leave the cells empty where the body was not seen"
-            )
-            raise table.error(text, row=row, column=table.names[column])
+def _refuse_nines(table: Table, columns: Sequence[int]) -> None:
+    """Refuse what programs write where nothing is seen: the same nines in all three coordinates."""
+    given = np.stack([table.numbers(column, blank_is_nan=True) for column in columns], axis=1)
+    alike = (given == given[:, :1]).all(axis=1)
+    rows = [int(row) for row in np.flatnonzero(alike) if is_nines(float(given[row, 0]))]
+    if len(rows) >= _NINES:
+        text = (
+            f"expected a position, got {given[rows[0], 0]:.10g} for all of it, as in "
+            f"{counted(len(rows), 'row')}; leave the cells empty where the body was not seen"
+        )
+        raise table.error(text, row=rows[0], column=table.names[columns[0]])
 
 
 def _unread(table: Table, found: Mapping[str, tuple[int, str]]) -> tuple[str, ...]:
     """A note on columns that are not read, if there are any."""
     read = {table.names[column] for column, _unit in found.values()}
-    others = [name for name in table.names if name not in read and not _TIMES.fullmatch(name)]
+    names = [name for name in table.names if name.strip()]
+    others = [name for name in names if name not in read and not _TIMES.fullmatch(name)]
     if not others:
         return ()
     turned = (

@@ -1,4 +1,4 @@
-"""Leaves out dwells at which the platform was nowhere near where its command would bring it.
+"""Leaves out dwells at which the platform was where it had been, and not where it was commanded.
 
 A run that crashes ends with a platform that does not move any more, whatever is commanded.
 """
@@ -20,29 +20,38 @@ from seecr.pose import Array
 
 # A dwell is not far from its command unless it is so many times as far as most.
 _USUAL = 10.0
+# It did not follow its command if it moved by less than this part of what was asked.
+_FOLLOWED = 0.2
 
 
 def without_strays(
     robot: Robot, takes: Sequence[Take], frames: Frames
 ) -> tuple[list[Take], list[str]]:
-    """The recordings without dwells far from their commands, and a note for each that has some.
+    """The recordings without dwells that did not follow their commands, and notes on them.
 
-    Dwells are far from their commands by the same measure by which frames cannot be aligned, and
-    much farther than most. If more than a few are, it is no matter of single dwells: all stay.
+    Such a dwell is far from its command, by the measure by which frames cannot be aligned, much
+    farther than most, and the platform has hardly moved since the dwell before, though it was told
+    to. If more than a few of a recording are, it is no matter of single dwells: all stay.
     """
     off = [_off(robot, take, frames) for take in takes]
-    every = np.concatenate(off)
-    told = np.concatenate([_told(robot, take) for take in takes])
-    usual = float(np.median(every))
-    limit = max(LEFT * size_of_cloud(told), _USUAL * usual)
-    if not 0.0 < np.mean(every > limit) <= 1.0 - MOST:
-        return list(takes), []
-    notes = [
-        _note(take, own > limit, own, usual)
-        for take, own in zip(takes, off, strict=True)
-        if np.any(own > limit)
-    ]
-    return [_without(take, own > limit) for take, own in zip(takes, off, strict=True)], notes
+    told = [_told(robot, take) for take in takes]
+    usual = float(np.median(np.concatenate(off)))
+    limit = max(LEFT * size_of_cloud(np.concatenate(told)), _USUAL * usual)
+    out, notes = list[Take](), list[str]()
+    for take, own, commands in zip(takes, off, told, strict=True):
+        far = (own > limit) & _stood_still(take, commands)
+        if 0 < far.sum() <= (1.0 - MOST) * len(far) + 1e-9:
+            notes.append(_note(take, far, own, usual))
+            take = _without(take, far)
+        out.append(take)
+    return out, notes
+
+
+def _stood_still(take: Take, told: Array) -> NDArray[np.bool_]:
+    """(n,) whether the platform has hardly moved since the dwell before, though it was told to."""
+    place = take.dwells.position[take.used]
+    moved, asked = (np.linalg.norm(np.diff(p, axis=0), axis=1) for p in (place, told))
+    return np.concatenate([[False], moved < _FOLLOWED * asked])
 
 
 def _told(robot: Robot, take: Take) -> Array:

@@ -14,11 +14,11 @@ from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.write import write_measurements
 from crosscheck.planning.adding import Adding
 from crosscheck.planning.result import Plan
-from seecr.errors import InputError
+from seecr.errors import InputError, InputFileError
 from seecr.files import check_writable
 from seecr.pose import Array
 
-__all__ = ["NAME", "box_of", "sometimes_written", "write_plan"]
+__all__ = ["NAME", "box_of", "check_own", "sometimes_written", "write_plan"]
 
 NAME = "plan.json"
 _OWN = "poses.csv"
@@ -66,6 +66,22 @@ def sometimes_written(out: Path, read: Path | None) -> list[str]:
     own = [_OWN] if _OWN in _wrote(out) and not _same(out / _OWN, read) else []
     names = [Path(name) for name in (*own, *map(_addition, Adding))]
     return [str(one) for name in names for one in (name, name.with_suffix(".toml"))]
+
+
+def check_own(out: Path) -> None:
+    """Check that chosen poses replace none but those of an older plan.
+
+    Raises:
+        InputFileError: there are others.
+    """
+    there = [out / _OWN, (out / _OWN).with_suffix(".toml")]
+    mine = [path for path in there if path.exists()]
+    if mine and _OWN not in _wrote(out):
+        raise InputFileError.at(
+            mine[0],
+            f"would be overwritten, but is not part of an older result: no {NAME} next to it says "
+            "that it wrote it; expected a new folder or that of an older plan; name one with --out",
+        )
 
 
 def _wrote(out: Path) -> list[object]:

@@ -23,6 +23,7 @@ from seecr.holding.lengths import Held, hold, holds_firmly
 from seecr.holding.unheld import why_not_held
 from seecr.inverse.history import REACHED, lengths_with_history
 from seecr.inverse.nearest import Nearest, Reaching, nearest, poses_in_place
+from seecr.inverse.told import told_lengths
 from seecr.pose import Array, pose_difference
 from seecr.prediction.experiment import Experiment, Prediction, effects_of
 from seecr.result import COORDINATES, Record, Result, named
@@ -124,6 +125,7 @@ class Correction(Result):
         out += self._strain_lines(lost)
         for rows, text in (
             (lost & ~self.found, "of them: no pose nearby was found that can be held"),
+            (self.held & ~self.found, "can be held, but a cable would have no length to pay out"),
             (near & ~self.settled, "of them: a nearer pose that can be held may exist"),
             (
                 self.found & ~self.stays,
@@ -414,7 +416,10 @@ class _Search:
             return holds_firmly(tables, limits.aim[rows[some]], limits.low, limits.high)
 
         def spans(poses: Array, some: NDArray[np.intp]) -> Array:
-            return bridged_lengths(self._tables(replace(self.given.rows(rows[some]), pose=poses)))
+            part = replace(self.given.rows(rows[some]), pose=poses)
+            straight = bridged_lengths(self._tables(part))
+            told = told_lengths(self.robot, part, self.effects, straight)
+            return np.minimum(straight, np.nan_to_num(told, nan=np.inf))
 
         def holds(poses: Array, some: NDArray[np.intp]) -> NDArray[np.bool_]:
             tables = self._tables(replace(self.given.rows(rows[some]), pose=poses))

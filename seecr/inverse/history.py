@@ -88,7 +88,7 @@ def lengths_with_history(
             held.rest[first + _AHEAD :] = last[first + _AHEAD :]
         elif number and number % _EVERY == 0:
             held.rest = last + to_their_limit(change, before)
-        if late:
+        if late and first < len(missed):
             held.rest[:first] = last[:first]
         before, last_size = change, size_now
     assert best is not None
@@ -96,12 +96,12 @@ def lengths_with_history(
 
 
 def _first_missed(missed: Array, held: Held, robot: Robot) -> int:
-    """The first row that is missed, if any: what comes before it is as it should be.
+    """The first row that is missed, or the number of rows: what is before it is as it should be.
 
     To change that a little would change the history of all that come after it.
     """
     rows = np.flatnonzero(held.fine & (np.nan_to_num(missed, nan=np.inf) >= REACHED / robot.length))
-    return int(rows[0]) if len(rows) else 0
+    return int(rows[0]) if len(rows) else len(missed)
 
 
 def _left(missed: Array, robot: Robot) -> tuple[float, float]:

@@ -140,14 +140,26 @@ def held_chance(
         drawn = [terms.with_vector(one).effects for one in vectors[len(seen) : count]]
         # where full searches find no orientation for the first few, none is found for the others
         # either, unless that of a neighbour is nearly one
-        thorough = count == _STAGES[0][0]
-        more = [margins_at(robot, places[rows], *limits, one, thorough) for one in drawn]
+        hopeful = np.asarray(np.isfinite(seen).any(axis=0)) | np.full(len(rows), len(seen) == 0)
+        more = [_margins(robot, places[rows], limits, one, hopeful) for one in drawn]
         seen = np.concatenate([seen, more])
         out[rows] = (seen >= edge).mean(axis=0)
         near = ~(np.isin(out[rows], (0.0, 1.0)) & _far(seen, sure, solved))
         rows, seen = rows[near], seen[:, near]
         if len(rows) == 0:
             break
+    return out
+
+
+def _margins(
+    robot: Robot, places: Array, limits: tuple[ArrayLike, ArrayLike, ArrayLike | None],
+    effects: GivenEffects, hopeful: NDArray[np.bool_],
+) -> Array:  # fmt: skip
+    """Margins (n,) at places; full searches are only made at those that are ``hopeful`` (n,)."""
+    out = margins_at(robot, places, *limits, effects, thorough=False)
+    again = np.flatnonzero(hopeful & np.isneginf(out))
+    if len(again) and robot.n_cables < robot.n_dof:
+        out[again] = margins_at(robot, places[again], *limits, effects)
     return out
 
 

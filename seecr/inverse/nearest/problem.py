@@ -36,7 +36,7 @@ Stays = Callable[[Array, Rows], NDArray[np.bool_]]
 """Whether the platform is stable at poses (k, 7) of some rows, with the lengths that hold it there.
 """
 Spans = Callable[[Array, Rows], Array]
-"""Lengths (k, m) [m] of the straight cables at poses (k, 7) of some rows."""
+"""Lengths (k, m) [m] of straight cables at poses (k, 7) of some rows, or what is told, if less."""
 Holds = Callable[[Array, Rows], NDArray[np.bool_]]
 """Whether poses (k, 7) of some rows can be held, by the balance as it is and not linearised."""
 

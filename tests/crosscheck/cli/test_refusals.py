@@ -247,6 +247,9 @@ def test_measurements_are_not_replaced_by_those_of_a_twin(
     poses.write_text("cmd_x_m\n0.4\n")
     said = refused("plan", robot, "--rows", 8, "--out", tmp_path)
     assert f"{poses}: would be overwritten, but is not part of an older result" in said
+    # nor if an older plan is there, which was made of them
+    (tmp_path / "plan.json").write_text('{"files": ["add-payload.csv"]}')
+    assert "says that it wrote it" in refused("plan", robot, "--rows", 8, "--out", tmp_path)
     assert poses.read_text() == "cmd_x_m\n0.4\n"
 
 

@@ -34,7 +34,7 @@ def taken(made, folder, clock, choices=None):
     )
 
 
-@pytest.mark.parametrize("clock", [37.3, -5.2, 2.0, -1000.0, 0.8, -0.7])
+@pytest.mark.parametrize("clock", [37.3, -5.2, 2.0, -1000.0])
 def test_the_shift_is_found_and_said(made, tmp_path, clock):
     found = taken(made, tmp_path, clock)
     truth, measured = made.truth, found.measured
@@ -50,16 +50,36 @@ def test_one_clock_stays_one(made, tmp_path):
     assert found.takes[0].held.clock == 0.0 and "clock shows" not in str(found)
 
 
-def test_a_shift_that_leaves_most_rests_with_their_commands_is_found_too():
-    """The last rest, of a run that crashed as it was to move on, had gone to the next command."""
+@pytest.mark.parametrize("clock", [0.5, -0.5])
+def test_a_shift_that_may_be_the_robots_is_said_and_left_alone(made, tmp_path, clock):
+    """Most rests are with their commands; a robot that waits, or starts slowly, does the same."""
+    found = taken(made, tmp_path, clock)
+    assert found.takes[0].held.clock == 0.0
+    (note,) = (note for note in found.notes if "moves begin about" in note)
+    assert ("after" if clock > 0.0 else "before") in note and "give --clock " in note
+    assert float(note.rpartition(" ")[2]) == pytest.approx(clock, abs=0.3)
+
+
+def test_only_a_steady_and_large_shift_is_said():
     told = np.random.default_rng(1).uniform(0.0, 1.0, (12, 3))
     held, rests = going_round(told, 0.4)
-    assert find_clock(held, told, rests).shift == pytest.approx(0.4, abs=0.1)
-    assert find_clock(held, told, rests, least=0.6).shift == 0.0
+    assert find_clock(held, told, rests).said and find_clock(held, told, rests).shift == 0.0
+    assert not find_clock(held, told, rests, least=0.6).said
     held, rests = going_round(told, 0.0)
     begin = held.begin_s - np.tile([0.1, 0.5], 6)
     late = replace(held, begin_s=begin, end_s=np.append(begin[1:], np.inf))
-    assert find_clock(late, told, rests).shift == 0.0, "as late as it happens"
+    assert not find_clock(late, told, rests).said, "as late as it happens"
+
+
+def test_where_no_two_commands_in_a_row_have_a_rest_nothing_is_known():
+    told = np.random.default_rng(1).uniform(0.0, 1.0, (12, 3))
+    held, rests = going_round(told, 0.0)
+    some = np.arange(len(rests)) % 2 == 0
+    few = replace(
+        rests, begin_s=rests.begin_s[some], end_s=rests.end_s[some], position=rests.position[some],
+        start=rests.start[some],
+    )  # fmt: skip
+    assert find_clock(held, told, few).shift == 0.0
 
 
 def test_times_of_day_are_one_clock(made, tmp_path):

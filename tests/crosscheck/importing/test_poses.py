@@ -56,12 +56,14 @@ def test_columns_that_are_not_read_are_said(tmp_path: Path) -> None:
 
 
 def test_numbers_that_stand_for_not_seen_are_refused(tmp_path: Path) -> None:
-    rows = [f"{k},-9999,2,3" if k % 2 else f"{k},1,2,3" for k in range(8)]
+    rows = [f"{k},-9999,-9999,-9999" if k % 2 else f"{k},1,2,3" for k in range(8)]
     path = log(tmp_path, "t_s,x_mm,y_mm,z_mm", *rows)
     with pytest.raises(InputFileError, match=r"line 3, column x_mm: expected a position, got -99"):
         read_poses(path)
     once = log(tmp_path, "t_s,x_mm,y_mm,z_mm", *rows[:2], "8,1,2,3")
     assert read_poses(once).bodies["log"][0][1, 0] == pytest.approx(-9.999)
+    high = log(tmp_path, "t_s,x_mm,y_mm,z_mm", *(f"{k},1,2,999" for k in range(8)))
+    assert read_poses(high).bodies["log"][0][3, 2] == pytest.approx(0.999), "a height"
 
 
 def test_three_angles_turn_about_moving_axes(tmp_path: Path) -> None:

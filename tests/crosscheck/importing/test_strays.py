@@ -12,33 +12,41 @@ from made_data import soft_cogiro
 
 from crosscheck.importing import import_case
 from crosscheck.importing.case import Imported
+from crosscheck.importing.join import joined
 from crosscheck.importing.strays import without_strays
 
 ROBOT = soft_cogiro()
 MADE = made_of.recording(ROBOT)
 
 
-def imported(folder: Path, last: int, off: float = 0.0) -> Imported:
-    """What a platform that moves no more from the command ``last`` on reads, ``off`` [m] aside."""
+def recorded(last: int, off: float = 0.0) -> made_of.Recording:
+    """Of a platform that moves no more from the command ``last`` on, where it is ``off`` [m]."""
     stops = np.searchsorted(MADE.t_s, MADE.sent_s[last])
     position, quat = MADE.position.copy(), MADE.quat.copy()
     position[stops:], quat[stops:] = position[stops - 1] + [off, 0.0, 0.0], quat[stops - 1]
-    stopped = replace(MADE, position=position, quat=quat)
-    commands = made_of.commands_csv(folder / "c.csv", MADE)
-    return import_case("poses", [made_of.poses_csv(folder / "a.csv", stopped)], ROBOT, [commands])
+    return replace(MADE, position=position, quat=quat)
 
 
-def test_a_dwell_far_from_its_command_is_left_out_and_said(tmp_path: Path) -> None:
+def imported(folder: Path, made: made_of.Recording, times: bool = True) -> Imported:
+    commands = made_of.commands_csv(folder / "c.csv", made, times=times)
+    return import_case("poses", [made_of.poses_csv(folder / "a.csv", made)], ROBOT, [commands])
+
+
+def test_a_dwell_that_did_not_follow_its_command_is_left_out_and_said(tmp_path: Path) -> None:
     n = len(MADE.sent_s)
-    found = imported(tmp_path, n - 1, 0.3)
-    assert found.measured.n_rows == n - 1 and len(found.records()) == n - 1
+    told = MADE.truth.command_pose[:, :3]
+    # the way back to the first pose is the longest
+    far = int(np.argmax(np.linalg.norm(np.diff(told, axis=0), axis=1))) + 1
+    stops, goes = np.searchsorted(MADE.t_s, [MADE.sent_s[far], MADE.sent_s[far] + 1.9])
+    position, quat = MADE.position.copy(), MADE.quat.copy()
+    position[stops:goes], quat[stops:goes] = position[stops - 1], quat[stops - 1]
+    found = imported(tmp_path, replace(MADE, position=position, quat=quat))
     note = next(note for note in found.notes if "left out, from line" in note)
     assert note.startswith("a.csv: 1 dwell left out") and "(--clock)?" in note
-    line = int(note.split("from line ")[1].split()[0])
-    assert abs(MADE.t_s[line - 2] - MADE.sent_s[n - 1]) < 0.2
+    assert len(found.records()) == n - 1 and not found.measured.read[far]
+    assert found.measured.t_s is not None and np.all(np.diff(found.measured.t_s) > 0.0)
     # the frames are those of all other dwells
-    log = made_of.poses_csv(tmp_path / "b.csv", MADE)
-    whole = import_case("poses", [log], ROBOT, [tmp_path / "c.csv"])
+    whole = imported(tmp_path, MADE)
     frames, others = found.frames, whole.frames
     assert frames.shift == pytest.approx(others.shift, abs=2e-3)
     assert abs(frames.turn @ others.turn) == pytest.approx(1.0, abs=1e-6)
@@ -46,9 +54,34 @@ def test_a_dwell_far_from_its_command_is_left_out_and_said(tmp_path: Path) -> No
     assert not any("left out, from line" in note for note in whole.notes)
 
 
-def test_if_all_are_far_it_is_no_matter_of_single_dwells(tmp_path: Path) -> None:
-    found = imported(tmp_path, len(MADE.sent_s) - 1)
+def test_without_times_of_commands_a_dwell_left_out_is_between_its_neighbours(
+    tmp_path: Path,
+) -> None:
+    """It had the time of the last one."""
+    commands = made_of.commands_csv(tmp_path / "c.csv", MADE, times=False)
+    log = made_of.poses_csv(tmp_path / "a.csv", MADE)
+    (take,) = import_case("poses", [log], ROBOT, [commands]).takes
+    number = take.number.copy()
+    whole = joined(take.held, take.dwells, number)[0].t_s
+    number[3] = -1
+    rows, _noise = joined(take.held, take.dwells, number)
+    assert whole is not None and rows.t_s is not None
+    assert np.delete(rows.t_s, 3) == pytest.approx(np.delete(whole, 3))
+    assert rows.t_s[3] == pytest.approx(0.5 * (whole[2] + whole[4]))
+
+
+def test_a_dwell_elsewhere_to_which_the_platform_moved_stays(tmp_path: Path) -> None:
+    """A payload lets it sag: that is what data are for."""
+    found = imported(tmp_path, recorded(len(MADE.sent_s) - 1, 0.3))
+    assert found.measured.n_rows == len(MADE.sent_s)
+
+
+def test_if_many_did_not_follow_it_is_no_matter_of_single_dwells(tmp_path: Path) -> None:
+    found = imported(tmp_path, MADE)
     frames, (take,) = found.frames, found.takes
-    moved = replace(frames, shift=frames.shift + np.array([0.5, 0.0, 0.0]))
-    takes, notes = without_strays(ROBOT, [take], moved)
+    still = take.dwells.position.copy()
+    still[3:9] = still[3]
+    stopped = replace(take, dwells=replace(take.dwells, position=still))
+    takes, notes = without_strays(ROBOT, [stopped], frames)
     assert not notes and takes[0].number.tolist() == take.number.tolist()
+    assert without_strays(ROBOT, [take], frames) == ([take], [])

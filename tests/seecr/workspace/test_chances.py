@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -83,9 +84,9 @@ def test_poses_far_from_the_limit_are_decided_by_few_models(
     poses[:, 0] = [-0.5, *np.linspace(0.02, 0.12, 7), 0.3]
     tried = np.zeros(9, dtype=int)
 
-    def counting(robot: Robot, at: Array, *rest: Any) -> Array:
+    def counting(robot: Robot, at: Array, *rest: Any, **how: Any) -> Array:
         tried[np.isin(poses[:, 0], at[:, 0])] += 1
-        return margins_at(robot, at, *rest)
+        return margins_at(robot, at, *rest, **how)
 
     monkeypatch.setattr(chances, "margins_at", counting)
     few = held_chance(ROBOT, poses, model, lowest=0.02)
@@ -96,6 +97,25 @@ def test_poses_far_from_the_limit_are_decided_by_few_models(
     every = held_chance(ROBOT, poses, model, lowest=0.02)
     assert every is not None
     np.testing.assert_allclose(few, every, atol=0.005)
+
+
+def test_full_searches_are_made_where_there_is_hope(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two cables: one position is found by itself, one by full searches alone, one by none."""
+    asked: list[tuple[int, bool]] = []
+
+    def margins(_robot: Robot, at: Array, *_rest: Any, thorough: bool = True) -> Array:
+        asked.append((len(at), thorough))
+        return np.where(at[:, 0] < (1.5 if thorough else 0.5), 1.0, -np.inf)
+
+    monkeypatch.setattr(chances, "margins_at", margins)
+    robot: Any = SimpleNamespace(n_cables=2, n_dof=3)
+    places = np.zeros((3, 7))
+    places[:, 0] = [0.0, 1.0, 2.0]
+    for hopeful, found in ((np.ones(3, bool), [1.0, 1.0, -np.inf]), (places[:, 0] < 1, [1.0])):
+        asked.clear()
+        out = chances._margins(robot, places, (0.0, 1.0, None), (), hopeful)
+        assert out[: len(found)].tolist() == found
+        assert asked == [(3, False), *([(2, True)] if hopeful.all() else [])]
 
 
 def test_two_cables_hold_a_position_as_often_as_the_mass_allows(
