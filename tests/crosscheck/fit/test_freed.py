@@ -58,6 +58,17 @@ def test_a_reading_metres_off_does_not_turn_the_frame():
     assert frame.vector[:3] == pytest.approx([0.4, 0.0, -0.2], abs=1e-4)
 
 
+def test_a_row_that_alone_shows_where_the_target_is_counts():
+    """It sticks out as long as the target is where it is not."""
+    target = term(ROBOT, "tracker_target", shift_x_m=0.1, shift_z_m=0.15)
+    data = measured(ROBOT, [target, term(ROBOT, "tracker_frame", **FAR)], points=5)
+    level = data.command_pose[:, 3] > 1.0 - 1e-9
+    level[np.flatnonzero(~level)[3]] = True
+    some = replace(data.rows(np.flatnonzero(level)), free=("tracker_frame", "tracker_target"))
+    found = prepare(ROBOT, some, Terms()).terms["tracker_target"].vector
+    assert found[2] == pytest.approx(0.15, abs=1e-3), "0.143 without it"
+
+
 @pytest.mark.slow
 def test_a_diagnosis_finds_what_is_missing_beside_the_frame_and_not_the_frame():
     gain = term(ROBOT, "pulley_radius", radius_m=0.01)
