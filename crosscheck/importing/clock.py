@@ -65,9 +65,9 @@ def find_clock(held: HeldCommands, told: Array, rests: Dwells, least: float = 0.
     if off[best] >= _ALIKE or off[best] * _CLEAR >= min(others, default=np.inf):
         return Clock(0.0)
     late = _late(held.end_s, rests, whose[best])
-    if len(late) == 0:
-        return Clock(float(shifts[best]))
-    shift, n = float(np.median(late)), len(late)
+    if best == 0 and len(late) == 0:
+        return Clock(0.0)
+    shift, n = float(np.median(late)) if len(late) else float(shifts[best]), len(late)
     if best == 0:
         unsteady = float(np.quantile(np.abs(late - shift), _BULK)) > _STEADY * abs(shift)
         small = abs(shift) < max(least, 1e-9)
@@ -77,10 +77,15 @@ def find_clock(held: HeldCommands, told: Array, rests: Dwells, least: float = 0.
         shift,
         (
             f"the tracker's clock shows {abs(shift):.3f} s {sign} than that of the commands, "
-            f"estimated from {counted(n, 'command')} at which the platform starts to move (--clock "
-            f"{shift:.3f})",
+            f"estimated from {_from_what(n)} (--clock {shift:.3f})",
         ),
     )
+
+
+def _from_what(moves: int) -> str:
+    if not moves:
+        return "where the platform rests"
+    return f"{counted(moves, 'command')} at which the platform starts to move"
 
 
 def _late_words(shift: float) -> str:

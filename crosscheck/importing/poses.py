@@ -22,7 +22,7 @@ from seecr.units import UNITS, Unit, of_columns
 
 _TIMES = re.compile(r"(t|time|timestamp)(?:_(\w+)|\s*\[(\w+)\])?", re.IGNORECASE)
 # A number of nines in so many rows stands for "not seen".
-_NINES = 4
+_ROWS = 4
 _LABEL = re.compile(
     r"(?:(?:meas|pose|pos|position)[_ ])?(q[wxyz]|r[xyz]|t?[xyz])"
     r"(?:_(\w+)|\s*\[(\w+)\]|\s*\((\w+)\))?",
@@ -67,7 +67,7 @@ def _refuse_nines(table: Table, columns: Sequence[int]) -> None:
     given = np.stack([table.numbers(column, blank_is_nan=True) for column in columns], axis=1)
     alike = (given == given[:, :1]).all(axis=1)
     rows = [int(row) for row in np.flatnonzero(alike) if is_nines(float(given[row, 0]))]
-    if len(rows) >= _NINES:
+    if len(rows) >= _ROWS:
         text = (
             f"expected a position, got {given[rows[0], 0]:.10g} for all of it, as in "
             f"{counted(len(rows), 'row')}; leave the cells empty where the body was not seen"

@@ -33,8 +33,8 @@ def without_strays(
     farther than most, and the platform has hardly moved since the dwell before, though it was told
     to. If more than a few of a recording are, it is no matter of single dwells: all stay.
     """
-    off = [_off(robot, take, frames) for take in takes]
     told = [_told(robot, take) for take in takes]
+    off = [_off(take, frames, own) for take, own in zip(takes, told, strict=True)]
     usual = float(np.median(np.concatenate(off)))
     limit = max(LEFT * size_of_cloud(np.concatenate(told)), _USUAL * usual)
     out, notes = list[Take](), list[str]()
@@ -60,13 +60,13 @@ def _told(robot: Robot, take: Take) -> Array:
     return commanded(robot, rows)[:, :3]
 
 
-def _off(robot: Robot, take: Take, frames: Frames) -> Array:
-    """Distances (n,) [m] of the dwells that are used from where they are commanded."""
+def _off(take: Take, frames: Frames, told: Array) -> Array:
+    """Distances (n,) [m] of the dwells that are used from where they are told to be (n, 3)."""
     quat = take.dwells.quat_wxyz
     place, _turned = frames.poses(
         take.dwells.position[take.used], None if quat is None else quat[take.used]
     )
-    return np.asarray(np.linalg.norm(place - _told(robot, take), axis=1))
+    return np.asarray(np.linalg.norm(place - told, axis=1))
 
 
 def _without(take: Take, far: NDArray[np.bool_]) -> Take:

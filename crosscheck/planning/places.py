@@ -92,7 +92,10 @@ def _grid(plan: Planned, box: Array | None) -> Array:
     robot, pose = plan.problem.robot, _planned_poses(plan)
     low, high = _box(robot, pose[:, :3])
     if box is not None:
-        low, high = np.clip(low, *box), np.clip(high, *box)
+        # where the box is beside what is planned, all of it
+        apart = (high < box[0]) | (low > box[1])
+        low = np.where(apart, box[0], np.maximum(low, box[0]))
+        high = np.where(apart, box[1], np.minimum(high, box[1]))
     return tilted_grid(robot, low, high, _GRID)
 
 

@@ -43,6 +43,8 @@ alone.
 # Strain of a cable up to which the nearest poses are sought where no highest tension is given:
 # steel yields before, fibres tear. Without an end, poses near the edge take any tension.
 _STRAIN = 0.05
+# The nearest pose leaves no cable shorter than this part of the shortest at the reference pose.
+_SHORT = 1e-2
 # Rotations below this [deg] are rounding, and displacements of nearest poses below this [m].
 _TURNED, _MOVED = 1e-9, 1e-9
 # Number of poses whose reason is printed.
@@ -411,22 +413,24 @@ class _Search:
             part = replace(self.given.rows(rows[some]), pose=poses)
             return counted_balance(self._tables(part), limits.low, limits.high, about)
 
-        def stays(poses: Array, some: NDArray[np.intp]) -> NDArray[np.bool_]:
-            tables = self._tables(replace(self.given.rows(rows[some]), pose=poses))
-            return holds_firmly(tables, limits.aim[rows[some]], limits.low, limits.high)
+        # beside its exit point a cable may pull any way, so that much seems to be held there; but
+        # the platform is at the winch, which is no place to stay
+        least = _SHORT * float(np.min(self.robot.reference_lengths))
 
-        def spans(poses: Array, some: NDArray[np.intp]) -> Array:
+        def stays(poses: Array, some: NDArray[np.intp]) -> NDArray[np.bool_]:
             part = replace(self.given.rows(rows[some]), pose=poses)
-            straight = bridged_lengths(self._tables(part))
-            told = told_lengths(self.robot, part, self.effects, straight)
-            return np.minimum(straight, np.nan_to_num(told, nan=np.inf))
+            tables = self._tables(part)
+            straight = bridged_lengths(tables)
+            told = np.nan_to_num(told_lengths(self.robot, part, self.effects, straight), nan=np.inf)
+            firm = holds_firmly(tables, limits.aim[rows[some]], limits.low, limits.high)
+            return np.asarray(firm & (np.minimum(straight, told).min(axis=1) > least))
 
         def holds(poses: Array, some: NDArray[np.intp]) -> NDArray[np.bool_]:
             tables = self._tables(replace(self.given.rows(rows[some]), pose=poses))
             return holds_tightly(tables, limits.low, limits.high)
 
         return Reaching.within(
-            self.robot, self.given.pose[rows], balance, stays, spans, (limits.low, limits.high),
+            self.robot, self.given.pose[rows], balance, stays, (limits.low, limits.high),
             scale[rows], fix_position=fix_position, straight=own if straight else None,
             holds=holds if bends(own) and self.robot.n_cables >= self.robot.n_dof else None,
         )  # fmt: skip

@@ -140,7 +140,9 @@ def held_chance(
         drawn = [terms.with_vector(one).effects for one in vectors[len(seen) : count]]
         # where full searches find no orientation for the first few, none is found for the others
         # either, unless that of a neighbour is nearly one
-        hopeful = np.asarray(np.isfinite(seen).any(axis=0)) | np.full(len(rows), len(seen) == 0)
+        hopeful = np.ones(len(rows), dtype=bool)
+        if len(seen):
+            hopeful &= np.isfinite(seen).any(axis=0)
         more = [_margins(robot, places[rows], limits, one, hopeful) for one in drawn]
         seen = np.concatenate([seen, more])
         out[rows] = (seen >= edge).mean(axis=0)

@@ -27,11 +27,6 @@ def slides() -> Robot:
     return replace(robot, joints=joints)
 
 
-def long_cables(poses: Array, _rows: Rows) -> Array:
-    """Lengths (n, 1) of cables that are nowhere near their exit points."""
-    return np.full((len(poses), 1), np.inf)
-
-
 def slab(wanted_x: list[float], stays_from: float = -np.inf) -> Reaching:
     """Wanted poses so far [m] beside the reference pose; stable only from some x on."""
     robot = slides()
@@ -47,4 +42,4 @@ def slab(wanted_x: list[float], stays_from: float = -np.inf) -> Reaching:
         return np.asarray(poses[:, 0] - robot.reference_pose[0] >= stays_from)
 
     limits = np.zeros(3), np.array([_STIFF * REACH, _STIFF * REACH, 2.0])
-    return Reaching.within(robot, wanted, balance, stays, long_cables, limits, np.ones(len(wanted)))
+    return Reaching.within(robot, wanted, balance, stays, limits, np.ones(len(wanted)))

@@ -35,7 +35,6 @@ def part_of(problem: Reaching, rows: Rows) -> Reaching:
         values=None if problem.values is None else problem.values[rows],
         balance=lambda poses, some, about=None: problem.balance(poses, rows[some], about),
         stays=lambda poses, some: problem.stays(poses, rows[some]),
-        spans=lambda poses, some: problem.spans(poses, rows[some]),
         least=problem.least[rows], most=problem.most[rows], scale=problem.scale[rows],
         straight=None if problem.straight is None else take(problem.straight, rows),
     )  # fmt: skip

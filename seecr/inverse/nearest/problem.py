@@ -35,8 +35,6 @@ class Balance(Protocol):
 Stays = Callable[[Array, Rows], NDArray[np.bool_]]
 """Whether the platform is stable at poses (k, 7) of some rows, with the lengths that hold it there.
 """
-Spans = Callable[[Array, Rows], Array]
-"""Lengths (k, m) [m] of straight cables at poses (k, 7) of some rows, or what is told, if less."""
 Holds = Callable[[Array, Rows], NDArray[np.bool_]]
 """Whether poses (k, 7) of some rows can be held, by the balance as it is and not linearised."""
 
@@ -46,8 +44,6 @@ _INSIDE = 1e-6
 _WEIGHT = 1e-3
 # Step of finite differences [robot's length].
 _DIFFERENCE = 1e-4
-# Shorter than this, a cable is none [shortest cable at the reference pose].
-_SHORT = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +59,6 @@ class Reaching:
     values: Array | None  # (n, d) joint values at the wanted poses, None for a free platform
     balance: Balance
     stays: Stays
-    spans: Spans
     least: Array  # (n, m) [N]
     most: Array  # (n, m) [N]
     scale: Array  # (n,) [N] load
@@ -78,7 +73,6 @@ class Reaching:
         wanted: Array,
         balance: Balance,
         stays: Stays,
-        spans: Spans,
         limits: tuple[Array, Array],
         scale: Array,
         *,
@@ -103,9 +97,7 @@ class Reaching:
         free = np.full(robot.n_dof, np.inf)
         if fix_position:
             free[~robot.hinges] = 0.0
-        return cls(
-            robot, wanted, values, balance, stays, spans, least, most, scale, free, straight, holds
-        )
+        return cls(robot, wanted, values, balance, stays, least, most, scale, free, straight, holds)
 
     @property
     def is_in_place(self) -> bool:
@@ -177,14 +169,8 @@ class Reaching:
         return out
 
     def rests(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
-        """Whether the platform is stable, at poses that are in balance or nearly so.
-
-        Beside its exit point a cable may pull any way, so that much seems to be held there. But
-        there the platform is at the winch, which is no place to stay.
-        """
-        poses, least = self.placed(away, rows), _SHORT * float(np.min(self.robot.reference_lengths))
-        has_cables = self.spans(poses, rows).min(axis=1) > least
-        return np.asarray(self.stays(poses, rows) & has_cables)
+        """Whether the platform is stable, at poses that are in balance or nearly so."""
+        return self.stays(self.placed(away, rows), rows)
 
     def lack(self, away: Array, rows: Rows) -> tuple[Array, NDArray[np.bool_]]:
         """(k,) approximate residual of the balance [load]; and whether the pose can be held."""

@@ -12,7 +12,10 @@ from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.exact import own_gram
 from crosscheck.calibration.joint import Setting, settle
 from crosscheck.calibration.linearised import linearised
-from crosscheck.calibration.priors import FLAT, widths_of
+from crosscheck.calibration.priors import FLAT, wider, widths_of
+from crosscheck.fit.candidates import Trials
+from crosscheck.fit.evidence import evidence
+from crosscheck.fit.gauss_newton import fit
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import evaluate
 from seecr.description.mjcf import load_robot
@@ -47,6 +50,19 @@ def test_values_that_belong_to_the_data_have_one_flat_prior() -> None:
         assert widths["tracker_target"] == [FLAT] and len(widths["platform_mass"]) > 5
     for widths in widths_in(setting_with(())):
         assert len(widths["tracker_target"]) > 5
+
+
+def test_they_are_never_wider_either() -> None:
+    assert wider(TARGET.layout, ("tracker_target",)).tolist() == [FLAT]
+    assert FLAT not in wider(TARGET.layout)
+
+
+def test_the_steps_give_them_one_prior_too() -> None:
+    setting = setting_with(("tracker_target",))
+    trials = Trials(setting.problem, setting.factor)
+    found = fit(setting.problem, BOTH, setting.factor)
+    assert trials.evidence(found).log == evidence(found, ("tracker_target",)).log
+    assert trials.evidence(found).log != evidence(found).log
 
 
 def test_they_are_fitted_with_a_flat_prior_too() -> None:

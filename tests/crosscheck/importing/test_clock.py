@@ -80,6 +80,8 @@ def test_where_no_two_commands_in_a_row_have_a_rest_nothing_is_known():
         start=rests.start[some],
     )  # fmt: skip
     assert find_clock(held, told, few).shift == 0.0
+    aside = find_clock(held.shifted(-7.0), told, few)
+    assert aside.shift == pytest.approx(7.0, abs=1.0) and "from where the platform" in aside.said[0]
 
 
 def test_times_of_day_are_one_clock(made, tmp_path):

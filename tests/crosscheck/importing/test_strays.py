@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, cast
 
 import made_recordings as made_of
 import numpy as np
 import pytest
 from made_data import soft_cogiro
 
-from crosscheck.importing import import_case
+from crosscheck.importing import import_case, strays
 from crosscheck.importing.case import Imported
 from crosscheck.importing.join import joined
 from crosscheck.importing.strays import without_strays
@@ -68,6 +69,30 @@ def test_without_times_of_commands_a_dwell_left_out_is_between_its_neighbours(
     assert whole is not None and rows.t_s is not None
     assert np.delete(rows.t_s, 3) == pytest.approx(np.delete(whole, 3))
     assert rows.t_s[3] == pytest.approx(0.5 * (whole[2] + whole[4]))
+
+
+@pytest.mark.parametrize(
+    ("off", "gone"),
+    [
+        ([0.1, 0.1, 0.1, 0.1, 3.0], 1),  # one of five, a fifth of what the commands spread
+        ([0.5, 0.5, 0.5, 0.5, 3.0], 0),  # not so much farther than most
+        ([0.1, 0.1, 0.1, 3.0, 3.0], 0),  # two of five
+        ([0.01, 0.01, 0.01, 0.01, 0.2], 0),  # small beside what the commands spread
+    ],
+)
+def test_only_few_dwells_much_farther_than_most_are_left_out(
+    monkeypatch: pytest.MonkeyPatch, off: list[float], gone: int
+) -> None:
+    told = np.zeros((5, 3))
+    told[:, 0] = np.arange(5) * 2.0
+    far = np.array(off)
+    monkeypatch.setattr(strays, "_told", lambda *_given: told)
+    monkeypatch.setattr(strays, "_off", lambda *_given: far)
+    monkeypatch.setattr(strays, "_stood_still", lambda *_given: far == far.max())
+    monkeypatch.setattr(strays, "_note", lambda *_given: "left out")
+    monkeypatch.setattr(strays, "_without", lambda _take, some: int(some.sum()))
+    takes, notes = without_strays(ROBOT, cast(Any, ["a take"]), cast(Any, None))
+    assert takes == ([gone] if gone else ["a take"]) and len(notes) == (gone > 0)
 
 
 def test_a_dwell_elsewhere_to_which_the_platform_moved_stays(tmp_path: Path) -> None:

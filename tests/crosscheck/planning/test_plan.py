@@ -301,6 +301,17 @@ def test_poses_to_add_are_in_the_box(name):
     assert np.any((free < box[0]) | (free > box[1]))
 
 
+def test_beside_what_is_planned_the_whole_box_is_used():
+    """The grid had been on one of its faces, each pose many times."""
+    robot = load_robot(model_path("demobot_cogiro"))
+    poses = np.tile(robot.reference_pose, (6, 1))
+    poses[:, 0] += np.linspace(-0.02, 0.02, 6)
+    home = robot.reference_pose[:3]
+    box = home + np.array([[0.1, -0.05, -0.02], [0.2, 0.05, 0.03]])
+    there = more_poses(make_plan(robot, poses, SIGMA).planned, box=box).poses
+    assert np.ptp(there[:, 0]) > 0.05 and len(np.unique(there, axis=0)) == len(there)
+
+
 def test_poses_to_add_are_listed_where_they_are_said_to_be(robot, commands):
     plan = make_plan(robot, commands.rows(np.arange(10)), SIGMA)
     listed = [item for item in plan.suggestions if item.poses is not None and item.reached]

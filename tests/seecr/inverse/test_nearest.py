@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import score_nearest
-from slab import long_cables
 
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.mjcf import load_robot
@@ -175,8 +174,7 @@ def test_a_turn_about_a_hinge_is_as_far_as_its_shorter_way() -> None:
     none = np.zeros((1, 4))
     problem = Reaching(
         robot, want[None], values[:1], lambda poses, *_: balance_equations(robot, poses),
-        lambda _, rows: np.ones(len(rows), dtype=bool), long_cables,
-        none, none, np.ones(1), np.ones(3),
+        lambda _, rows: np.ones(len(rows), dtype=bool), none, none, np.ones(1), np.ones(3),
     )  # fmt: skip
     (away,) = problem.to(problem.coordinates(there[None]), np.zeros(1, dtype=np.intp))
     assert away == pytest.approx((values[1] - values[0]) * [1.0, 1.0, robot.length])
@@ -187,8 +185,7 @@ def test_balance_bends_as_its_rates_change() -> None:
     none = np.zeros((1, 8))
     problem = Reaching(
         robot, robot.reference_pose[None], None, lambda poses, *_: balance_equations(robot, poses),
-        lambda _, rows: np.ones(len(rows), dtype=bool), long_cables,
-        none, none, np.array([200.0]), np.ones(6),
+        lambda _, rows: np.ones(len(rows), dtype=bool), none, none, np.array([200.0]), np.ones(6),
     )  # fmt: skip
     random, row = np.random.default_rng(0), np.zeros(1, dtype=np.intp)
     away, pulls = 0.3 * random.normal(size=(1, 6)), random.uniform(50.0, 900.0, (1, 8))
@@ -245,7 +242,7 @@ def test_starts_are_the_nearest_that_differ_in_rotation() -> None:
     rows = random.permutation(np.repeat([0, 2], 60))
     away = robot.length * random.normal(size=(len(rows), 6))
     problem = Reaching.within(
-        robot, np.tile(robot.reference_pose, (3, 1)), none_balances, none_stays, long_cables,
+        robot, np.tile(robot.reference_pose, (3, 1)), none_balances, none_stays,
         (np.zeros(8), np.ones(8)), np.ones(3),
     )  # fmt: skip
     expected = []

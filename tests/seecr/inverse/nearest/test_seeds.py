@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from slab import REACH, long_cables, slab
+from slab import REACH, slab
 
 from seecr.description.joints import pose_of_values
 from seecr.description.mjcf import load_robot
@@ -29,7 +29,7 @@ def free(fix_position: bool = False) -> Reaching:
 
     limits = np.zeros(8), np.full(8, 2.0)
     return Reaching.within(
-        FREE, wanted, balance, stays, long_cables, limits, np.ones(2), fix_position=fix_position
+        FREE, wanted, balance, stays, limits, np.ones(2), fix_position=fix_position
     )
 
 
