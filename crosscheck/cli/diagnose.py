@@ -134,6 +134,7 @@ def _keep(
     path: Path,
 ) -> str:  # fmt: skip
     """Write the model that was found, if there was a verdict; what was done."""
+    from crosscheck import DiagnosisVerdict
     from crosscheck.diagnosis import found_covariance, found_effects
     from crosscheck.model import provenance_of, renewed, save_model, with_fit
 
@@ -150,4 +151,10 @@ def _keep(
     save_model(path, renewed(new, robot, measured))
     if not names:
         return f"Written to {path}: {', '.join(moved)}, refitted to these data; nothing added"
-    return f"Written to {path}: {', '.join(names)}"
+    text = f"Written to {path}: {', '.join(names)}"
+    if found.verdict is not DiagnosisVerdict.MANY_EFFECTS:
+        return text
+    return (
+        f"{text}, with the values that explain most by themselves, not those above, which are "
+        "nearer to the truth beside the other missing effects"
+    )

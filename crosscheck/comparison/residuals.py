@@ -12,6 +12,7 @@ from crosscheck.comparison.quantities import channels
 from crosscheck.comparison.result import Comparison, Coordinate, Group, UnsolvedRow, WorstRow
 from crosscheck.comparison.tracking import tracking
 from crosscheck.comparison.travel import Travel, regions_of, travel
+from crosscheck.fit.contradicted import contradictions
 from crosscheck.fit.noise import as_table, whiteness
 from crosscheck.fit.outliers import outlying_rows
 from crosscheck.fit.prepare import noise_floor, prepare
@@ -41,7 +42,8 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
     ready = prepare(robot, data, terms)
     problem = ready.problem
     # nothing is cross-validated here, so that the note about its blocks is left out
-    notes = [*said, *ready.notes, *([str(ready.refusal)] if ready.refusal else [])]
+    notes = [*said, *contradictions(terms), *ready.notes]
+    notes += [str(ready.refusal)] if ready.refusal else []
     terms = ready.terms
     plain = problem.experiment.predict(terms.effects)
     factor = problem.noise(plain)

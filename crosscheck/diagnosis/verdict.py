@@ -13,6 +13,7 @@ from crosscheck.calibration.search import search_sets
 from crosscheck.diagnosis.chances import PROBABLE
 from crosscheck.diagnosis.doubtful import doubtful_values
 from crosscheck.diagnosis.explained import explained
+from crosscheck.diagnosis.found import found_effects
 from crosscheck.diagnosis.importance import weighed
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.settled import settled
@@ -20,6 +21,7 @@ from crosscheck.diagnosis.stepwise import by_steps
 from crosscheck.diagnosis.unexplained import beside_imitated, unexplained
 from crosscheck.diagnosis.words import size_notes
 from crosscheck.fit.candidates import candidates_for, null_fit
+from crosscheck.fit.contradicted import contradictions
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.possible import hardly_happens
 from crosscheck.fit.prepare import Prepared, Progress, noise_floor, prepare
@@ -88,8 +90,9 @@ def diagnose(
             base = found.search.steps[0].fit
             return replace(no_verdict(ready.problem, base, found.notes, rows), sight=found.sight)
         others = thin.note_on_others(found.search.last.fit.terms, found.search.problem.sigma)
+        against = contradictions(one.term for one in found_effects(found))
         doubts = doubtful_values(found)
-        return replace(found, notes=(*doubts, *found.notes, *others))
+        return replace(found, notes=(*against, *doubts, *found.notes, *others))
 
 
 def _may_be_noise(found: Diagnosis, problem: Problem) -> bool:

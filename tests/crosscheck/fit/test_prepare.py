@@ -70,6 +70,9 @@ def test_every_reason_is_a_sentence_with_its_numbers() -> None:
     # "probable (1) but not certain" was said of what is all but certain
     assert str(Reason(Why.NOT_SURE, p=0.9999)) == "probable (> 99 %) but not certain"
     assert str(Reason(Why.NOT_SURE, p=0.986)) == "probable (99 %) but not certain"
+    # nor is an effect that is all but certain "not certain": it is left out because it is small
+    small = str(Reason(Why.DOES_LITTLE, p=0.9999))
+    assert small.startswith("probable (> 99 %), but it does little beside")
     two = Reason(Why.NOT_NEEDED_BESIDE, p=0.1, by=("creep", "stiffness"))
     assert str(two) == "not needed once creep, stiffness are in the model (probability 10 %)"
     late = Reason(Why.NOT_PREDICTIVE, beside=("pulley_radius", "creep"))
