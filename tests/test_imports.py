@@ -146,14 +146,14 @@ def test_no_import_points_upwards() -> None:
 
 def test_an_upward_import_is_seen_also_a_lazy_one() -> None:
     lazy = "def late():\n    from crosscheck.cli import main\n    return main\n"
-    assert upward("crosscheck.fit.problem", imports_of(ast.parse(lazy))) == {
+    assert upward("crosscheck.fit.words", imports_of(ast.parse(lazy))) == {
         ("crosscheck.fit", "crosscheck.cli")
     }
-    assert upward("seecr.pose", imports_of(ast.parse("import crosscheck.fit.problem"))) == {
+    assert upward("seecr.pose", imports_of(ast.parse("import crosscheck.fit.words"))) == {
         ("seecr.pose", "crosscheck.fit")
     }
     only_types = f"if TYPE_CHECKING:\n{lazy.replace('def late():', '    pass').split('return')[0]}"
-    assert upward("crosscheck.fit.problem", imports_of(ast.parse(only_types))) == set()
+    assert upward("crosscheck.fit.words", imports_of(ast.parse(only_types))) == set()
 
 
 def test_only_commands_use_the_faces() -> None:

@@ -7,22 +7,22 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from crosscheck.calibration.all_effects import Calibration, fit_all_effects
-from crosscheck.calibration.catalogue import Catalogue
-from crosscheck.calibration.colour import Colour
-from crosscheck.calibration.equals import EQUAL
-from crosscheck.calibration.joining import layouts
-from crosscheck.calibration.joint import JointFit, cost
-from crosscheck.calibration.judgement import SURPRISE
-from crosscheck.calibration.not_noise import is_not_noise
-from crosscheck.calibration.own_noise import by_own_noise
-from crosscheck.calibration.priors import widths_of
-from crosscheck.calibration.refits import ROUNDS, Found, compare_sets
-from crosscheck.calibration.sets import Names
-from crosscheck.calibration.stages import Progress, poor
-from crosscheck.calibration.unknown import UnknownOdds, unknown_beside
-from crosscheck.fit.problem import KINDS, Problem, kinds_read
-from crosscheck.fit.state import evaluate
+from crosscheck.calibration.joint_fit.all_effects import Calibration, fit_all_effects
+from crosscheck.calibration.joint_fit.joining import layouts
+from crosscheck.calibration.joint_fit.joint import JointFit, cost
+from crosscheck.calibration.joint_fit.stages import Progress, poor
+from crosscheck.calibration.judgement.verdict import SURPRISE
+from crosscheck.calibration.linear_evidence.priors import widths_of
+from crosscheck.calibration.noise.colour import Colour
+from crosscheck.calibration.sets.catalogue import Catalogue
+from crosscheck.calibration.sets.equals import EQUAL
+from crosscheck.calibration.sets.linear_search import Names
+from crosscheck.calibration.sets.own_noise import by_own_noise
+from crosscheck.calibration.sets.refits import ROUNDS, Found, compare_sets
+from crosscheck.calibration.unknown.beside import UnknownOdds, unknown_beside
+from crosscheck.calibration.unknown.not_noise import is_not_noise
+from crosscheck.fit.least_squares.problem import KINDS, Problem, kinds_read
+from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.measurements.data import Sigma
 from seecr.effects import Term, Terms
 from seecr.pose import Array

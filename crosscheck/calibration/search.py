@@ -5,32 +5,32 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from crosscheck.calibration.all_effects import PLAIN, Calibration, covariance
-from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.compared import all_stated, fit_and_compare
-from crosscheck.calibration.detectable import detectable_size
-from crosscheck.calibration.equals import EQUAL, parameters_counted
-from crosscheck.calibration.exact import FEW, Refit
-from crosscheck.calibration.imitated import Imitated, field_beside, field_in_place
-from crosscheck.calibration.joint import Setting
-from crosscheck.calibration.judgement import NOTHING, Judgement, judge
-from crosscheck.calibration.linearised import free_of
-from crosscheck.calibration.probability import (
+from crosscheck.calibration.joint_fit.all_effects import PLAIN, Calibration, covariance
+from crosscheck.calibration.joint_fit.joint import Setting
+from crosscheck.calibration.joint_fit.linearised import free_of
+from crosscheck.calibration.joint_fit.stages import Progress
+from crosscheck.calibration.judgement.probability import (
     Classes,
     alike_beyond,
     all_scores,
     probabilities,
 )
-from crosscheck.calibration.refits import Found
-from crosscheck.calibration.replaceable import Replaced
-from crosscheck.calibration.sets import Names
-from crosscheck.calibration.stages import Progress
-from crosscheck.calibration.sure_together import sure_together
-from crosscheck.calibration.unknown import unknown_beside
-from crosscheck.calibration.varying import Varying
-from crosscheck.fit.nothing import distance_from_nothing, is_nothing
-from crosscheck.fit.possible import can_be, hardly_happens
-from crosscheck.fit.problem import Problem, Rms
+from crosscheck.calibration.judgement.replaceable import Replaced
+from crosscheck.calibration.judgement.sure_together import sure_together
+from crosscheck.calibration.judgement.verdict import NOTHING, Judgement, judge
+from crosscheck.calibration.sets.catalogue import Catalogue
+from crosscheck.calibration.sets.equals import EQUAL, parameters_counted
+from crosscheck.calibration.sets.exact import FEW, Refit
+from crosscheck.calibration.sets.linear_search import Names
+from crosscheck.calibration.sets.refits import Found
+from crosscheck.calibration.unknown.beside import unknown_beside
+from crosscheck.calibration.unknown.detectable import detectable_size
+from crosscheck.calibration.unknown.imitated import Imitated, field_beside, field_in_place
+from crosscheck.calibration.unknown.varying import Varying
+from crosscheck.fit.effects.nothing import distance_from_nothing, is_nothing
+from crosscheck.fit.effects.possible import can_be, hardly_happens
+from crosscheck.fit.least_squares.problem import Problem, Rms
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.measurements.data import Sigma
 from seecr.description.robot import Robot
@@ -81,7 +81,7 @@ def search_sets(
     """Fit all effects at once, then compare sets of effects.
 
     Args:
-        problem: readings, from :func:`crosscheck.fit.prepare.prepare`.
+        problem: readings, from :func:`crosscheck.fit.preparation.prepare.prepare`.
         stated: the noise that the user stated, without estimates.
         terms: effects of the model as it stands; they are in every set.
         progress: called with what is being done and the fraction that is done.
@@ -156,7 +156,7 @@ def _classes(
     Args:
         found: the compared sets. own: the set.
         sizes: of all effects, the number of parameters by
-            :func:`crosscheck.calibration.equals.parameters_counted`.
+            :func:`crosscheck.calibration.sets.equals.parameters_counted`.
         further: scores of further sets that were fitted.
     """
     scores = {**all_scores(found), **further}

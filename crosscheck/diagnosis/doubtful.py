@@ -12,9 +12,9 @@ import numpy as np
 
 from crosscheck.diagnosis.node import LEAST_GAIN
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.fit.candidates import Trials
-from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.possible import can_be
+from crosscheck.fit.effects.candidates import Trials
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.effects.possible import can_be
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.words import value_lines
 from seecr.effects import Term

@@ -10,14 +10,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from crosscheck.calibration.judgement import SURE
+from crosscheck.calibration.judgement.verdict import SURE
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.node import Node, node_of
 from crosscheck.diagnosis.order import fitted_to_the_end, in_order
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
-from crosscheck.fit.candidates import try_candidate
-from crosscheck.fit.possible import can_be
+from crosscheck.fit.effects.candidates import try_candidate
+from crosscheck.fit.effects.possible import can_be
 
 DOUBTED = 0.5
 """An effect found by the search that is less probable than this may stand in for others."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.steps import shown_stages
-from crosscheck.fit.gauss_newton import Fit
+from crosscheck.fit.effects.gauss_newton import Fit
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.model.fitted import Fitted
 from seecr.pose import Array

@@ -11,7 +11,7 @@ from made_data import SIGMA, measured, term
 
 from crosscheck.add import add_effect, weigh
 from crosscheck.add.result import Addition
-from crosscheck.fit.noise import Whiteness
+from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.model.fitted import Fitted
 from seecr.description.mjcf import load_robot
 from seecr.effects import Term

@@ -9,8 +9,8 @@ from typing import Any
 import made_diagnoses
 import pytest
 
-from crosscheck.calibration.imitated import NOT_ASKED, Imitated
-from crosscheck.calibration.varying import Varying
+from crosscheck.calibration.unknown.imitated import NOT_ASKED, Imitated
+from crosscheck.calibration.unknown.varying import Varying
 from crosscheck.diagnosis.chances import Chances, chances_of
 from crosscheck.diagnosis.listed import diagnosis_of
 from crosscheck.diagnosis.nearby import _with_equals

@@ -12,16 +12,16 @@ import pytest
 from made_data import COGIRO, measured, term
 
 import crosscheck
-from crosscheck.calibration.imitated import NOT_ASKED, Imitated
-from crosscheck.calibration.judgement import Judgement
+from crosscheck.calibration.judgement.verdict import Judgement
 from crosscheck.calibration.search import SetSearch
-from crosscheck.calibration.varying import Varying
+from crosscheck.calibration.unknown.imitated import NOT_ASKED, Imitated
+from crosscheck.calibration.unknown.varying import Varying
 from crosscheck.diagnosis import small, unexplained, verdict
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.small import spoils
 from crosscheck.diagnosis.unexplained import beside_imitated
 from crosscheck.diagnosis.verdict import is_clear, is_undetermined
-from crosscheck.fit.possible import hardly_happens
+from crosscheck.fit.effects.possible import hardly_happens
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.measurements.data import Measurements
 from seecr.commands.data import Commands

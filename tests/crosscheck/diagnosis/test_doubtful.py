@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from made_data import COGIRO, measured, term
 
-from crosscheck.calibration.joining import inside
+from crosscheck.calibration.joint_fit.joining import inside
 from crosscheck.diagnosis import search
 from crosscheck.diagnosis.doubtful import doubtful_values
 from crosscheck.diagnosis.verdict import diagnose

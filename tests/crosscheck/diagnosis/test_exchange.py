@@ -13,9 +13,9 @@ from crosscheck.diagnosis.node import node_of
 from crosscheck.diagnosis.order import in_order
 from crosscheck.diagnosis.rivals import Rival, rivals_of
 from crosscheck.diagnosis.search import Search
-from crosscheck.fit.candidates import Trials
-from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.noise import Whiteness
+from crosscheck.fit.effects.candidates import Trials
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.noise.whiteness import Whiteness
 
 NAMES = ("tracker_scale", "cable_length_offset", "drum_gain")
 
