@@ -9,7 +9,7 @@ import numpy as np
 
 from crosscheck.calibration.judgement.verdict import SURE
 from crosscheck.diagnosis.chances import Chances
-from crosscheck.diagnosis.exchange import exchanged, replaced
+from crosscheck.diagnosis.exchanged_effects import exchanged, replaced
 from crosscheck.diagnosis.listed import diagnosis_of, missing_of, not_listed
 from crosscheck.diagnosis.nearby import chances_near
 from crosscheck.diagnosis.result import Diagnosis, NotListed

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from crosscheck.calibration.judgement.verdict import SURE, too_large
 from crosscheck.calibration.search import search_sets
 from crosscheck.diagnosis.chances import PROBABLE
-from crosscheck.diagnosis.doubtful import doubtful_values
+from crosscheck.diagnosis.contradicted import doubtful_values
 from crosscheck.diagnosis.explained import explained
 from crosscheck.diagnosis.importance import weighed
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect

@@ -15,8 +15,8 @@ from crosscheck.fit.preparation.fitness import refusal_of
 from crosscheck.fit.preparation.freed import freed
 from crosscheck.fit.preparation.parts import groups_of, laid_out
 from crosscheck.fit.reasons import Refusal, Unfit
-from crosscheck.fit.suspect_data.doubts import doubts
-from crosscheck.fit.suspect_data.exchanged import exchange_doubts
+from crosscheck.fit.suspect_data.another_robot import doubts
+from crosscheck.fit.suspect_data.exchanged_columns import exchange_doubts
 from crosscheck.fit.suspect_data.tension_unit import tension_doubts
 from crosscheck.measurements.data import Measurements
 from seecr.description.robot import Robot

@@ -13,7 +13,7 @@ from crosscheck.fit.least_squares.known import known_left, known_readings
 from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.preparation.fitness import commands_table
 from crosscheck.fit.preparation.parts import groups_of, laid_out, names_in
-from crosscheck.fit.suspect_data.doubts import doubts
+from crosscheck.fit.suspect_data.another_robot import doubts
 from crosscheck.fit.suspect_data.tension_unit import other_tensions
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.commands.loads import Loads

@@ -11,7 +11,7 @@ from made_data import COGIRO, measured, term
 
 from crosscheck.calibration.joint_fit.joining import inside
 from crosscheck.diagnosis import search
-from crosscheck.diagnosis.doubtful import doubtful_values
+from crosscheck.diagnosis.contradicted import doubtful_values
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.fit.reasons import DiagnosisVerdict
 from seecr.description.mjcf import load_robot

@@ -13,7 +13,7 @@ from made_data import measured, soft_cogiro, term
 
 import crosscheck
 from crosscheck.fit.preparation.prepare import prepare
-from crosscheck.fit.suspect_data.exchanged import exchanges, misfits
+from crosscheck.fit.suspect_data.exchanged_columns import exchanges, misfits
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import load_measurements
 from crosscheck.measurements.together import together

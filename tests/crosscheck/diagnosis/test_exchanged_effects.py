@@ -8,7 +8,7 @@ import pytest
 from linear_toy import LinearToy, toy
 
 from crosscheck.diagnosis.chances import Chances
-from crosscheck.diagnosis.exchange import exchanged, replaced
+from crosscheck.diagnosis.exchanged_effects import exchanged, replaced
 from crosscheck.diagnosis.node import node_of
 from crosscheck.diagnosis.order import in_order
 from crosscheck.diagnosis.rivals import Rival, rivals_of
@@ -113,5 +113,5 @@ def test_no_fit_takes_the_place_that_is_worse_or_impossible(
     found = ending_with(made, "cable_length_offset")
     scale = ending_with(made, "tracker_scale")
     assert replaced(scale, [Rival("cable_length_offset", found.last.fit, -5.0)]) is scale
-    monkeypatch.setattr("crosscheck.diagnosis.exchange.can_be", lambda *_: False)
+    monkeypatch.setattr("crosscheck.diagnosis.exchanged_effects.can_be", lambda *_: False)
     assert replaced(found, [the_scale(made, found)]) is found
