@@ -28,7 +28,7 @@ _SOMETHING = (
 )
 
 
-def doubtful_values(found: Diagnosis) -> Iterator[str]:
+def contradicted_values(found: Diagnosis) -> Iterator[str]:
     """A note for each effect of the model whose known values explain less than others would.
 
     Others explain more if fitting them, alone, has far more evidence than what was found has.

@@ -19,7 +19,7 @@ from crosscheck.diagnosis.search import Search
 from crosscheck.fit.effects.candidates import try_candidate
 from crosscheck.fit.effects.possible import can_be
 
-DOUBTED = 0.5
+IMPROBABLE = 0.5
 """An effect found by the search that is less probable than this may stand in for others."""
 
 
@@ -30,7 +30,7 @@ def exchanged(found: Search, chances: Chances) -> Search:
         found: a search that ended with noise.
         chances: probabilities about its last model.
     """
-    gone = [name for name in found.found if chances.of(name) < DOUBTED]
+    gone = [name for name in found.found if chances.of(name) < IMPROBABLE]
     inside = set(found.last.fit.terms.names)
     come = [m[0] for m, p in chances.classes if p > SURE and not inside & set(m)]
     if not gone or not come:

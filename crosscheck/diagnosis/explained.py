@@ -153,7 +153,7 @@ def _noise_notes(sought: SetSearch) -> list[str]:
 
 def _size_notes(sought: SetSearch) -> list[str]:
     terms = sought.found.best.joint.terms
-    return size_notes(terms[name] for name in sorted(sought.judgement.doubted))
+    return size_notes(terms[name] for name in sorted(sought.judgement.implausible))
 
 
 def _sentence(

@@ -15,7 +15,7 @@ from crosscheck.calibration.linear_evidence.gram import Gram
 from crosscheck.calibration.search import SetSearch
 from crosscheck.calibration.sets.exact import Refit
 from crosscheck.calibration.sets.linear_search import Names
-from crosscheck.calibration.sets.refits import Found
+from crosscheck.calibration.sets.refits import ComparedSets
 from crosscheck.diagnosis.node import Node
 from crosscheck.diagnosis.order import Step
 from crosscheck.diagnosis.search import Search
@@ -55,7 +55,7 @@ def steps_of_set(sought: SetSearch, names: Names) -> Search:
     return Search(Trials(problem, factor), tuple(steps), {})
 
 
-def _score(found: Found, names: Names) -> float:
+def _score(found: ComparedSets, names: Names) -> float:
     return found.refits[names].score if names in found.refits else found.scores.score(names)
 
 

@@ -84,7 +84,7 @@ def beside_imitated(found: Search, sought: SetSearch) -> SetSearch:
     said, chances = sought.judgement, chances_of(sought)
     if said.imitated is None or said.sure:
         return sought
-    own = sought.found.best.names - said.imitated.replaced - said.doubted
+    own = sought.found.best.names - said.imitated.replaced - said.implausible
     missing, _search = _warranted(found, chances, sought.outdone)
     sure = tuple(m.effect for m in missing if m.effect in own and m.probability > SURE)
     return replace(sought, judgement=replace(said, sure=sure))

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from crosscheck.calibration.judgement.verdict import SURE, too_large
 from crosscheck.calibration.search import search_sets
 from crosscheck.diagnosis.chances import PROBABLE
-from crosscheck.diagnosis.contradicted import doubtful_values
+from crosscheck.diagnosis.contradicted import contradicted_values
 from crosscheck.diagnosis.explained import explained
 from crosscheck.diagnosis.importance import weighed
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
@@ -88,7 +88,7 @@ def diagnose(
             base = found.search.steps[0].fit
             return replace(no_verdict(ready.problem, base, found.notes, rows), sight=found.sight)
         others = thin.note_on_others(found.search.last.fit.terms, found.search.problem.sigma)
-        doubts = doubtful_values(found)
+        doubts = contradicted_values(found)
         return replace(found, notes=(*doubts, *found.notes, *others))
 
 

@@ -8,7 +8,7 @@ from crosscheck.calibration.judgement.probability import Classes
 from crosscheck.calibration.sets.equals import EQUAL
 from crosscheck.calibration.sets.exact import FEW
 from crosscheck.calibration.sets.linear_search import Names
-from crosscheck.calibration.sets.refits import Found
+from crosscheck.calibration.sets.refits import ComparedSets
 
 # More alternatives than these are too many to read.
 _MOST = 3
@@ -24,7 +24,7 @@ def shared(some: Sequence[Names], classes: Classes) -> Names:
     )
 
 
-def alternatives(found: Found, classes: Classes) -> list[Names]:
+def alternatives(found: ComparedSets, classes: Classes) -> list[Names]:
     """Sets of few effects that explain as well as the best one, none a subset of another.
 
     Args:

@@ -11,7 +11,7 @@ from scipy import special
 from crosscheck.calibration.sets.equals import EQUAL, are_equals
 from crosscheck.calibration.sets.exact import LOCAL_MINIMUM, Refit
 from crosscheck.calibration.sets.linear_search import Names, Scores
-from crosscheck.calibration.sets.refits import Found
+from crosscheck.calibration.sets.refits import ComparedSets
 
 # Only the neighbours of sets that are worse than the best by less than this ln evidence count.
 _COUNTED = 8.0
@@ -95,7 +95,7 @@ class Classes:
         return self.further.get(name, next(p for members, p in pairs if name in members))
 
 
-def all_scores(found: Found) -> dict[Names, float]:
+def all_scores(found: ComparedSets) -> dict[Names, float]:
     """Scores of all fitted sets, and approximate ones of sets with one effect more than these.
 
     Each fitted set that counts has its own larger sets. If only those of the best set counted, its
@@ -113,7 +113,7 @@ def all_scores(found: Found) -> dict[Names, float]:
     return out | {names: refit.score for names, refit in found.refits.items()}
 
 
-def _larger(found: Found, refit: Refit) -> dict[Names, float]:
+def _larger(found: ComparedSets, refit: Refit) -> dict[Names, float]:
     """Sets with one effect more than a fitted one, with approximate scores.
 
     None may score higher than that set: if it were better, it would have been fitted, unless no

@@ -17,7 +17,7 @@ from crosscheck.calibration.sets.challenge import excluding
 from crosscheck.calibration.sets.equals import are_equals
 from crosscheck.calibration.sets.exact import Refit
 from crosscheck.calibration.sets.linear_search import Names, explore
-from crosscheck.calibration.sets.refits import Found
+from crosscheck.calibration.sets.refits import ComparedSets
 
 # A set that is worse than the best by less ln evidence than this explains as much.
 _AS_MUCH = 12.5
@@ -36,7 +36,7 @@ class Replaced:
         replaceable: the effects without which others explain as much.
     """
 
-    found: Found
+    found: ComparedSets
     size: Callable[[str], int]
     can_be: Callable[[Refit], bool]
     scores: dict[Names, float] = field(default_factory=dict)

@@ -18,7 +18,7 @@ from crosscheck.calibration.judgement.alternatives import alternatives, shared
 from crosscheck.calibration.judgement.probability import Classes
 from crosscheck.calibration.sets.equals import SMALL
 from crosscheck.calibration.sets.linear_search import Names
-from crosscheck.calibration.sets.refits import Found
+from crosscheck.calibration.sets.refits import ComparedSets
 from crosscheck.calibration.unknown.field import UNKNOWN
 from crosscheck.calibration.unknown.imitated import NOT_ASKED, Imitated
 from crosscheck.fit.reasons import DiagnosisVerdict
@@ -57,7 +57,7 @@ class Judgement:
         verdict: the verdict.
         sure: effects that are missing beyond doubt, each one representing its class.
         undecided: the expected number of open classes, see :class:`Classes`.
-        doubted: members of the best set that are implausibly large.
+        implausible: members of the best set that are implausibly large.
         more: whether something unknown explains more beside the best set.
         imitated: something unknown that members of the best set imitate; None if there is nothing.
         replaceable: members that are probable, but others together explain as much.
@@ -66,7 +66,7 @@ class Judgement:
     verdict: DiagnosisVerdict
     sure: tuple[str, ...]
     undecided: float
-    doubted: Names = NONE
+    implausible: Names = NONE
     more: bool = False
     imitated: Imitated | None = None
     replaceable: Names = NONE
@@ -86,12 +86,12 @@ class Judgement:
 
 
 def judge(
-    found: Found,
+    found: ComparedSets,
     classes: Classes,
     field_odds: float,
     surprise: float,
     not_noise: bool = False,
-    doubted: Names = NONE,
+    implausible: Names = NONE,
     beside: float = -np.inf,
     in_place: Imitated = NOT_ASKED,
     without: Mapping[Names, float] = NOTHING,
@@ -105,7 +105,7 @@ def judge(
         field_odds: ln odds of something unknown beside the whole catalogue.
         surprise: chi2 per reading of the worst held-out run over what the joint fit expects.
         not_noise: whether what was taken for noise is not noise.
-        doubted: members of the best set that are implausibly large.
+        implausible: members of the best set that are implausibly large.
         beside: ln odds of something unknown beside the best set.
         in_place: a field in place of some members of the best set.
         without: how probable it is that groups of its members are noise; that makes them less sure,
@@ -120,10 +120,10 @@ def judge(
     few = len(best) <= _FEW and undecided < (_OPEN_BESIDE if set(sure) == best else _OPEN)
     more = beside > UNKNOWN
     large = too_large(_size(found, name) for name in best)
-    few = few and not doubted and not more and not large
+    few = few and not implausible and not more and not large
     sure = adequate(found, sure) if few and sure else sure_effects(found, classes, False)
-    sure = tuple(name for name in sure if name not in doubted)
-    if not doubted and not large:
+    sure = tuple(name for name in sure if name not in implausible)
+    if not implausible and not large:
         sure = tuple(dict.fromkeys([*sure, *in_each(found, classes)]))
     if more:
         worth = worths(found)
@@ -131,21 +131,21 @@ def judge(
     if in_place.chance:
         # of several members that stay, some may absorb what others explain
         kept = carrying_most(found, in_place.worth, _ALL)
-        kept = tuple(name for name in kept if name not in doubted)
+        kept = tuple(name for name in kept if name not in implausible)
         if kept or not unknown:
             return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, kept, undecided, imitated=in_place)
     if unknown:  # known effects imitate it: none of them is sure but one that outweighs all else
         # where no field explains what is unknown, nothing limits what a member may imitate of it
         field = beside_field() if field_odds > UNKNOWN else NOT_ASKED
-        alone = tuple(n for n in outweighing(found, field) if n not in doubted)
+        alone = tuple(n for n in outweighing(found, field) if n not in implausible)
         return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, alone, undecided)
     if not sure and not more and undecided < _OPEN and explained_evidence(found) < _OWED:
         return Judgement(DiagnosisVerdict.NO_EFFECT_MISSING, (), undecided)
     verdict = DiagnosisVerdict.EFFECTS_FOUND if few and sure else DiagnosisVerdict.MANY_EFFECTS
-    return Judgement(verdict, sure, undecided, doubted, more)
+    return Judgement(verdict, sure, undecided, implausible, more)
 
 
-def in_each(found: Found, classes: Classes) -> tuple[str, ...]:
+def in_each(found: ComparedSets, classes: Classes) -> tuple[str, ...]:
     """Members that are sure in each of several sets of few effects that explain as well.
 
     What these do in different ways may be most of what is there, so that no part of it counts.
@@ -163,7 +163,7 @@ def too_large(sizes: Iterable[int]) -> bool:
     return sum(size > _NUMBERS for size in sizes) > _LARGE
 
 
-def sure_effects(found: Found, classes: Classes, few: bool) -> tuple[str, ...]:
+def sure_effects(found: ComparedSets, classes: Classes, few: bool) -> tuple[str, ...]:
     """Members of the best set that are missing beyond doubt, the most valuable first.
 
     Args:
@@ -178,7 +178,7 @@ def sure_effects(found: Found, classes: Classes, few: bool) -> tuple[str, ...]:
     return tuple(sorted(some, key=lambda e: -worth[e]))
 
 
-def adequate(found: Found, sure: tuple[str, ...]) -> tuple[str, ...]:
+def adequate(found: ComparedSets, sure: tuple[str, ...]) -> tuple[str, ...]:
     """These effects, plus further ones of the best set as long as it explains much more.
 
     That something is missing may be certain even if it is open which effect it is.
@@ -192,7 +192,7 @@ def adequate(found: Found, sure: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(sorted(listed, key=lambda e: -worth[e]))
 
 
-def carrying_most(found: Found, worth: Mapping[str, float], part: float) -> tuple[str, ...]:
+def carrying_most(found: ComparedSets, worth: Mapping[str, float], part: float) -> tuple[str, ...]:
     """The small effect that carries more than a part of what its set explains, if there is one.
 
     Args:
@@ -203,7 +203,7 @@ def carrying_most(found: Found, worth: Mapping[str, float], part: float) -> tupl
     return tuple(n for n in worth if _size(found, n) <= SMALL and worth[n] > least)
 
 
-def outweighing(found: Found, field: Imitated) -> tuple[str, ...]:
+def outweighing(found: ComparedSets, field: Imitated) -> tuple[str, ...]:
     """The member that is worth far more than all others and something unknown, if there is one.
 
     What is unknown follows no field exactly. Members may imitate what the field misses, those of
@@ -215,13 +215,13 @@ def outweighing(found: Found, field: Imitated) -> tuple[str, ...]:
     return tuple(n for n, w in worth.items() if w > max(least, _OWED * _size(found, n)))
 
 
-def _size(found: Found, name: str) -> int:
+def _size(found: ComparedSets, name: str) -> int:
     """An effect's number of amplitudes; 0 if it is not in the linear model."""
     group = found.scores.gram.groups.get(name)
     return 0 if group is None else len(group.columns)
 
 
-def worths(found: Found) -> dict[str, float]:
+def worths(found: ComparedSets) -> dict[str, float]:
     """ln evidence that each member of the best set is worth, by a refit without it or linearly.
 
     Members that move nothing beside the others are left out.
@@ -235,12 +235,12 @@ def worths(found: Found) -> dict[str, float]:
     }
 
 
-def _worth(found: Found, linear: dict[Names, float], base: float, rest: Names) -> float:
+def _worth(found: ComparedSets, linear: dict[Names, float], base: float, rest: Names) -> float:
     if rest in found.refits:
         return found.best.score - found.refits[rest].score
     return base - linear.get(rest, -np.inf)
 
 
-def explained_evidence(found: Found) -> float:
+def explained_evidence(found: ComparedSets) -> float:
     """ln evidence of the best set over that of the model as it stands."""
     return found.best.score - found.none.score

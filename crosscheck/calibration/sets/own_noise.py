@@ -24,7 +24,7 @@ from crosscheck.calibration.noise.colour import log_det
 from crosscheck.calibration.noise.robust import log_chance_of_outliers
 from crosscheck.calibration.sets.exact import FEW, scored, width_of
 from crosscheck.calibration.sets.linear_search import Names
-from crosscheck.calibration.sets.refits import Found
+from crosscheck.calibration.sets.refits import ComparedSets
 from crosscheck.fit.least_squares.state import evaluate
 from seecr.effects import Terms
 
@@ -48,7 +48,7 @@ class OwnNoise:
 
 
 def by_own_noise(
-    setting: Setting, found: Found, may_be: Callable[[JointFit], bool] = lambda _fit: True
+    setting: Setting, found: ComparedSets, may_be: Callable[[JointFit], bool] = lambda _fit: True
 ) -> OwnNoise:
     """Compare the best set with fewer effects, each by its own noise.
 
@@ -80,7 +80,7 @@ def by_own_noise(
     return OwnNoise(fewer, {out: float(np.exp(e - total)) for out, e in every.items()})
 
 
-def evidence_by_own_noise(setting: Setting, found: Found, joint: JointFit) -> float:
+def evidence_by_own_noise(setting: Setting, found: ComparedSets, joint: JointFit) -> float:
     """ln evidence of a set by a fit with its own noise, plus ln of its prior."""
     fixed = replace(setting, frozen=True, weight=joint.weight)
     names, noise = frozenset(joint.terms.names), (setting.chain, joint.colour, joint.weight)
@@ -88,7 +88,7 @@ def evidence_by_own_noise(setting: Setting, found: Found, joint: JointFit) -> fl
     return score - 0.5 * log_det(*noise) + log_chance_of_outliers(setting.chain, joint.weight)
 
 
-def _doubtful_members(found: Found) -> Iterable[Names]:
+def _doubtful_members(found: ComparedSets) -> Iterable[Names]:
     """Members of the best set, alone or together, that are worth little ln evidence each."""
     best, scores = found.best.names, found.scores
     near = scores.neighbours(best)
@@ -98,7 +98,7 @@ def _doubtful_members(found: Found) -> Iterable[Names]:
         yield from map(frozenset, combinations(some, count))
 
 
-def _fitted(setting: Setting, found: Found, out: Names) -> JointFit | None:
+def _fitted(setting: Setting, found: ComparedSets, out: Names) -> JointFit | None:
     """The best set without some members, fitted from its values with its own noise."""
     free = replace(setting, frozen=True, weight=None)
     best = found.best.joint

@@ -39,7 +39,7 @@ _AS_MUCH = 12.5
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class ComparedSets:
     """Sets that were compared.
 
     Attributes:
@@ -74,7 +74,7 @@ def compare_sets(
     rounds: int = ROUNDS,
     given: Iterable[Terms] = (),
     grow: bool = False,
-) -> Found:
+) -> ComparedSets:
     """Search the sets of effects, by linear evidence and exact fits in turn.
 
     Args:
@@ -121,7 +121,9 @@ def compare_sets(
     if other.names != best.names:
         scores, best = exact.scores_about(other.joint), other
     idle = frozenset(n for n in best.names - always if _is_idle(exact, scores, best, n))
-    return Found(exact.possible, best, scores, lambda names: exact.fit(scores, names), always, idle)
+    return ComparedSets(
+        exact.possible, best, scores, lambda names: exact.fit(scores, names), always, idle
+    )
 
 
 def plainer(exact: Exact, best: Refit) -> Refit:

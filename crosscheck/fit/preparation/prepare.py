@@ -15,7 +15,7 @@ from crosscheck.fit.preparation.fitness import refusal_of
 from crosscheck.fit.preparation.freed import freed
 from crosscheck.fit.preparation.parts import groups_of, laid_out
 from crosscheck.fit.reasons import Refusal, Unfit
-from crosscheck.fit.suspect_data.another_robot import doubts
+from crosscheck.fit.suspect_data.another_robot import another_robot_doubts
 from crosscheck.fit.suspect_data.exchanged_columns import exchange_doubts
 from crosscheck.fit.suspect_data.tension_unit import tension_doubts
 from crosscheck.measurements.data import Measurements
@@ -86,7 +86,7 @@ def prepare(
             known = replace(problem, sigma=data.sigma)
             problem, estimates = estimate_sigma(known, plain)
     odd = [
-        *doubts(problem, plain.readings),
+        *another_robot_doubts(problem, plain.readings),
         *tension_doubts(problem, plain),
         *exchange_doubts(problem, plain),
         *oversized(problem, plain),

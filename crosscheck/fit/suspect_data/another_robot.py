@@ -26,7 +26,7 @@ _LEAST_ROWS = 4
 _OTHER_TURN, _LEAST_TURN, _BACKWARDS = 20.0, np.radians(0.1), 3.0
 
 
-def doubts(problem: Problem, readings: Readings) -> list[str]:
+def another_robot_doubts(problem: Problem, readings: Readings) -> list[str]:
     """Sentences that say why the data are hardly of this robot; none if they may be.
 
     Args:

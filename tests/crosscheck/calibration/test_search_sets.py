@@ -82,7 +82,7 @@ def test_structure_beside_all_effects_is_nothing_unknown_if_few_effects_leave_no
         asked.append(len(joint.terms.names))
         return len(joint.terms.names) == len(FEW)
 
-    def compare_sets(*args: Any) -> refits.Found:
+    def compare_sets(*args: Any) -> refits.ComparedSets:
         refitted.append(args[5])
         return refits.compare_sets(*args)
 

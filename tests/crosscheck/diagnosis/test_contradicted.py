@@ -11,7 +11,7 @@ from made_data import COGIRO, measured, term
 
 from crosscheck.calibration.joint_fit.joining import inside
 from crosscheck.diagnosis import search
-from crosscheck.diagnosis.contradicted import doubtful_values
+from crosscheck.diagnosis.contradicted import contradicted_values
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.fit.reasons import DiagnosisVerdict
 from seecr.description.mjcf import load_robot
@@ -56,7 +56,7 @@ def test_fixed_values_that_the_data_contradict_are_doubted() -> None:
 def test_only_values_that_are_known_are_doubted(known: bool) -> None:
     """What was measured to 0.1 mm is doubted, where the data say 15 mm; what is free is fitted."""
     model = WRONG.measured(shift_x_m=(0.005, 1e-4)) if known else WRONG
-    notes = list(doubtful_values(diagnose(ROBOT, DATA, Terms([model]))))
+    notes = list(contradicted_values(diagnose(ROBOT, DATA, Terms([model]))))
     assert len(notes) == known
     assert not known or ("shift_x = 20.0" in notes[0] and "shift_y" not in notes[0])
 
@@ -72,7 +72,7 @@ def test_readings_of_values_count_in_the_evidence_beside_them() -> None:
     model = plain.measured(**dict(zip(plain.layout.names, readings, strict=True)))
     mass = term(ROBOT, "platform_mass", added_kg=0.1)
     found = diagnose(ROBOT, measured(ROBOT, [mass, true], points=3, seed=3), Terms([model]))
-    assert found.missing and not list(doubtful_values(found))
+    assert found.missing and not list(contradicted_values(found))
 
 
 def test_values_that_the_data_confirm_are_not_doubted() -> None:
@@ -80,7 +80,7 @@ def test_values_that_the_data_confirm_are_not_doubted() -> None:
     found = diagnose(
         ROBOT, measured(ROBOT, [HIDDEN, mass], points=4, seed=3), Terms([HIDDEN.fixed()])
     )
-    assert [one.effect for one in found.missing] and not list(doubtful_values(found))
+    assert [one.effect for one in found.missing] and not list(contradicted_values(found))
 
 
 def test_a_fixed_value_at_its_bound_stays_there() -> None:

@@ -12,7 +12,7 @@ from crosscheck.calibration.judgement.verdict import Judgement
 from crosscheck.calibration.linear_evidence.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.sets.exact import Refit
 from crosscheck.calibration.sets.linear_search import Names, Scores
-from crosscheck.calibration.sets.refits import Found
+from crosscheck.calibration.sets.refits import ComparedSets
 from crosscheck.fit.reasons import DiagnosisVerdict
 
 NAMES = "abcdefgh"
@@ -34,17 +34,17 @@ def gram(equal: bool = False) -> Gram:
     return gram_of(x, x @ z + rng.normal(size=200), groups)
 
 
-def compared(some: Gram, best: str) -> Found:
+def compared(some: Gram, best: str) -> ComparedSets:
     scores = Scores(some, len(NAMES))
 
     def fit(names: Names) -> Refit:
         return Refit(names, NO_FIT, {}, scores.score(names))
 
     refits = {names: fit(names) for names in (frozenset[str](), frozenset(best))}
-    return Found(refits, refits[frozenset(best)], scores, fit)
+    return ComparedSets(refits, refits[frozenset(best)], scores, fit)
 
 
-def tried(found: Found, sure: str) -> tuple[Replaced, Classes]:
+def tried(found: ComparedSets, sure: str) -> tuple[Replaced, Classes]:
     def classes() -> Classes:
         scores = {names: refit.score for names, refit in found.refits.items()} | some.scores
         return probabilities(scores, found.best.names, NAMES)

@@ -18,7 +18,7 @@ from crosscheck.calibration.linear_evidence.gram import ColumnGroup, gram_of
 from crosscheck.calibration.search import with_equivalents
 from crosscheck.calibration.sets.exact import Refit
 from crosscheck.calibration.sets.linear_search import Names, Scores
-from crosscheck.calibration.sets.refits import Found
+from crosscheck.calibration.sets.refits import ComparedSets
 from crosscheck.calibration.unknown.imitated import Imitated
 from crosscheck.fit.reasons import DiagnosisVerdict
 from seecr.effects import Terms
@@ -28,13 +28,15 @@ NO_FIT: Any = None
 LARGE = ColumnGroup(np.array([0, 2, 3, 4]), np.array([1.0]))
 
 
-def found_of(scores: dict[str, float]) -> Found:
+def found_of(scores: dict[str, float]) -> ComparedSets:
     """Sets refitted to these scores, written as their members' letters."""
     refits = {frozenset(k): Refit(frozenset(k), NO_FIT, {}, s) for k, s in scores.items()}
     best = max(refits.values(), key=lambda r: r.score)
     x = np.random.default_rng(0).normal(size=(20, len(NAMES)))
     groups = {n: ColumnGroup(np.array([k]), np.array([1.0])) for k, n in enumerate(NAMES)}
-    return Found(refits, best, Scores(gram_of(x, 0.0 * x[:, 0], groups), len(NAMES)), refits.get)
+    return ComparedSets(
+        refits, best, Scores(gram_of(x, 0.0 * x[:, 0], groups), len(NAMES)), refits.get
+    )
 
 
 def judged(scores: dict[str, float], odds: float = -5.0, surprise: float = 1.0) -> Judgement:
@@ -121,7 +123,7 @@ def test_what_is_of_a_size_that_does_not_happen_is_not_sure() -> None:
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
     said = judge(found, classes, -5.0, 1.0)
     assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a", "b"))
-    said = judge(found, classes, -5.0, 1.0, doubted=frozenset("b"))
+    said = judge(found, classes, -5.0, 1.0, implausible=frozenset("b"))
     assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ("a",))
 
 
@@ -169,8 +171,10 @@ def test_a_field_in_the_place_of_members_is_something_unknown() -> None:
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
     here = Imitated(6.0, frozenset("b"), (), {"a": 800.0})
 
-    def said(in_place: Imitated, of: Found = found, doubted: Names = frozenset()) -> Judgement:
-        return judge(of, classes, -5.0, 1.0, doubted=doubted, in_place=in_place)
+    def said(
+        in_place: Imitated, of: ComparedSets = found, implausible: Names = frozenset()
+    ) -> Judgement:
+        return judge(of, classes, -5.0, 1.0, implausible=implausible, in_place=in_place)
 
     assert said(here).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     assert (said(here).sure, said(here).imitated) == (("a",), here)
@@ -181,7 +185,7 @@ def test_a_field_in_the_place_of_members_is_something_unknown() -> None:
     grown = replace(found.scores.gram, groups={**found.scores.gram.groups, "a": LARGE})
     large = replace(found, scores=replace(found.scores, gram=grown))
     assert said(here, large).sure == ()
-    assert said(here, doubted=frozenset("a")).sure == ()
+    assert said(here, implausible=frozenset("a")).sure == ()
     assert said(replace(here, worth={"a": 800.0, "c": 1.0})).sure == ("a",)
     # where runs left out are off, too, nothing is said of what imitates what unless one is sure
     far = judge(found, classes, -5.0, 9.0, in_place=here)
@@ -197,8 +201,10 @@ def test_beside_what_all_effects_leave_one_is_sure_that_outweighs_all_else() -> 
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
     field = Imitated(20.0, frozenset(), (), {"a": 800.0, "b": 5.0})
 
-    def sure(beside: Imitated, of: Found = found, doubted: Names = frozenset()) -> tuple[str, ...]:
-        said = judge(of, classes, 9.0, 1.0, doubted=doubted, beside_field=lambda: beside)
+    def sure(
+        beside: Imitated, of: ComparedSets = found, implausible: Names = frozenset()
+    ) -> tuple[str, ...]:
+        said = judge(of, classes, 9.0, 1.0, implausible=implausible, beside_field=lambda: beside)
         assert said.verdict is DiagnosisVerdict.UNKNOWN_EFFECT and said.imitated is None
         return said.sure
 
@@ -207,7 +213,7 @@ def test_beside_what_all_effects_leave_one_is_sure_that_outweighs_all_else() -> 
     assert sure(replace(field, worth={"a": 800.0, "b": 80.0})) == ()
     assert sure(replace(field, odds=270.0)) == ()
     assert sure(replace(field, odds=0.0, worth={"a": 20.0})) == ()
-    assert sure(field, doubted=frozenset("a")) == ()
+    assert sure(field, implausible=frozenset("a")) == ()
     # nor one of many parameters that is not worth more for it
     seven = ColumnGroup(np.arange(7), np.array([1.0]))
     grown = replace(found.scores.gram, groups={**found.scores.gram.groups, "a": seven})
@@ -260,7 +266,7 @@ def test_what_each_of_several_sets_has_is_sure_though_what_is_open_is_worth_more
     # or a member is of a size that may stand for anything
     found = found_of(either)
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
-    assert judge(found, classes, -5.0, 1.0, doubted=frozenset("b")).sure == ()
+    assert judge(found, classes, -5.0, 1.0, implausible=frozenset("b")).sure == ()
     # or all are groups that together imitate anything
     found = found_of(large)
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
@@ -315,7 +321,7 @@ def test_equals_in_a_larger_set_are_looked_for_in_what_is_listed(
         return None if names == frozenset("ac") else Refit(names, joint, {}, -1.0)
 
     base = found_of(scores)
-    found = Found(refits, refits[frozenset("abg")], base.scores, refit)
+    found = ComparedSets(refits, refits[frozenset("abg")], base.scores, refit)
     classes = probabilities(scores_of(refits), found.best.names, NAMES, fitted=refits)
     assert classes.members[0] == ("a", "c")
     assert with_equivalents(found, frozenset("ab"), classes, robot, Terms()) == {
@@ -323,7 +329,7 @@ def test_equals_in_a_larger_set_are_looked_for_in_what_is_listed(
     }
     assert fitted == [frozenset("cb")]
     # what has no solution and what no robot can have says nothing
-    unsolved = Found(refits, found.best, base.scores, lambda _names: None)
+    unsolved = ComparedSets(refits, found.best, base.scores, lambda _names: None)
     assert with_equivalents(unsolved, frozenset("ab"), classes, robot, Terms()) == {}
     monkeypatch.setattr(search, "can_be", lambda *_: False)
     assert with_equivalents(found, frozenset("ab"), classes, robot, Terms()) == {}

@@ -19,7 +19,7 @@ from crosscheck.calibration.judgement.probability import (
 from crosscheck.calibration.linear_evidence.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.sets.exact import Refit
 from crosscheck.calibration.sets.linear_search import Names, Scores, explore, log_prior, trimmed
-from crosscheck.calibration.sets.refits import Found
+from crosscheck.calibration.sets.refits import ComparedSets
 
 WIDTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0])
 NONE: Names = frozenset()
@@ -153,7 +153,7 @@ def test_members_of_the_best_set_are_as_sure_as_all_sets_say() -> None:
         fit: Any = None  # of linear models there is none
         some = {n: Refit(n, fit, {}, fresh.score(n)) for n in {NONE, *fresh.best(20, 12.0)}}
         best = max(some.values(), key=lambda r: r.score)
-        found = all_scores(Found(some, best, fresh, some.get))
+        found = all_scores(ComparedSets(some, best, fresh, some.get))
         alone = [(name,) for name in gram.names]
         true = of_classes({n: every.score(n) for n in sets}, best.names, gram.names, alone).effect
         said = of_classes(found, best.names, gram.names, alone).effect
@@ -174,7 +174,7 @@ def test_beside_what_the_linear_model_does_not_know_others_gain_what_they_do_els
     }  # fmt: skip
     # about the best set the linear model sees little of what the other does
     scores.solved[other] = (top - 60.0, {"e9": 1.0})
-    found = all_scores(Found(some, some[best], scores, some.get))
+    found = all_scores(ComparedSets(some, some[best], scores, some.get))
     larger = {names - other: s for names, s in found.items() if other < names and not best < names}
     assert len(larger) == 11
     # what they gain but for the prior, which pays less for a third effect than for a second

@@ -15,7 +15,7 @@ from crosscheck.calibration.noise.colour import Colour
 from crosscheck.calibration.search import SetSearch, search_sets
 from crosscheck.calibration.sets import own_noise
 from crosscheck.calibration.sets.own_noise import OwnNoise
-from crosscheck.calibration.sets.refits import Found
+from crosscheck.calibration.sets.refits import ComparedSets
 from crosscheck.calibration.unknown.beside import UnknownOdds
 from crosscheck.fit.preparation.prepare import prepare
 from crosscheck.given import considered
@@ -100,7 +100,7 @@ def test_what_may_be_noise_is_told_as_less_probable_unless_the_noise_is_still_an
 ) -> None:
     noise = {frozenset[str](): 0.4, frozenset({"pulley_radius"}): 0.6}
 
-    def own(_setting: object, found: Found, _may_be: object) -> OwnNoise:
+    def own(_setting: object, found: ComparedSets, _may_be: object) -> OwnNoise:
         return OwnNoise(found.best.joint if again else None, noise)
 
     monkeypatch.setattr(compared, "by_own_noise", own)

@@ -13,7 +13,7 @@ from crosscheck.fit.least_squares.known import known_left, known_readings
 from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.preparation.fitness import commands_table
 from crosscheck.fit.preparation.parts import groups_of, laid_out, names_in
-from crosscheck.fit.suspect_data.another_robot import doubts
+from crosscheck.fit.suspect_data.another_robot import another_robot_doubts
 from crosscheck.fit.suspect_data.tension_unit import other_tensions
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.commands.loads import Loads
@@ -44,15 +44,15 @@ def predicted(off_m: float = 0.0, pull: float = 1.0) -> Readings:
 
 
 def test_a_model_that_explains_the_readings_raises_no_doubts() -> None:
-    assert doubts(problem(), predicted()) == []
+    assert another_robot_doubts(problem(), predicted()) == []
 
 
 def test_a_model_farther_off_than_the_commands_is_doubted_with_both_distances() -> None:
     """A metre along one of three axes: 577.4 mm rms over all."""
-    (said,) = doubts(problem(), predicted(off_m=1.0))
+    (said,) = another_robot_doubts(problem(), predicted(off_m=1.0))
     assert said.startswith("The model is 577 mm from the measured positions, the commands")
     few = Problem(ROBOT, data(), SIGMA, np.arange(data().n_rows) < 3)
-    assert doubts(few, predicted(off_m=1.0)) == []
+    assert another_robot_doubts(few, predicted(off_m=1.0)) == []
 
 
 @pytest.mark.parametrize(("pull", "doubted"), [(19.0, 0), (21.0, 1), (1 / 19.0, 0), (1 / 21.0, 1)])
@@ -69,7 +69,7 @@ def test_of_several_files_the_doubted_one_is_named() -> None:
     )
     readings = predicted()
     readings.position[number == 1] += [1.0, 0.0, 0.0]
-    (said,) = doubts(problem(two), readings)
+    (said,) = another_robot_doubts(problem(two), readings)
     assert said.startswith("two.csv: The model is 577 mm from the measured positions")
 
 
