@@ -14,13 +14,11 @@ from dataclasses import dataclass, field
 
 from crosscheck.calibration.judgement.probability import Classes
 from crosscheck.calibration.sets.challenge import excluding
-from crosscheck.calibration.sets.equals import are_equals
+from crosscheck.calibration.sets.equals import BY_CHANCE, are_equals
 from crosscheck.calibration.sets.exact import Refit
 from crosscheck.calibration.sets.linear_search import Names, explore
 from crosscheck.calibration.sets.refits import ComparedSets
 
-# A set that is worse than the best by less ln evidence than this explains as much.
-_AS_MUCH = 12.5
 # Moves of the search without an effect, the sets that are fitted then, and how many times.
 _MOVES, _EACH, _ROUNDS = 6, 2, 3
 
@@ -61,8 +59,8 @@ class Replaced:
         own, best = self.found.best, self.found.best.names
         scores = excluding(self.found.scores, barred)
         explore(scores, [best - barred], _MOVES)
-        least = self.found.scores.score(best) - _AS_MUCH
-        some = [names for names in scores.best(_EACH, _AS_MUCH) if scores.score(names) > least]
+        least = self.found.scores.score(best) - BY_CHANCE
+        some = [names for names in scores.best(_EACH, BY_CHANCE) if scores.score(names) > least]
         equals = set[str]()
         for names in some:
             self._fit(names)
@@ -82,7 +80,7 @@ class Replaced:
         return self.scores[names]
 
     def _as_much(self, score: float) -> bool:
-        return score > self.found.best.score - _AS_MUCH
+        return score > self.found.best.score - BY_CHANCE
 
     def _all(self) -> list[tuple[Names, float]]:
         before = {names: refit.score for names, refit in self.found.refits.items()}

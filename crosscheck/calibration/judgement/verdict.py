@@ -16,7 +16,7 @@ import numpy as np
 
 from crosscheck.calibration.judgement.alternatives import alternatives, shared
 from crosscheck.calibration.judgement.probability import Classes
-from crosscheck.calibration.sets.equals import SMALL
+from crosscheck.calibration.sets.equals import BY_CHANCE, SMALL
 from crosscheck.calibration.sets.linear_search import Names
 from crosscheck.calibration.sets.refits import ComparedSets
 from crosscheck.calibration.unknown.field import UNKNOWN
@@ -31,8 +31,6 @@ _FEW, _OPEN, _OPEN_BESIDE = 5, 1.0, 2.0
 # Effects with more parameters than a pose has can together imitate anything: more than _LARGE of
 # them are a calibration.
 _NUMBERS, _LARGE = 6, 2
-# A set that explains less ln evidence than this may be chance and needs no name.
-_OWED = 12.5
 # Held-out runs may be so many times as far off as the fit expects.
 SURPRISE = 2.0
 # In a large set, an effect is only sure if it carries more than this part of what all explain, and
@@ -139,7 +137,7 @@ def judge(
         field = beside_field() if field_odds > UNKNOWN else NOT_ASKED
         alone = tuple(n for n in outweighing(found, field) if n not in implausible)
         return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, alone, undecided)
-    if not sure and not more and undecided < _OPEN and explained_evidence(found) < _OWED:
+    if not sure and not more and undecided < _OPEN and explained_evidence(found) < BY_CHANCE:
         return Judgement(DiagnosisVerdict.NO_EFFECT_MISSING, (), undecided)
     verdict = DiagnosisVerdict.EFFECTS_FOUND if few and sure else DiagnosisVerdict.MANY_EFFECTS
     return Judgement(verdict, sure, undecided, implausible, more)
@@ -186,7 +184,7 @@ def adequate(found: ComparedSets, sure: tuple[str, ...]) -> tuple[str, ...]:
     worth, listed = worths(found), list(sure)
     for name in sorted(set(worth) - set(sure), key=lambda e: -worth[e]):
         alone = found.refit(found.always | set(listed))
-        if alone is not None and alone.score > found.best.score - _OWED:
+        if alone is not None and alone.score > found.best.score - BY_CHANCE:
             break
         listed.append(name)
     return tuple(sorted(listed, key=lambda e: -worth[e]))
@@ -212,7 +210,7 @@ def outweighing(found: ComparedSets, field: Imitated) -> tuple[str, ...]:
     worth = field.worth
     others = _ALL * sum(max(w, 0.0) for w in worth.values())
     least = max(_WORTH, others, _FAR * field.odds)
-    return tuple(n for n, w in worth.items() if w > max(least, _OWED * _size(found, n)))
+    return tuple(n for n, w in worth.items() if w > max(least, BY_CHANCE * _size(found, n)))
 
 
 def _size(found: ComparedSets, name: str) -> int:

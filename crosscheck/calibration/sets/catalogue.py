@@ -12,13 +12,11 @@ from crosscheck.calibration.joint_fit.joining import added_columns, amplitudes, 
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting
 from crosscheck.calibration.linear_evidence.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.linear_evidence.priors import widths_for
+from crosscheck.fit.effects.starts import UNSEEN
 from crosscheck.fit.least_squares.known import known_readings
 from crosscheck.fit.least_squares.state import derivatives
 from seecr.effects import Term, Terms
 from seecr.pose import Array
-
-# An effect is not seen if its plausible size moves no reading by more than this part of its noise.
-_UNSEEN = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +117,6 @@ def catalogue_columns(
             columns[term.name], z[term.name] = own, np.zeros(own.shape[1])
     seen = [
         n for n, x in columns.items()
-        if x.shape[1] and (n in inside or np.max(np.abs(x), initial=0.0) > _UNSEEN)
+        if x.shape[1] and (n in inside or np.max(np.abs(x), initial=0.0) > UNSEEN)
     ]  # fmt: skip
     return {n: columns[n] for n in seen}, {n: z[n] for n in seen}

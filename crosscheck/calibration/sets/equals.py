@@ -10,6 +10,9 @@ EQUAL = 3.0
 # parameter: a frame that yields equally in all directions acts like cable behind the exit point,
 # but has two parameters.
 SMALL, _ONE_MORE = 3, 3.0
+# A difference in ln evidence below this, half of 25 in chi2, may be chance: a set that is worse by
+# no more explains as much.
+BY_CHANCE = 12.5
 
 
 def are_equals(loss: float, own: int, other: int) -> bool:

@@ -16,7 +16,7 @@ from crosscheck.calibration.joint_fit.joining import amplitudes, inside, promisi
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting
 from crosscheck.calibration.sets.catalogue import Catalogue
 from crosscheck.calibration.sets.challenge import challenge
-from crosscheck.calibration.sets.equals import EQUAL, are_equals
+from crosscheck.calibration.sets.equals import BY_CHANCE, EQUAL, are_equals
 from crosscheck.calibration.sets.exact import FEW, LOCAL_MINIMUM, Exact, Refit
 from crosscheck.calibration.sets.grown import grown
 from crosscheck.calibration.sets.linear_search import Names, Scores, explore
@@ -34,8 +34,6 @@ _BESIDE = 6
 _CHALLENGES = 3
 # Sets up to this size are tried without each of their members.
 _THINNED = 8
-# A set that is worse than the best by no more than this explains as much.
-_AS_MUCH = 12.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +180,7 @@ def _is_idle(exact: Exact, scores: Scores, best: Refit, name: str) -> bool:
     if not does_nothing(exact.setting, best, name):
         return False
     without = exact.fit(scores, best.names - {name})
-    return without is not None and without.score > best.score - _AS_MUCH
+    return without is not None and without.score > best.score - BY_CHANCE
 
 
 def does_nothing(setting: Setting, best: Refit, name: str) -> bool:

@@ -46,7 +46,7 @@ _START_SIZES = 3.0
 # If more than this part of the cables is slack, a fit may end in a local minimum.
 _SLACK_PART = 0.02
 # An effect is not seen if its plausible size shifts no reading by more than this part of its noise.
-_UNSEEN = 0.02
+UNSEEN = 0.02
 # With fewer rows than this, a second thread for the shapes of an effect does not pay.
 _MANY_ROWS = 600
 
@@ -131,7 +131,7 @@ def _scored(
     def score(shape: dict[str, float]) -> _Scored:
         null = layout.start(shape)
         white = amplitude_columns(problem, base, layout, null) * scale
-        seen = bool(np.max(np.abs(white), initial=0.0) > _UNSEEN)
+        seen = bool(np.max(np.abs(white), initial=0.0) > UNSEEN)
         z, gain, directions = _linear(beside(white, span), base.state.white)
         z = np.clip(z, -_START_SIZES, _START_SIZES)
         vector = np.clip(null + z * scale, layout.lower, layout.upper)

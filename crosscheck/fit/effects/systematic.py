@@ -17,7 +17,7 @@ from crosscheck.fit.least_squares.problem import Problem
 from seecr.pose import Array
 
 # An effect counts if it explains more than this part of what the best one explains.
-_AS_MUCH = 0.5
+_PART_OF_BEST = 0.5
 
 
 def moved_by_others(problem: Problem, found: Fit) -> Array:
@@ -44,7 +44,7 @@ def moved_by_others(problem: Problem, found: Fit) -> Array:
             falls.append(fall)
             moves.append(move)
     most = max(falls, default=0.0)
-    some = [m for f, m in zip(falls, moves, strict=True) if f > _AS_MUCH * most > 0.0]
+    some = [m for f, m in zip(falls, moves, strict=True) if f > _PART_OF_BEST * most > 0.0]
     largest = np.max(np.abs(some), axis=0) if some else np.zeros(len(found.terms))
     return np.asarray(largest * found.terms.scale)
 
