@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from crosscheck.diagnosis.result import Diagnosis, MissingEffect
     from crosscheck.diagnosis.verdict import diagnose
     from crosscheck.errors import CrosscheckError, UnsolvedError
+    from crosscheck.fit.noise.tolerance import Tolerance
     from crosscheck.fit.reasons import DiagnosisVerdict
-    from crosscheck.fit.tolerance import Tolerance
     from crosscheck.importing.case import Imported, import_case
     from crosscheck.importing.choices import ImportChoices
     from crosscheck.measurements.data import Measurements, Sigma
@@ -57,7 +57,7 @@ _WHERE = {
     "Plan": "planning.result",
     "Run": "suite.run",
     "Sigma": "measurements.data",
-    "Tolerance": "fit.tolerance",
+    "Tolerance": "fit.noise.tolerance",
     "Twin": "twin.make",
     "UnsolvedError": "errors",
     "add_effect": "add",

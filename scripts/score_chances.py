@@ -28,8 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.diagnosis.verdict import diagnose
-from crosscheck.fit.problem import Problem
-from crosscheck.fit.state import derivatives, evaluate
+from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.least_squares.state import derivatives, evaluate
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.twin.hidden import choose, times
 from crosscheck.twin.lab import random_of, sweeps

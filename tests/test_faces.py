@@ -111,7 +111,7 @@ def test_commands_use_public_names_alone(path: Path) -> None:
 
 
 def test_a_private_name_is_seen() -> None:
-    assert not is_public("crosscheck.fit.state", "evaluate")
+    assert not is_public("crosscheck.fit.least_squares.state", "evaluate")
     assert not is_public("seecr.files", "_missing")
     assert is_public("seecr.files", "staged") and is_public("crosscheck", "diagnose")
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from crosscheck.comparison.coloured import Coloured
-from crosscheck.fit.evidence import FALSE_ALARM
-from crosscheck.fit.noise import Whiteness
-from crosscheck.fit.problem import Rms
+from crosscheck.fit.effects.evidence import FALSE_ALARM
+from crosscheck.fit.least_squares.problem import Rms
+from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
 from crosscheck.model.fitted import Fitted
 from crosscheck.units import with_error

@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 from crosscheck.add.result import Addition
 from crosscheck.comparison.coloured import coloured_noise
 from crosscheck.errors import UnsolvedError
-from crosscheck.fit.candidates import null_fit, seen_directions
-from crosscheck.fit.contradicted import contradictions
-from crosscheck.fit.evidence import FALSE_ALARM, p_value
-from crosscheck.fit.gauss_newton import Fit, fit
-from crosscheck.fit.held_out import HeldOut, hold_out, improves, pays, unfitted
-from crosscheck.fit.known import firmer
-from crosscheck.fit.noise import Whiteness, whiteness
-from crosscheck.fit.nothing import distance_from_nothing, is_nothing
-from crosscheck.fit.problem import Problem, Rms, rms_by_kind
-from crosscheck.fit.state import evaluate
-from crosscheck.fit.systematic import moved_by_others
+from crosscheck.fit.effects.candidates import null_fit, seen_directions
+from crosscheck.fit.effects.contradictions import contradictions
+from crosscheck.fit.effects.evidence import FALSE_ALARM, p_value
+from crosscheck.fit.effects.gauss_newton import Fit, fit
+from crosscheck.fit.effects.held_out import HeldOut, hold_out, improves, pays, unfitted
+from crosscheck.fit.effects.nothing import distance_from_nothing, is_nothing
+from crosscheck.fit.effects.systematic import moved_by_others
+from crosscheck.fit.least_squares.known import firmer
+from crosscheck.fit.least_squares.problem import Problem, Rms, rms_by_kind
+from crosscheck.fit.least_squares.state import evaluate
+from crosscheck.fit.noise.whiteness import Whiteness, whiteness
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import provenance_of, renewed, with_fit
 from seecr.counted import counted, some
@@ -49,7 +49,7 @@ def weigh(
         problem: the data. terms: effects before. names: of the new ones. factor: of the noise.
         best: the fit with all of them. notes: about the data. basis: the model to write into.
         firmness: by how much independently measured values were made firmer for this fit
-            (:func:`crosscheck.fit.known.firmer`).
+            (:func:`crosscheck.fit.least_squares.known.firmer`).
 
     Raises:
         UnsolvedError: the fit did not converge, or ended in a local minimum.

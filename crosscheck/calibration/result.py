@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from crosscheck.calibration.absent import absent_effects
-from crosscheck.calibration.all_effects import Calibration, JointErrors, fit_all_effects
+from crosscheck.calibration.joint_fit.absent import absent_effects
+from crosscheck.calibration.joint_fit.all_effects import Calibration, JointErrors, fit_all_effects
 from crosscheck.errors import CrosscheckError, UnsolvedError
-from crosscheck.fit.contradicted import contradictions
-from crosscheck.fit.prepare import Progress, prepare
+from crosscheck.fit.effects.contradictions import contradictions
+from crosscheck.fit.preparation.prepare import Progress, prepare
+from crosscheck.fit.preparation.thinned import thinned
 from crosscheck.fit.reasons import Reason, Why
-from crosscheck.fit.thinned import thinned
 from crosscheck.fit.words import fitted_records, rms_words
 from crosscheck.given import GivenModel, GivenRobot, basis_of, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from crosscheck.calibration.alternatives import alternatives, shared
-from crosscheck.calibration.equals import EQUAL
-from crosscheck.calibration.exact import Refit
-from crosscheck.calibration.judgement import Judgement
-from crosscheck.calibration.robust import outliers
+from crosscheck.calibration.judgement.alternatives import alternatives, shared
+from crosscheck.calibration.judgement.verdict import Judgement
+from crosscheck.calibration.noise.robust import outliers
 from crosscheck.calibration.search import SetSearch
-from crosscheck.calibration.sets import Names
+from crosscheck.calibration.sets.equals import EQUAL
+from crosscheck.calibration.sets.exact import Refit
+from crosscheck.calibration.sets.linear_search import Names
 from crosscheck.diagnosis.advice import check_of
 from crosscheck.diagnosis.chances import PROBABLE, Chances, chances_of
 from crosscheck.diagnosis.common_part import common_part
@@ -36,8 +36,8 @@ from crosscheck.diagnosis.words import (
     size_notes,
     words_of,
 )
-from crosscheck.fit.candidates import Candidate
-from crosscheck.fit.problem import rms_by_kind
+from crosscheck.fit.effects.candidates import Candidate
+from crosscheck.fit.least_squares.problem import rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.words import rms_words
 from seecr.counted import counted
@@ -154,7 +154,7 @@ def _noise_notes(sought: SetSearch) -> list[str]:
 
 def _size_notes(sought: SetSearch) -> list[str]:
     terms = sought.found.best.joint.terms
-    return size_notes(terms[name] for name in sorted(sought.judgement.doubted))
+    return size_notes(terms[name] for name in sorted(sought.judgement.implausible))
 
 
 def _sentence(

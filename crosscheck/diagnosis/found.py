@@ -6,9 +6,9 @@ import numpy as np
 
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.steps import shown_stages
-from crosscheck.fit.gauss_newton import Fit
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.effects.systematic import moved_by_others
 from crosscheck.fit.reasons import DiagnosisVerdict
-from crosscheck.fit.systematic import moved_by_others
 from crosscheck.model.fitted import Fitted
 from seecr.pose import Array
 from seecr.prediction.model import Model

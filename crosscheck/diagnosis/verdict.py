@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from crosscheck.calibration.judgement import SURE, too_large
+from crosscheck.calibration.judgement.verdict import SURE, too_large
 from crosscheck.calibration.search import search_sets
 from crosscheck.diagnosis.chances import PROBABLE
-from crosscheck.diagnosis.doubtful import doubtful_values
+from crosscheck.diagnosis.contradicted import contradicted_values
 from crosscheck.diagnosis.explained import explained
 from crosscheck.diagnosis.found import found_effects
 from crosscheck.diagnosis.importance import weighed
@@ -20,15 +20,15 @@ from crosscheck.diagnosis.settled import settled
 from crosscheck.diagnosis.stepwise import by_steps
 from crosscheck.diagnosis.unexplained import beside_imitated, unexplained
 from crosscheck.diagnosis.words import size_notes
-from crosscheck.fit.candidates import candidates_for, null_fit
-from crosscheck.fit.contradicted import contradictions
-from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.possible import hardly_happens
-from crosscheck.fit.prepare import Prepared, Progress, noise_floor, prepare
-from crosscheck.fit.problem import Problem, Rms, kinds_read, kinds_stated, rms_by_kind
+from crosscheck.fit.effects.candidates import candidates_for, null_fit
+from crosscheck.fit.effects.contradictions import contradictions
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.effects.possible import hardly_happens
+from crosscheck.fit.least_squares.problem import Problem, Rms, kinds_read, kinds_stated, rms_by_kind
+from crosscheck.fit.noise.tolerance import HALF_THE_NOISE, Tolerance
+from crosscheck.fit.preparation.prepare import Prepared, Progress, noise_floor, prepare
+from crosscheck.fit.preparation.thinned import thinned
 from crosscheck.fit.reasons import DiagnosisVerdict, Refusal, Unfit, Why
-from crosscheck.fit.thinned import thinned
-from crosscheck.fit.tolerance import HALF_THE_NOISE, Tolerance
 from crosscheck.fit.words import rms_words
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
@@ -91,7 +91,7 @@ def diagnose(
             return replace(no_verdict(ready.problem, base, found.notes, rows), sight=found.sight)
         others = thin.note_on_others(found.search.last.fit.terms, found.search.problem.sigma)
         against = contradictions(one.term for one in found_effects(found))
-        doubts = doubtful_values(found)
+        doubts = contradicted_values(found)
         return replace(found, notes=(*against, *doubts, *found.notes, *others))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from crosscheck.diagnosis.chances import PROBABLE, Chances
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
-from crosscheck.fit.possible import largest_size
+from crosscheck.fit.effects.possible import largest_size
 from crosscheck.fit.reasons import DiagnosisVerdict, probability_words
 from seecr.counted import counted
 from seecr.effects import Term

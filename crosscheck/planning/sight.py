@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.reasons import Reason, Why
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.result import Visible

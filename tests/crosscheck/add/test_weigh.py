@@ -12,8 +12,8 @@ from made_diagnoses import POINTS, SIGMA, readings, robot
 import crosscheck.add.fit
 from crosscheck.add import add_effect, add_effects, weigh
 from crosscheck.errors import CrosscheckError, UnsolvedError
-from crosscheck.fit.gauss_newton import fit
-from crosscheck.fit.prepare import prepare
+from crosscheck.fit.effects.gauss_newton import fit
+from crosscheck.fit.preparation.prepare import prepare
 from crosscheck.terminal.addition import why_not
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path

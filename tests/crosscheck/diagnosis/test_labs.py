@@ -16,9 +16,9 @@ import pytest
 
 from crosscheck import calibrate, diagnose
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.fit.problem import Problem, rms_by_kind
+from crosscheck.fit.least_squares.problem import Problem, rms_by_kind
+from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.fit.reasons import DiagnosisVerdict
-from crosscheck.fit.state import evaluate
 from crosscheck.measurements.read import load_measurements
 from seecr.description.mjcf import load_robot
 from seecr.effects import Terms, catalogue

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 from written_pages import figures_of, text_of
 
-from crosscheck.calibration.imitated import Imitated
+from crosscheck.calibration.unknown.imitated import Imitated
 from crosscheck.diagnosis.result import Diagnosis, NotListed
 from crosscheck.diagnosis.steps import (
     by_block,
@@ -30,9 +30,9 @@ from crosscheck.diagnosis.steps import (
     views_of,
 )
 from crosscheck.diagnosis.words import OTHERS_WITHIN, WITHIN, removed
-from crosscheck.fit.candidates import Candidate
-from crosscheck.fit.imitation import imitated
-from crosscheck.fit.problem import KINDS
+from crosscheck.fit.effects.candidates import Candidate
+from crosscheck.fit.least_squares.imitation import imitated
+from crosscheck.fit.least_squares.problem import KINDS
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.report import where, write_page
 from crosscheck.report.cables import Wall, draw_wall, length_changes, walls_of
