@@ -14,13 +14,14 @@ from crosscheck.diagnosis.result import MissingEffect
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.planning.adding import Extension
+from crosscheck.planning.deciding import telling_models_apart
 from crosscheck.planning.extensions import extensions
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.proposer import Gain, Suggestion, telling_apart
 from crosscheck.planning.words import signal_words
 from crosscheck.units import in_unit, parameter_name
 from seecr.description.robot import Robot
-from seecr.effects import Term, catalogue
+from seecr.effects import Term, Terms, catalogue
 from seecr.pose import Array, rotvec_from_quat
 from seecr.units import with_error
 
@@ -124,12 +125,16 @@ _ALL_AT_ONCE = (
 )
 
 
+NO_OTHERS: Mapping[Names, Terms] = {}
+_WHICH = "to find out which effects are missing:"
+
+
 def measure_next(
     found: Search,
     missing: Sequence[MissingEffect],
     verdict: DiagnosisVerdict,
     where: Sequence[Association],
-    alternatives: Sequence[Names] = (),
+    alternatives: Mapping[Names, Terms] = NO_OTHERS,
     seen: Sequence[Varying] = (),
 ) -> list[str]:
     """What to measure to tell effects apart, confirm or find them, a sentence each.
@@ -137,12 +142,13 @@ def measure_next(
     Args:
         found: the search that leads to what is missing.
         missing, verdict, where: as in the diagnosis.
-        alternatives: sets of effects of which one is missing.
+        alternatives: sets of effects of which one is missing, with the model that has it.
         seen: what something unknown may change, if effects imitate it.
     """
     out = []
     plan = Planned(found.problem, found.last.fit, found.factor, Reads.of(found.problem.data))
-    options = list(extensions(plan)) if any(effect.rivals for effect in missing) else []
+    is_open = any(effect.rivals for effect in missing) or len(alternatives) > 1
+    options = list(extensions(plan)) if is_open else []
     for effect in missing:
         out += _to_separate(plan, options, effect)
         if not effect.rivals:
@@ -150,7 +156,9 @@ def measure_next(
         if effect.common is not None:
             out.append(effect.common.advice)
     if len(alternatives) > 1 or (alternatives and verdict is DiagnosisVerdict.MANY_EFFECTS):
-        out += _to_decide(alternatives)
+        ways = telling_models_apart(plan, options, list(alternatives.values()))
+        out += [f"{_WHICH} {way.words} {_signal({'': way.gains[0]})}" for way in ways[:_MOST_WAYS]]
+        out += _to_decide(list(alternatives))
     if verdict is DiagnosisVerdict.MANY_EFFECTS:
         out.append(_CALIBRATE)
     if verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
@@ -165,8 +173,7 @@ def _to_decide(alternatives: Sequence[Names]) -> list[str]:
     """Checks by hand of effects that some of the sets have and not all; of all if it is one set."""
     every, always = frozenset().union(*alternatives), frozenset.intersection(*alternatives)
     return [
-        f"to find out which effects are missing: {measured_directly(name)} ({name})"
-        for name in sorted(every - always or every)
+        f"{_WHICH} {measured_directly(name)} ({name})" for name in sorted(every - always or every)
     ]
 
 

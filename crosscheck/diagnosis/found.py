@@ -65,14 +65,15 @@ def _differs(new: Array, old: Array) -> bool:
 
 
 def _widened(found: Diagnosis) -> float:
-    """Factor by which standard errors of listed effects exceed those of the fit."""
-    best = shown_stages(found)[1].step.fit
+    """Factor by which standard errors of all listed effects exceed those of the fit."""
+    if found.verdict is DiagnosisVerdict.MANY_EFFECTS:
+        return 1.0
+    best, factors = shown_stages(found)[1].step.fit, list[float]()
     for one in found.missing:
         own = best.stderr[best.terms.part(one.term.name)]
         seen = np.isfinite(own) & (own > 0.0) & np.isfinite(one.stderr)
-        if found.verdict is not DiagnosisVerdict.MANY_EFFECTS and seen.any():
-            return float(one.stderr[seen][0] / own[seen][0])
-    return 1.0
+        factors += (one.stderr[seen] / own[seen]).tolist()
+    return min(factors, default=1.0)
 
 
 def found_covariance(found: Diagnosis) -> Array | None:
@@ -85,5 +86,9 @@ def found_covariance(found: Diagnosis) -> Array | None:
     best, effects = shown_stages(found)[1].step.fit, found_effects(found)
     every = np.arange(len(best.terms))
     order = np.concatenate([every[best.terms.part(one.term.name)] for one in effects])
-    whole = best.with_idle(_widened(found) ** 2 * best.covariance)
-    return np.asarray(whole[np.ix_(order, order)])
+    whole = best.with_idle(_widened(found) ** 2 * best.covariance)[np.ix_(order, order)]
+    # some are wider still, by what a further effect would do to them
+    listed = np.concatenate([one.stderr for one in effects]) ** 2
+    seen = np.isfinite(listed) & np.isfinite(np.diag(whole))
+    whole[np.diag_indices_from(whole)] += np.where(seen, listed - np.diag(whole), 0.0).clip(0.0)
+    return np.asarray(whole)

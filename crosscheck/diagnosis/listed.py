@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from crosscheck.calibration.sets.equals import SMALL
 from crosscheck.calibration.sets.linear_search import Names
 from crosscheck.comparison.associations import Association
-from crosscheck.diagnosis.advice import check_of, measure_next
+from crosscheck.diagnosis.advice import NO_OTHERS, check_of, measure_next
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.common_part import common_part
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect, NotListed
@@ -20,6 +22,8 @@ from crosscheck.fit.effects.candidates import Candidate
 from crosscheck.fit.least_squares.problem import Rms, rms_by_kind
 from crosscheck.fit.noise.unstated import overestimated
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
+from seecr.effects import Terms
+from seecr.pose import Array
 
 
 def diagnosis_of(
@@ -35,7 +39,7 @@ def diagnosis_of(
     chances: Chances,
     shown: Search | None = None,
     where: tuple[Association, ...] = (),
-    alternatives: Sequence[Names] = (),
+    alternatives: Mapping[Names, Terms] = NO_OTHERS,
 ) -> Diagnosis:
     """A diagnosis with the steps that lead to it.
 
@@ -44,7 +48,7 @@ def diagnosis_of(
             diagnosis.
         search: steps from the model as it stands to what is kept.
         shown: the steps whose errors are shown, if ``search`` leads to more than is listed.
-        alternatives: sets of effects of which one is missing.
+        alternatives: sets of effects of which one is missing, with the model that has it.
     """
     last = (search if shown is None else shown).last
     after = rms_by_kind(search.problem, last.fit.state.raw)
@@ -88,7 +92,11 @@ def _with_equals(
 
 
 def missing_of(
-    found: Search, name: str, chances: Chances, rivals: Sequence[Rival] | None = None
+    found: Search,
+    name: str,
+    chances: Chances,
+    rivals: Sequence[Rival] | None = None,
+    spread: Array | None = None,
 ) -> MissingEffect:
     """An effect that the search found, with what adding it does.
 
@@ -96,12 +104,14 @@ def missing_of(
         found: the search. name: name of the effect.
         chances: probabilities of all effects.
         rivals: effects that cannot be told from it; if not given, they are searched.
+        spread: (p,) further standard deviation of the values of the last model, if any.
     """
     best = found.last.fit
     term, part = best.terms[name], best.terms.part(name)
     index = 1 + found.found.index(name)
     before, step = found.steps[index - 1], found.steps[index]
     stderr = best.stderr[part] * found.last.whiteness.inflation
+    stderr = stderr if spread is None else np.hypot(stderr, spread[part])
     return MissingEffect(
         term=term,
         stderr=stderr,

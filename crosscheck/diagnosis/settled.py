@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from crosscheck.calibration.judgement.verdict import SURE
+from crosscheck.diagnosis.averaged import spread_by_others
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.exchanged_effects import exchanged, replaced
 from crosscheck.diagnosis.listed import diagnosis_of, missing_of, not_listed
@@ -43,7 +44,8 @@ def settled(
     kept = _sure_part(found, chances)
     if kept is not found:
         rivals = _all_rivals(kept, told)
-    missing = [missing_of(kept, name, chances, rivals[name]) for name in kept.found]
+    spread = spread_by_others(kept.problem, kept.last.fit, chances)
+    missing = [missing_of(kept, name, chances, rivals[name], spread) for name in kept.found]
     hints = hints_of(chances, kept.found, found.found)
     verdict, sentence = DiagnosisVerdict.NO_EFFECT_MISSING, agreement_words(found.tried, hints)
     if missing:

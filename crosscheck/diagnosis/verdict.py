@@ -15,6 +15,7 @@ from crosscheck.diagnosis.contradicted import contradicted_values
 from crosscheck.diagnosis.explained import explained
 from crosscheck.diagnosis.found import found_effects
 from crosscheck.diagnosis.importance import weighed
+from crosscheck.diagnosis.pairs import pairs_instead
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.settled import settled
 from crosscheck.diagnosis.stepwise import by_steps
@@ -169,15 +170,17 @@ def _searched(
     """The diagnosis of data that are fit for one."""
     problem = ready.problem
     found, more = by_steps(problem, base, factor, _part(progress, 0.0, 0.5))
-    if found.last.whiteness.is_noise and kinds_stated(problem) == kinds_read(problem):
+    pairs = pairs_instead(found)
+    if not pairs and found.last.whiteness.is_noise and kinds_stated(problem) == kinds_read(problem):
         steps = settled(found, (*notes, *more), lambda text: progress(text, 0.5))
         if is_clear(steps):
             large = [e.term for e in steps.missing if hardly_happens(e.term)]
             return replace(steps, notes=(*steps.notes, *size_notes(large)))
-    # The steps do not end with stated noise, or leave something open: an effect is not sure, or the
-    # noise is autocorrelated, larger than stated (perhaps by a few outliers), or estimated from
-    # what may be an effect. So all effects are fitted at once, and sets of them compared.
-    given = [step.fit.terms for step in found.steps[1:]]
+    # The steps do not end with stated noise, or leave something open: an effect is not sure, two
+    # others explain as much, or the noise is autocorrelated, larger than stated (perhaps by a few
+    # outliers), or estimated from what may be an effect. So all effects are fitted at once, and
+    # sets of them compared.
+    given = [*pairs, *(step.fit.terms for step in found.steps[1:])]
     sought = search_sets(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0), given)
     said = sought.judgement
     if said.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT or said.imitated is not None:

@@ -7,6 +7,8 @@ linearised about the fit, and those that explain most of the remainder tell how 
 
 from __future__ import annotations
 
+from collections.abc import Container
+
 import numpy as np
 
 from crosscheck.fit.effects.candidates import candidates_for
@@ -33,20 +35,32 @@ def moved_by_others(problem: Problem, found: Fit) -> Array:
         (p,) the largest move among such effects, in the values' units; 0 for values that are fixed
         or on a bound.
     """
-    falls, moves = [], []
+    every = moves_by_effect(problem, found).values()
+    most = max((fall for fall, _move in every), default=0.0)
+    some = [move for fall, move in every if fall > _PART_OF_BEST * most > 0.0]
+    return np.max(np.abs(some), axis=0) if some else np.zeros(len(found.terms))
+
+
+def moves_by_effect(
+    problem: Problem, found: Fit, names: Container[str] | None = None
+) -> dict[str, tuple[float, Array]]:
+    """Fall of chi2, and moves (p,) of the values in their units, as each effect is added.
+
+    Args:
+        problem: the data. found: a fit.
+        names: of the effects that are asked; by default all that the model does not have.
+    """
+    out = {}
     for candidate in candidates_for(problem):
         layout = candidate.layout
-        if candidate.why_not is not None or layout.name in found.terms:
+        asked = names is None or layout.name in names
+        if not asked or candidate.why_not is not None or layout.name in found.terms:
             continue
         for shape in layout.effect.shapes(found.state.prediction.setup)[:1]:
             columns = amplitude_columns(problem, found, layout, layout.start(shape)) * layout.scale
             fall, move = _with_columns(found, columns)
-            falls.append(fall)
-            moves.append(move)
-    most = max(falls, default=0.0)
-    some = [m for f, m in zip(falls, moves, strict=True) if f > _PART_OF_BEST * most > 0.0]
-    largest = np.max(np.abs(some), axis=0) if some else np.zeros(len(found.terms))
-    return np.asarray(largest * found.terms.scale)
+            out[layout.name] = fall, move * found.terms.scale
+    return out
 
 
 def _with_columns(found: Fit, columns: Array) -> tuple[float, Array]:

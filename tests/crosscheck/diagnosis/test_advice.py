@@ -19,7 +19,7 @@ from crosscheck.diagnosis.search import Search, search
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.planning.adding import Adding
 from crosscheck.planning.proposer import Gain, Suggestion
-from seecr.effects import Term, catalogue, layout_of
+from seecr.effects import Term, Terms, catalogue, layout_of
 
 
 @pytest.fixture(scope="module")
@@ -126,15 +126,17 @@ def test_without_a_lead_the_same_poses_are_repeated(found: Search) -> None:
 def test_where_it_is_open_which_effects_it_is_what_is_not_common_is_checked_by_hand(
     found: Search,
 ) -> None:
-    either = [frozenset({"gravity_tilt", "stiffness"}), frozenset({"drum_gain", "stiffness"})]
+    names = ("gravity_tilt", "stiffness"), ("drum_gain", "stiffness")
+    either = {frozenset(both): Terms() for both in names}  # models that nothing tells apart
     *checks, _calibrate = measure_next(found, [], DiagnosisVerdict.MANY_EFFECTS, (), either)
     assert checks == [
         f"to find out which effects are missing: {measured_directly(name)} ({name})"
         for name in ("drum_gain", "gravity_tilt")
     ]
-    *checks, _calibrate = measure_next(found, [], DiagnosisVerdict.MANY_EFFECTS, (), either[:1])
+    one = dict(list(either.items())[:1])
+    *checks, _calibrate = measure_next(found, [], DiagnosisVerdict.MANY_EFFECTS, (), one)
     assert [check.split()[-1] for check in checks] == ["(gravity_tilt)", "(stiffness)"]
-    assert measure_next(found, [], DiagnosisVerdict.MANY_EFFECTS, (), []) == [_calibrate]
+    assert measure_next(found, [], DiagnosisVerdict.MANY_EFFECTS, ()) == [_calibrate]
 
 
 def test_where_nothing_is_missing_the_plan_is_named(found: Search) -> None:
