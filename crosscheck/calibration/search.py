@@ -18,7 +18,7 @@ from crosscheck.calibration.judgement.probability import (
 )
 from crosscheck.calibration.judgement.replaceable import Replaced
 from crosscheck.calibration.judgement.sure_together import sure_together
-from crosscheck.calibration.judgement.verdict import NOTHING, Judgement, judge
+from crosscheck.calibration.judgement.verdict import NOTHING, Judgement, SignsOfUnknown, judge
 from crosscheck.calibration.sets.catalogue import Catalogue
 from crosscheck.calibration.sets.equals import EQUAL, parameters_counted
 from crosscheck.calibration.sets.exact import FEW, Refit
@@ -97,10 +97,11 @@ def search_sets(
     in_place = field_in_place(setting, best.joint, best.widths, found.scores)
     classes = _classes(found, best.names, sizes)
     beside = unknown_beside(setting, best.joint, all_stated(problem, stated)).odds
-    said = judge(
-        found, classes, odds, every.surprise, every.not_noise, _implausible(found), beside,
-        in_place, without, lambda: field_beside(setting, best.joint, best.widths, found.scores),
+    signs = SignsOfUnknown(
+        odds, every.surprise, every.not_noise, beside, in_place,
+        lambda: field_beside(setting, best.joint, best.widths, found.scores),
     )  # fmt: skip
+    said = judge(found, classes, signs, _implausible(found), without)
     said = said.without(nothing_by_themselves(setting, found, said))
     if said.verdict is DiagnosisVerdict.MANY_EFFECTS and said.sure:
 
