@@ -16,7 +16,7 @@ from crosscheck.fit.effects.gauss_newton import Fit, fit
 from crosscheck.fit.least_squares.known import firmer
 from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.least_squares.state import State
-from crosscheck.fit.noise.outliers import outlying_rows
+from crosscheck.fit.noise.outliers import outlying_rows, without_outliers
 from crosscheck.fit.preparation.prepare import Progress, prepare
 from crosscheck.fit.reasons import Why
 from crosscheck.given import GivenModel, GivenRobot, basis_of, model_of, robot_of
@@ -130,7 +130,9 @@ def _added(
     factor = problem.noise(problem.experiment.predict(terms.effects))
     best = fitter(problem, terms, factor)
     progress("looking for outliers", 0.4)
-    cleaned, best = _without_outliers(problem, best, lambda some: fitter(some, terms, factor))
+    cleaned, best = _fitted_without_outliers(
+        problem, best, lambda some: fitter(some, terms, factor)
+    )
     notes += cleaned.left_out[len(problem.left_out) :]
     problem = cleaned
     firmness = _firmness(problem, best)
@@ -143,7 +145,7 @@ def _added(
     return weigh(problem, before, names, factor, best, notes, basis_of(model, robot), firmness)
 
 
-def _without_outliers(
+def _fitted_without_outliers(
     problem: Problem, best: Fit, again: Callable[[Problem], Fit]
 ) -> tuple[Problem, Fit]:
     """The problem without isolated outliers, and the fit to the rest of its rows.
@@ -158,7 +160,7 @@ def _without_outliers(
         if not more.any():
             break
         out |= more
-        cleaned = problem.without(out, f"{problem.data.lines_of(out)} left out as outliers")
+        cleaned = without_outliers(problem, out)
         best = again(cleaned)
     return cleaned, best
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from crosscheck.calibration.compared import all_stated, fit_and_compare
 from crosscheck.calibration.joint_fit.all_effects import PLAIN, Calibration, covariance
-from crosscheck.calibration.joint_fit.joint import Setting
+from crosscheck.calibration.joint_fit.joint import JointFit, Setting
 from crosscheck.calibration.joint_fit.linearised import free_of
 from crosscheck.calibration.joint_fit.stages import Progress
 from crosscheck.calibration.judgement.probability import (
@@ -18,13 +18,13 @@ from crosscheck.calibration.judgement.probability import (
 )
 from crosscheck.calibration.judgement.replaceable import Replaced
 from crosscheck.calibration.judgement.sure_together import sure_together
-from crosscheck.calibration.judgement.verdict import NOTHING, Judgement, judge
+from crosscheck.calibration.judgement.verdict import NOTHING, Judgement, SignsOfUnknown, judge
 from crosscheck.calibration.sets.catalogue import Catalogue
 from crosscheck.calibration.sets.equals import EQUAL, parameters_counted
 from crosscheck.calibration.sets.exact import FEW, Refit
 from crosscheck.calibration.sets.linear_search import Names
 from crosscheck.calibration.sets.refits import ComparedSets
-from crosscheck.calibration.unknown.beside import unknown_beside
+from crosscheck.calibration.unknown.beside import UnknownOdds, unknown_beside
 from crosscheck.calibration.unknown.detectable import detectable_size
 from crosscheck.calibration.unknown.imitated import Imitated, field_beside, field_in_place
 from crosscheck.calibration.unknown.varying import Varying
@@ -89,52 +89,93 @@ def search_sets(
             too.
     """
     every = fit_and_compare(problem, stated, terms, progress, given)
-    whole, catalogue, found, unknown = every.whole, every.catalogue, every.found, every.unknown
-    setting, joint, odds, without = whole.setting, whole.joint, unknown.odds, every.without
-    effects = [n for n in catalogue.names if n not in terms]
-    sizes = {name: parameters_counted(catalogue.start(name).layout) for name in effects}
-    best = found.best
+    found, best, setting = every.found, every.found.best, every.whole.setting
+    sizes = _sizes(every.catalogue, terms)
     in_place = field_in_place(setting, best.joint, best.widths, found.scores)
-    classes = _classes(found, best.names, sizes)
-    beside = unknown_beside(setting, best.joint, all_stated(problem, stated)).odds
-    said = judge(
-        found, classes, odds, every.surprise, every.not_noise, _implausible(found), beside,
-        in_place, without, lambda: field_beside(setting, best.joint, best.widths, found.scores),
+    by_sets = _classes(found, best.names, sizes)
+    signs = SignsOfUnknown(
+        every.unknown.odds, every.surprise, every.not_noise,
+        unknown_beside(setting, best.joint, all_stated(problem, stated)).odds,
+        in_place, lambda: field_beside(setting, best.joint, best.widths, found.scores),
     )  # fmt: skip
-    said = said.without(nothing_by_themselves(setting, found, said))
-    if said.verdict is DiagnosisVerdict.MANY_EFFECTS and said.sure:
-
-        def possible(refit: Refit) -> bool:
-            return can_be(problem.robot, refit.joint.terms, terms)
-
-        others = Replaced(found, sizes.__getitem__, possible)
-        others.try_without(said.sure, classes)
-        classes = _classes(found, best.names, sizes, others.scores)
-        said = said.replacing(frozenset(others.replaceable))
-    listed = found.always | set(said.sure)
-    alone = found.refit(listed) if said.verdict is DiagnosisVerdict.EFFECTS_FOUND else None
-    if alone is not None and listed != best.names:
-        # find what is equivalent to the listed effects, not to members of a larger set
-        further = {
-            **with_equivalents(found, listed, classes, problem.robot, terms),
-            listed: alone.score,
-        }
-        classes = _classes(found, listed, sizes, further)
-    classes = classes.at_most(best.names, without)
-    if said.imitated is not None:
-        odds = max(odds, in_place.odds)
-        classes = classes.without(in_place.replaced, in_place.chance)
+    judged = judge(found, by_sets, signs, _implausible(found), every.without)
+    seen = judged.without(nothing_by_themselves(setting, found, judged))
+    if seen.verdict is DiagnosisVerdict.MANY_EFFECTS and seen.sure:
+        said, classes = _with_replaceable(found, seen, by_sets, sizes, problem.robot, terms)
+    else:
+        said, classes = seen, _about_listed(found, seen, by_sets, sizes, problem.robot, terms)
     # what outweighs something unknown is there, however much of its worth that could take
     outdone = _outdone(found, in_place) - set(() if said.imitated else said.sure)
-    classes = classes.without(outdone, in_place.chance)
-    free = free_of(joint)
-    # no size is stated if something may have been absorbed: one of that size would have shown
-    shown = None if said.more or said.imitated else detectable_size(
-        setting, joint, joint.jacobian * free, joint.width * free
+    return SetSearch(
+        every.whole, found, every.catalogue,
+        _less_unknown(classes.at_most(best.names, every.without), said, in_place, outdone),
+        every.unknown.odds if said.imitated is None else max(every.unknown.odds, in_place.odds),
+        _size_shown(setting, every.whole.joint, said), said, in_place,
+        _varying(every.unknown, in_place), outdone,
     )  # fmt: skip
-    in_time = unknown.likeliest
-    varies = (in_time,) if in_time else in_place.seen if in_place.chance else ()
-    return SetSearch(whole, found, catalogue, classes, odds, shown, said, in_place, varies, outdone)
+
+
+def _sizes(catalogue: Catalogue, terms: Terms) -> dict[str, int]:
+    """Of each effect that the model does not have, the number of parameters that counts."""
+    names = [name for name in catalogue.names if name not in terms]
+    return {name: parameters_counted(catalogue.start(name).layout) for name in names}
+
+
+def _with_replaceable(
+    found: ComparedSets, said: Judgement, classes: Classes, sizes: Mapping[str, int],
+    robot: Robot, stood: Terms,
+) -> tuple[Judgement, Classes]:  # fmt: skip
+    """The judgement of a large set after each sure effect was excluded, and the probabilities."""
+
+    def possible(refit: Refit) -> bool:
+        return can_be(robot, refit.joint.terms, stood)
+
+    others = Replaced(found, sizes.__getitem__, possible)
+    others.try_without(said.sure, classes)
+    replaceable = frozenset(others.replaceable)
+    return said.replacing(replaceable), _classes(found, found.best.names, sizes, others.scores)
+
+
+def _about_listed(
+    found: ComparedSets, said: Judgement, classes: Classes, sizes: Mapping[str, int],
+    robot: Robot, stood: Terms,
+) -> Classes:  # fmt: skip
+    """Probabilities with what is equivalent to the listed effects, not to members of a larger set.
+
+    Those of the best set remain where it is listed itself, or where nothing is.
+    """
+    listed = found.always | set(said.sure)
+    alone = found.refit(listed) if said.verdict is DiagnosisVerdict.EFFECTS_FOUND else None
+    if alone is None or listed == found.best.names:
+        return classes
+    further = with_equivalents(found, listed, classes, robot, stood)
+    return _classes(found, listed, sizes, {**further, listed: alone.score})
+
+
+def _less_unknown(classes: Classes, said: Judgement, in_place: Imitated, outdone: Names) -> Classes:
+    """The probabilities if something unknown may explain what some members explain."""
+    if said.imitated is None:
+        return classes.without(outdone, in_place.chance)
+    kept = classes.without(in_place.replaced, in_place.chance)
+    return kept.without(outdone, in_place.chance)
+
+
+def _size_shown(setting: Setting, joint: JointFit, said: Judgement) -> Rms | None:
+    """The size from which on something unknown would have shown.
+
+    None is stated if something may have been absorbed: one of that size would have shown.
+    """
+    if said.more or said.imitated:
+        return None
+    free = free_of(joint)
+    return detectable_size(setting, joint, joint.jacobian * free, joint.width * free)
+
+
+def _varying(unknown: UnknownOdds, in_place: Imitated) -> tuple[Varying, ...]:
+    """What something unknown changes in time beside all effects, else in place of some."""
+    if unknown.likeliest:
+        return (unknown.likeliest,)
+    return in_place.seen if in_place.chance else ()
 
 
 def _outdone(found: ComparedSets, in_place: Imitated) -> Names:

@@ -11,12 +11,11 @@ import click
 
 from crosscheck.cli.choices import grown_model_option, result_in, sigma_option
 from crosscheck.cli.following import Given, after_fit
+from crosscheck.cli.grown import keep_grown, model_or_new
 from seecr.cli.options import FILE, json_option, made_by, progress_share
 
 if TYPE_CHECKING:
-    from crosscheck import Addition
     from seecr import Model
-    from seecr.made import Made
 
 
 @click.command(
@@ -74,10 +73,10 @@ def command(
     Exit status: 0 added, 1 not added because it is not worth adding, 2 bad input, 3 rows without an
     equilibrium or a fit that does not converge.
     """
-    from crosscheck import add_effect, add_effects, load_measurements, save_model
+    from crosscheck import add_effect, add_effects, load_measurements
     from crosscheck.measurements.stated import with_stated
     from crosscheck.model import check_place, load_diagnosed
-    from seecr import load_model, load_robot, new_model
+    from seecr import load_robot
     from seecr.effects import effect_named
 
     _check_not_both(words, all_from)
@@ -89,7 +88,7 @@ def command(
     machine = load_robot(robot)
     listed, said = load_diagnosed(all_from, machine) if all_from is not None else ((), ())
     names = [effect] if effect is not None else [term.name for term in listed]
-    old = load_model(model, machine) if model.exists() else new_model(machine)
+    old = model_or_new(model, machine)
     for name in names:
         _check_names(old, name, refit, model)
     measured = with_stated(load_measurements(data, machine), sigmas)
@@ -103,10 +102,7 @@ def command(
         found = replace(found, notes=(*said, *found.notes))
         written = found.pays or force
         made = made_by(machine.source, *data, all_from, model)  # of the model as it was read
-        text = _text(found, old, model, written, made)
-        keep(text)
-        if written:
-            save_model(model, found.model)
+        text = keep_grown(found, model, written, made, keep, {"model_notes": list(old.notes)})
     if as_json:
         click.echo(text)
     else:
@@ -157,10 +153,3 @@ def _check_names(old: Model, effect: str, refit: bool, path: Path) -> None:
         raise CrosscheckError(
             f"{path}: {effect} is fixed and never fitted; take out fixed = true to fit it again"
         )
-
-
-def _text(found: Addition, old: Model, model: Path, written: bool, made: Made) -> str:
-    from seecr.files import json_text
-
-    document = {"made": made, "written": written, "model": str(model), **found.as_json()}
-    return json_text({**document, "model_notes": list(old.notes)})

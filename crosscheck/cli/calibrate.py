@@ -14,6 +14,7 @@ from crosscheck.cli.choices import (
     sigma_option,
 )
 from crosscheck.cli.following import Given, after_fit
+from crosscheck.cli.grown import keep_grown, model_or_new
 from seecr.cli.options import FILE, json_option, made_by, progress_share
 
 
@@ -59,17 +60,16 @@ def command(
     Exit status: 0 written, 1 not written because the prediction of held-out runs does not improve,
     2 bad input, 3 rows without an equilibrium or a fit that does not converge.
     """
-    from crosscheck import calibrate, load_measurements, save_model
+    from crosscheck import calibrate, load_measurements
     from crosscheck.given import considered
     from crosscheck.measurements.stated import with_stated
     from crosscheck.model import check_place
     from crosscheck.terminal import print_calibration
-    from seecr import load_model, load_robot, new_model
-    from seecr.files import json_text
+    from seecr import load_robot
 
     considered(only, exclude)  # a wrong name is told before any file is read
     machine = load_robot(robot)
-    old = load_model(model, machine) if model.exists() else new_model(machine)
+    old = model_or_new(model, machine)
     measured = with_stated(load_measurements(data, machine), sigmas)
     check_place(model)
     with result_in(out, "calibration.json") as keep:
@@ -77,11 +77,7 @@ def command(
             found = calibrate(machine, measured, old, progress, only=only, exclude=exclude)
         written = found.pays or (force and found.settled)
         made = made_by(machine.source, *data, model)  # of the model as it was read
-        document = {"made": made, "written": written, "model": str(model), **found.as_json()}
-        text = json_text(document)
-        keep(text)
-        if written:
-            save_model(model, found.model)
+        text = keep_grown(found, model, written, made, keep)
     if as_json:
         click.echo(text)
     else:

@@ -9,7 +9,7 @@ from crosscheck.fit.effects.candidates import Trials, null_fit
 from crosscheck.fit.effects.gauss_newton import Fit
 from crosscheck.fit.least_squares.known import free_derivatives
 from crosscheck.fit.least_squares.problem import Problem
-from crosscheck.fit.noise.outliers import outlying_rows
+from crosscheck.fit.noise.outliers import outlying_rows, without_outliers
 from crosscheck.fit.noise.whiteness import whiteness
 from crosscheck.fit.preparation.prepare import Progress
 from seecr.pose import Array
@@ -26,7 +26,7 @@ def by_steps(
     """The stepwise search, and notes about what was done to model and data before it."""
     base, refitted = _at_its_best(problem, base, factor)
     found = search(Trials(problem, factor), base, progress)
-    found, outliers = _without_outliers(found, base, progress)
+    found, outliers = _searched_without_outliers(found, base, progress)
     return found, (*refitted, *outliers)
 
 
@@ -44,14 +44,15 @@ def _with_derivatives(problem: Problem, base: Fit) -> Fit:
     return replace(base, derive=lambda: free_derivatives(problem, base.state))
 
 
-def _without_outliers(found: Search, base: Fit, progress: Progress) -> tuple[Search, Notes]:
+def _searched_without_outliers(
+    found: Search, base: Fit, progress: Progress
+) -> tuple[Search, Notes]:
     """Repeat the search without isolated outliers, if there are a few, and name them."""
     problem, state = found.problem, found.last.fit.state
     rows = outlying_rows(problem, state)
     if not rows.any():
         return found, ()
-    note = f"{problem.data.lines_of(rows)} left out as outliers"
-    cleaned = problem.without(rows, note)
+    cleaned = without_outliers(problem, rows)
     kept = ~rows[problem.row_of]
     if whiteness(cleaned, state.white[kept], found.last.evidence.parameters).structured:
         # the other rows are not noise either, so that outliers are part of the unexplained
@@ -60,7 +61,8 @@ def _without_outliers(found: Search, base: Fit, progress: Progress) -> tuple[Sea
     if base.terms:
         again = _with_derivatives(cleaned, again)
     better = search(replace(found.trials, problem=cleaned), again, progress)
-    if better.found != found.found:
-        with_all = ", ".join(found.found) or "nothing"
-        note += f" (with them, the search finds {with_all})"
-    return better, (note,)
+    note = cleaned.left_out[-1]
+    if better.found == found.found:
+        return better, (note,)
+    with_all = ", ".join(found.found) or "nothing"
+    return better, (f"{note} (with them, the search finds {with_all})",)

@@ -10,6 +10,7 @@ import numpy as np
 
 from crosscheck.calibration.joint_fit.joining import (
     PAYS,
+    Promising,
     at_null,
     inside,
     layouts,
@@ -78,35 +79,36 @@ def fit_everything(
     at_once, later = layouts(setting.problem)
     progress("fitting all effects", 0.05)
     start = start_of(setting, terms, Terms(Term(a, a.null) for a in at_once))
-    joint = with_noise(setting, tempered(setting, start, widths_of(start.terms, setting.free)))
-    wanted = [a for a in later if a.name not in terms]
+    first = with_noise(setting, tempered(setting, start, widths_of(start.terms, setting.free)))
     frozen = replace(setting, frozen=True)
     if given is not None:
-        joint = from_given(frozen, joint, start, given)
-    before, joint = joint, with_rows_back(frozen, joint)
-    back = joint
-    if poor(joint):
+        first = from_given(frozen, first, start, given)
+    back = with_rows_back(frozen, first)
+    wanted = [a for a in later if a.name not in terms]
+    alone = back
+    if poor(back):
         progress("trying effects one by one", 0.4)
         firm = [a for a in at_once if a.name not in terms and a.name != TRACKER]
-        joint = _from_alone(frozen, joint, start, terms, (wanted, firm))
+        alone = _from_alone(frozen, back, start, terms, (wanted, firm))
     progress("trying effects with history", 0.6)
-    wanted = [a for a in wanted if a.name not in joint.terms]
-    looked = promising_beside(frozen, joint, wanted)
-    pays = sorted((one for one in looked if one.gain > PAYS), key=lambda one: -one.gain)
-    added = [inside(one.term) for one in pays]
-    if added:
-        progress(f"also fitting {', '.join(t.name for t in added)}", 0.7)
-        joint = _joined(frozen, joint, start.terms, added)
-    if any(a.name in joint.terms for a in later):
-        setting = frozen
-    best = to_its_end(setting, widened(setting, joint))
-    if back is not before or joint is not back:
+    looked = promising_beside(frozen, alone, [a for a in wanted if a.name not in alone.terms])
+    joined = _with_promising(frozen, alone, start.terms, looked, progress)
+    own = frozen if any(a.name in joined.terms for a in later) else setting
+    best = to_its_end(own, widened(own, joined))
+    if back is not first or joined is not back:
         # some rows were no true outliers, or more rows can be explained now
-        best = with_rows_back(setting, best)
-    there = [at_null(best.terms[a.name]) for a in later if a.name in best.terms]
-    others = [one for one in looked if one.term.name not in best.terms]
+        best = with_rows_back(own, best)
+    return _everything(own, best, later, looked)
+
+
+def _everything(
+    setting: Setting, joint: JointFit, later: Sequence[Layout], looked: Sequence[Promising]
+) -> Everything:
+    """The fit, with the effects that join later as they are in it or where they look promising."""
+    there = [at_null(joint.terms[a.name]) for a in later if a.name in joint.terms]
+    others = [one for one in looked if one.term.name not in joint.terms]
     prices = {one.term.name: one.price for one in others}
-    return Everything(setting, best, Terms([*there, *(one.term for one in others)]), prices)
+    return Everything(setting, joint, Terms([*there, *(one.term for one in others)]), prices)
 
 
 def poor(joint: JointFit) -> bool:
@@ -234,6 +236,19 @@ def from_given(setting: Setting, joint: JointFit, start: State, given: Terms) ->
         return joint
     other = with_noise(setting, settle(setting, state, width, joint.colour))
     return max(joint, other, key=lambda j: worth(setting, j))
+
+
+def _with_promising(
+    setting: Setting, joint: JointFit, first: Terms, looked: Sequence[Promising],
+    progress: Progress,
+) -> JointFit:  # fmt: skip
+    """The fit with those effects that pay, if any do and are worth it."""
+    pays = sorted((one for one in looked if one.gain > PAYS), key=lambda one: -one.gain)
+    if not pays:
+        return joint
+    added = [inside(one.term) for one in pays]
+    progress(f"also fitting {', '.join(t.name for t in added)}", 0.7)
+    return _joined(setting, joint, first, added)
 
 
 def _joined(setting: Setting, joint: JointFit, first: Terms, added: list[Term]) -> JointFit:

@@ -83,64 +83,111 @@ class Judgement:
         return replace(self.without(some), replaceable=some)
 
 
+@dataclass(frozen=True, eq=False)
+class SignsOfUnknown:
+    """What says that something unknown is at work.
+
+    Attributes:
+        beside_all: ln odds of something unknown beside the whole catalogue.
+        surprise: chi2 per reading of the worst held-out run over what the joint fit expects.
+        not_noise: whether what was taken for noise is not noise.
+        beside_best: ln odds of something unknown beside the best set.
+        in_place: a field in place of some members of the best set.
+        beside_field: computes a field beside the best set; it is asked if one is likely beside all
+            effects.
+    """
+
+    beside_all: float
+    surprise: float
+    not_noise: bool = False
+    beside_best: float = -np.inf
+    in_place: Imitated = NOT_ASKED
+    beside_field: Callable[[], Imitated] = lambda: NOT_ASKED
+
+    @property
+    def are_clear(self) -> bool:
+        """Whether not even all effects together explain the data."""
+        return self.not_noise or self.beside_all > UNKNOWN or self.surprise > SURPRISE
+
+    @property
+    def more(self) -> bool:
+        """Whether something unknown explains more beside the best set."""
+        return self.beside_best > UNKNOWN
+
+
 def judge(
     found: ComparedSets,
     classes: Classes,
-    field_odds: float,
-    surprise: float,
-    not_noise: bool = False,
+    signs: SignsOfUnknown,
     implausible: Names = NONE,
-    beside: float = -np.inf,
-    in_place: Imitated = NOT_ASKED,
     without: Mapping[Names, float] = NOTHING,
-    beside_field: Callable[[], Imitated] = lambda: NOT_ASKED,
 ) -> Judgement:
     """Decide on the verdict.
 
     Args:
         found: the compared sets.
         classes: probabilities of the classes of equivalent effects.
-        field_odds: ln odds of something unknown beside the whole catalogue.
-        surprise: chi2 per reading of the worst held-out run over what the joint fit expects.
-        not_noise: whether what was taken for noise is not noise.
+        signs: of something unknown.
         implausible: members of the best set that are implausibly large.
-        beside: ln odds of something unknown beside the best set.
-        in_place: a field in place of some members of the best set.
         without: how probable it is that groups of its members are noise; that makes them less sure,
             but it does not take many effects.
-        beside_field: computes a field beside the best set; it is asked if one is likely beside all
-            effects.
     """
-    best, undecided = found.best.names - found.always - found.idle, classes.undecided
-    classes = classes.at_most(found.best.names, without)
-    unknown = not_noise or field_odds > UNKNOWN or surprise > SURPRISE
-    sure = sure_effects(found, classes, True)
-    few = len(best) <= _FEW and undecided < (_OPEN_BESIDE if set(sure) == best else _OPEN)
-    more = beside > UNKNOWN
-    large = too_large(_size(found, name) for name in best)
-    few = few and not implausible and not more and not large
-    sure = adequate(found, sure) if few and sure else sure_effects(found, classes, False)
-    sure = tuple(name for name in sure if name not in implausible)
-    if not implausible and not large:
-        sure = tuple(dict.fromkeys([*sure, *in_each(found, classes)]))
-    if more:
-        worth = worths(found)
-        sure = tuple(name for name in carrying_most(found, worth, _MOST) if name in sure)
-    if in_place.chance:
-        # of several members that stay, some may absorb what others explain
-        kept = carrying_most(found, in_place.worth, _ALL)
-        kept = tuple(name for name in kept if name not in implausible)
-        if kept or not unknown:
-            return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, kept, undecided, imitated=in_place)
-    if unknown:  # known effects imitate it: none of them is sure but one that outweighs all else
-        # where no field explains what is unknown, nothing limits what a member may imitate of it
-        field = beside_field() if field_odds > UNKNOWN else NOT_ASKED
-        alone = tuple(n for n in outweighing(found, field) if n not in implausible)
-        return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, alone, undecided)
-    if not sure and not more and undecided < _OPEN and explained_evidence(found) < BY_CHANCE:
+    undecided, likely = classes.undecided, classes.at_most(found.best.names, without)
+    plain = not implausible and not too_large(_size(found, name) for name in _members(found))
+    few = plain and not signs.more and _is_few(found, likely, undecided)
+    named = [name for name in _named(found, likely, few) if name not in implausible]
+    in_all = in_each(found, likely) if plain else ()
+    sure = tuple(dict.fromkeys([*named, *in_all]))
+    if signs.more:
+        sure = tuple(n for n in carrying_most(found, worths(found), _MOST) if n in sure)
+    unknown = _beside_unknown(found, signs, implausible, undecided)
+    if unknown is not None:
+        return unknown
+    is_open = bool(sure) or signs.more or undecided >= _OPEN
+    if not is_open and explained_evidence(found) < BY_CHANCE:
         return Judgement(DiagnosisVerdict.NO_EFFECT_MISSING, (), undecided)
     verdict = DiagnosisVerdict.EFFECTS_FOUND if few and sure else DiagnosisVerdict.MANY_EFFECTS
-    return Judgement(verdict, sure, undecided, implausible, more)
+    return Judgement(verdict, sure, undecided, implausible, signs.more)
+
+
+def _is_few(found: ComparedSets, likely: Classes, undecided: float) -> bool:
+    """Whether the best set has few members, and it is hardly open which they are."""
+    best = _members(found)
+    all_sure = set(sure_effects(found, likely, True)) == best
+    return len(best) <= _FEW and undecided < (_OPEN_BESIDE if all_sure else _OPEN)
+
+
+def _named(found: ComparedSets, likely: Classes, few: bool) -> tuple[str, ...]:
+    """Sure members; of few effects also those that it takes beside them to explain as much."""
+    sure = sure_effects(found, likely, few)
+    if few and sure:
+        return adequate(found, sure)
+    return sure_effects(found, likely, False)
+
+
+def _beside_unknown(
+    found: ComparedSets, signs: SignsOfUnknown, implausible: Names, undecided: float
+) -> Judgement | None:
+    """What is sure where something unknown is at work; None if nothing is."""
+    in_place = signs.in_place
+    if in_place.chance:
+        # of several members that stay, some may absorb what others explain
+        most = carrying_most(found, in_place.worth, _ALL)
+        kept = tuple(name for name in most if name not in implausible)
+        if kept or not signs.are_clear:
+            return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, kept, undecided, imitated=in_place)
+    if not signs.are_clear:
+        return None
+    # known effects imitate it: none of them is sure but one that outweighs all else; where no field
+    # explains what is unknown, nothing limits what a member may imitate of it
+    field = signs.beside_field() if signs.beside_all > UNKNOWN else NOT_ASKED
+    alone = tuple(name for name in outweighing(found, field) if name not in implausible)
+    return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, alone, undecided)
+
+
+def _members(found: ComparedSets) -> Names:
+    """Members of the best set that move something; not those that the model has already."""
+    return found.best.names - found.always - found.idle
 
 
 def in_each(found: ComparedSets, classes: Classes) -> tuple[str, ...]:
@@ -227,10 +274,7 @@ def worths(found: ComparedSets) -> dict[str, float]:
     best = found.best
     linear = found.scores.neighbours(best.names)
     base = found.scores.score(best.names)
-    return {
-        name: _worth(found, linear, base, best.names - {name})
-        for name in best.names - found.always - found.idle
-    }
+    return {name: _worth(found, linear, base, best.names - {name}) for name in _members(found)}
 
 
 def _worth(found: ComparedSets, linear: dict[Names, float], base: float, rest: Names) -> float:

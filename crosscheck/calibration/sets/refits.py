@@ -91,37 +91,61 @@ def compare_sets(
     known = {frozenset(terms.names): terms for terms in given}
     exact = Exact(fixed, joint, catalogue, plain, report, known)
     scores = exact.scores_about(joint)
-    begin, best = frozenset(scores.gram.names) | always, exact.best_of(scores, [always, *known])
+    best = exact.best_of(scores, [always, *known])
+    scores, best = _in_rounds(exact, scores, best, most, rounds)
+    if grow:
+        scores, best = _moved_on(exact, scores, best, grown(exact), most)
+    scores, best = about_given(exact, scores, best, known)
+    scores, best = looked_about(exact, scores, best)
+    scores, best = _moved_on(exact, scores, best, swapped(exact, scores, best), most)
+    scores, best = _challenged(exact, scores, best, most)
+    scores, best = _about_plainer(exact, scores, best)
+    idle = frozenset(n for n in best.names - always if _is_idle(exact, scores, best, n))
+    return ComparedSets(
+        exact.possible, best, scores, lambda names: exact.fit(scores, names), always, idle
+    )
+
+
+def _in_rounds(
+    exact: Exact, scores: Scores, best: Refit, most: int, rounds: int
+) -> tuple[Scores, Refit]:
+    """The best set, sought about itself in turn from all effects on, and the scores about it."""
+    begin = frozenset(scores.gram.names) | scores.always
     for k in range(rounds):
         before, best = best.names, _searched(exact, scores, begin, most)
         if k and before == best.names:
             break
         begin = best.names
         scores = exact.scores_about(best.joint)
-    other = grown(exact) if grow else best
-    if other.names != best.names:
-        scores = exact.scores_about(other.joint)
-        best = _searched(exact, scores, other.names, most)
-    scores, best = about_given(exact, scores, best, known)
-    scores, best = looked_about(exact, scores, best)
-    other = swapped(exact, scores, best)
-    if other.names != best.names:
-        scores = exact.scores_about(other.joint)
-        best = _searched(exact, scores, other.names, most)
+    return scores, best
+
+
+def _moved_on(
+    exact: Exact, scores: Scores, best: Refit, better: Refit, most: int
+) -> tuple[Scores, Refit]:
+    """The best set after a search about one that is better, unless that is the best already."""
+    if better.names == best.names:
+        return scores, best
+    about = exact.scores_about(better.joint)
+    return about, _searched(exact, about, better.names, most)
+
+
+def _challenged(exact: Exact, scores: Scores, best: Refit, most: int) -> tuple[Scores, Refit]:
+    """The best set that stands challenges, or the one after the last of them."""
     for _ in range(_CHALLENGES):
         challenge(exact, scores, best)
-        other = exact.best
-        if other.names == best.names:
+        if exact.best.names == best.names:
             break
-        scores = exact.scores_about(other.joint)
-        best = _searched(exact, scores, other.names, most)
-    other = plainer(exact, best)
-    if other.names != best.names:
-        scores, best = exact.scores_about(other.joint), other
-    idle = frozenset(n for n in best.names - always if _is_idle(exact, scores, best, n))
-    return ComparedSets(
-        exact.possible, best, scores, lambda names: exact.fit(scores, names), always, idle
-    )
+        scores, best = _moved_on(exact, scores, best, exact.best, most)
+    return scores, best
+
+
+def _about_plainer(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Refit]:
+    """The set that :func:`plainer` prefers to the best one, and the scores about it."""
+    preferred = plainer(exact, best)
+    if preferred.names == best.names:
+        return scores, best
+    return exact.scores_about(preferred.joint), preferred
 
 
 def plainer(exact: Exact, best: Refit) -> Refit:

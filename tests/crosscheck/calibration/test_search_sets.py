@@ -12,7 +12,7 @@ from made_data import COGIRO, SIGMA, measured, term
 
 from crosscheck.calibration import compared, search
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting
-from crosscheck.calibration.judgement.verdict import Judgement, judge
+from crosscheck.calibration.judgement.verdict import Judgement, SignsOfUnknown, judge
 from crosscheck.calibration.search import SetSearch, nothing_by_themselves, search_sets
 from crosscheck.calibration.sets import refits
 from crosscheck.calibration.unknown.beside import UnknownOdds
@@ -67,9 +67,10 @@ def test_two_effects_are_named_and_a_field_makes_the_verdict_unknown() -> None:
     assert_a_model_by_itself(found)
     assert_open_which(found)
     assert_not_beyond_doubt(found)
-    unknown = judge(found.found, found.classes, 20.0, 1.0)
+    unknown = judge(found.found, found.classes, SignsOfUnknown(20.0, 1.0))
     assert unknown.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
-    assert judge(found.found, found.classes, -5.0, 9.0).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
+    surprising = judge(found.found, found.classes, SignsOfUnknown(-5.0, 9.0))
+    assert surprising.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
 
 
 def test_structure_beside_all_effects_is_nothing_unknown_if_few_effects_leave_none(

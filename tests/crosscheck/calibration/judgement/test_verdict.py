@@ -13,7 +13,7 @@ import pytest
 from crosscheck.calibration import search
 from crosscheck.calibration.judgement.alternatives import alternatives, shared
 from crosscheck.calibration.judgement.probability import all_scores, probabilities
-from crosscheck.calibration.judgement.verdict import Judgement, judge, too_large
+from crosscheck.calibration.judgement.verdict import Judgement, SignsOfUnknown, judge, too_large
 from crosscheck.calibration.linear_evidence.gram import ColumnGroup, gram_of
 from crosscheck.calibration.search import with_equivalents
 from crosscheck.calibration.sets.exact import Refit
@@ -26,6 +26,8 @@ from seecr.effects import Terms
 NAMES = ("a", "b", "c", "d", "e", "f", "g")
 NO_FIT: Any = None
 LARGE = ColumnGroup(np.array([0, 2, 3, 4]), np.array([1.0]))
+
+NO_SIGNS = SignsOfUnknown(-5.0, 1.0)
 
 
 def found_of(scores: dict[str, float]) -> ComparedSets:
@@ -42,7 +44,7 @@ def found_of(scores: dict[str, float]) -> ComparedSets:
 def judged(scores: dict[str, float], odds: float = -5.0, surprise: float = 1.0) -> Judgement:
     found = found_of(scores)
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
-    return judge(found, classes, odds, surprise)
+    return judge(found, classes, SignsOfUnknown(odds, surprise))
 
 
 def test_none_is_best() -> None:
@@ -63,9 +65,9 @@ def test_one_effect_beyond_doubt() -> None:
 def test_an_effect_that_may_be_noise_is_not_sure_but_nor_does_it_take_many() -> None:
     found = found_of({"": -900.0, "a": -6.0, "b": -800.0, "ab": 0.0})
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
-    sure = judge(found, classes, -5.0, 1.0)
+    sure = judge(found, classes, NO_SIGNS)
     assert (sure.verdict, sure.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a", "b"))
-    said = judge(found, classes, -5.0, 1.0, without={frozenset(): 0.5, frozenset("b"): 0.5})
+    said = judge(found, classes, NO_SIGNS, without={frozenset(): 0.5, frozenset("b"): 0.5})
     assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a",))
     assert said.undecided == sure.undecided
 
@@ -121,9 +123,9 @@ def test_what_is_of_a_size_that_does_not_happen_is_not_sure() -> None:
     """A frame tilted by eleven degrees was listed: what it imitates is something else."""
     found = found_of({"": -900.0, "a": -300.0, "b": -500.0, "ab": 0.0})
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
-    said = judge(found, classes, -5.0, 1.0)
+    said = judge(found, classes, NO_SIGNS)
     assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a", "b"))
-    said = judge(found, classes, -5.0, 1.0, implausible=frozenset("b"))
+    said = judge(found, classes, NO_SIGNS, implausible=frozenset("b"))
     assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ("a",))
 
 
@@ -133,8 +135,8 @@ def test_what_moves_nothing_beside_its_equal_is_not_listed(alone: float) -> None
     scores = {"": -900.0, "ab": 0.0, "a": alone, "b": alone - 0.2}
     found = found_of(scores)
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
-    assert set(judge(found, classes, -5.0, 1.0).sure) == {"a", "b"}
-    said = judge(replace(found, idle=frozenset("b")), classes, -5.0, 1.0)
+    assert set(judge(found, classes, NO_SIGNS).sure) == {"a", "b"}
+    said = judge(replace(found, idle=frozenset("b")), classes, NO_SIGNS)
     assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a",))
 
 
@@ -149,20 +151,20 @@ def test_a_field_beside_the_best_set_alone_makes_it_many() -> None:
     """The whole catalogue takes it in: that can be a calibration, few effects it is not."""
     found = found_of({"": -9000.0, "a": -30.0, "b": -8970.0, "ab": 0.0})
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
-    assert judge(found, classes, -5.0, 1.0, beside=4.0).sure == ("a", "b")
-    said = judge(found, classes, -5.0, 1.0, beside=6.0)
+    assert judge(found, classes, SignsOfUnknown(-5.0, 1.0, beside_best=4.0)).sure == ("a", "b")
+    said = judge(found, classes, SignsOfUnknown(-5.0, 1.0, beside_best=6.0))
     # b, which is worth 30 of 9000, may stand for what a field is
     assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ("a",)) and said.more
     # nor is an effect of many parameters sure then, or one that carries a half
     grown = replace(found.scores.gram, groups={**found.scores.gram.groups, "a": LARGE})
     large = replace(found, scores=replace(found.scores, gram=grown))
-    assert judge(large, classes, -5.0, 1.0, beside=6.0).sure == ()
+    assert judge(large, classes, SignsOfUnknown(-5.0, 1.0, beside_best=6.0)).sure == ()
     halves = found_of({"": -9000.0, "a": -4400.0, "b": -4600.0, "ab": 0.0})
-    assert judge(halves, classes, -5.0, 1.0).sure == ("a", "b")
-    assert judge(halves, classes, -5.0, 1.0, beside=6.0).sure == ("a",)
+    assert judge(halves, classes, NO_SIGNS).sure == ("a", "b")
+    assert judge(halves, classes, SignsOfUnknown(-5.0, 1.0, beside_best=6.0)).sure == ("a",)
     none = found_of({"": 0.0, "a": -4.0})
     classes = probabilities(all_scores(none), none.best.names, NAMES, fitted=none.refits)
-    said = judge(none, classes, 1.0, 1.0, beside=6.0)
+    said = judge(none, classes, SignsOfUnknown(1.0, 1.0, beside_best=6.0))
     assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ())
 
 
@@ -174,7 +176,7 @@ def test_a_field_in_the_place_of_members_is_something_unknown() -> None:
     def said(
         in_place: Imitated, of: ComparedSets = found, implausible: Names = frozenset()
     ) -> Judgement:
-        return judge(of, classes, -5.0, 1.0, implausible=implausible, in_place=in_place)
+        return judge(of, classes, replace(NO_SIGNS, in_place=in_place), implausible)
 
     assert said(here).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     assert (said(here).sure, said(here).imitated) == (("a",), here)
@@ -188,9 +190,11 @@ def test_a_field_in_the_place_of_members_is_something_unknown() -> None:
     assert said(here, implausible=frozenset("a")).sure == ()
     assert said(replace(here, worth={"a": 800.0, "c": 1.0})).sure == ("a",)
     # where runs left out are off, too, nothing is said of what imitates what unless one is sure
-    far = judge(found, classes, -5.0, 9.0, in_place=here)
+    far = judge(found, classes, SignsOfUnknown(-5.0, 9.0, in_place=here))
     assert (far.sure, far.imitated) == (("a",), here)
-    far = judge(found, classes, -5.0, 9.0, in_place=replace(here, worth={"a": 20.0}))
+    far = judge(
+        found, classes, SignsOfUnknown(-5.0, 9.0, in_place=replace(here, worth={"a": 20.0}))
+    )
     assert (far.verdict, far.sure) == (DiagnosisVerdict.UNKNOWN_EFFECT, ())
     assert far.imitated is None
 
@@ -204,7 +208,8 @@ def test_beside_what_all_effects_leave_one_is_sure_that_outweighs_all_else() -> 
     def sure(
         beside: Imitated, of: ComparedSets = found, implausible: Names = frozenset()
     ) -> tuple[str, ...]:
-        said = judge(of, classes, 9.0, 1.0, implausible=implausible, beside_field=lambda: beside)
+        signs = SignsOfUnknown(9.0, 1.0, beside_field=lambda: beside)
+        said = judge(of, classes, signs, implausible)
         assert said.verdict is DiagnosisVerdict.UNKNOWN_EFFECT and said.imitated is None
         return said.sure
 
@@ -221,7 +226,7 @@ def test_beside_what_all_effects_leave_one_is_sure_that_outweighs_all_else() -> 
     assert sure(field, large) == ("a",)
     assert sure(replace(field, worth={"a": 80.0}), large) == ()
     # and if no field explains what is unknown, a may follow it
-    far = judge(found, classes, -5.0, 9.0, beside_field=lambda: field)
+    far = judge(found, classes, SignsOfUnknown(-5.0, 9.0, beside_field=lambda: field))
     assert (far.verdict, far.sure) == (DiagnosisVerdict.UNKNOWN_EFFECT, ())
 
 
@@ -230,7 +235,7 @@ def test_a_large_set_of_large_groups_is_a_calibration() -> None:
     best = {"": -9000.0, "ab": -4000.0, "ac": -4100.0, "bc": -4200.0, "abc": 0.0}
     found = found_of(best)
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
-    assert judge(found, classes, -5.0, 1.0).verdict is DiagnosisVerdict.EFFECTS_FOUND
+    assert judge(found, classes, NO_SIGNS).verdict is DiagnosisVerdict.EFFECTS_FOUND
     seven = ColumnGroup(np.arange(7), np.array([1.0]))
     for names, verdict in (
         ("ab", DiagnosisVerdict.EFFECTS_FOUND),
@@ -238,7 +243,7 @@ def test_a_large_set_of_large_groups_is_a_calibration() -> None:
     ):
         groups = {**found.scores.gram.groups, **dict.fromkeys(names, seven)}
         grown = replace(found.scores, gram=replace(found.scores.gram, groups=groups))
-        assert judge(replace(found, scores=grown), classes, -5.0, 1.0).verdict is verdict
+        assert judge(replace(found, scores=grown), classes, NO_SIGNS).verdict is verdict
 
 
 def test_a_large_set_is_many_effects_and_names_what_carries_it() -> None:
@@ -266,14 +271,14 @@ def test_what_each_of_several_sets_has_is_sure_though_what_is_open_is_worth_more
     # or a member is of a size that may stand for anything
     found = found_of(either)
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
-    assert judge(found, classes, -5.0, 1.0, implausible=frozenset("b")).sure == ()
+    assert judge(found, classes, NO_SIGNS, implausible=frozenset("b")).sure == ()
     # or all are groups that together imitate anything
     found = found_of(large)
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
     seven = dict.fromkeys("abe", ColumnGroup(np.arange(7), np.array([1.0])))
     gram = replace(found.scores.gram, groups={**found.scores.gram.groups, **seven})
     grown = replace(found, scores=replace(found.scores, gram=gram))
-    assert judge(grown, classes, -5.0, 1.0).sure == ("e",)
+    assert judge(grown, classes, NO_SIGNS).sure == ("e",)
     # or a set has something else in its place
     assert judged({**either, "ec": -0.2}).sure == ()
 
