@@ -103,7 +103,8 @@ def search_sets(
     if seen.verdict is DiagnosisVerdict.MANY_EFFECTS and seen.sure:
         said, classes = _with_replaceable(found, seen, by_sets, sizes, problem.robot, terms)
     else:
-        said, classes = seen, _about_listed(found, seen, by_sets, sizes, problem.robot, terms)
+        classes = _about_listed(found, seen, by_sets, sizes, problem.robot, terms)
+        said = seen.with_sure_ones(classes)
     # what outweighs something unknown is there, however much of its worth that could take
     outdone = _outdone(found, in_place) - set(() if said.imitated else said.sure)
     return SetSearch(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from crosscheck.calibration.judgement.probability import Classes
 from crosscheck.calibration.sets.equals import EQUAL
-from crosscheck.calibration.sets.exact import FEW
+from crosscheck.calibration.sets.exact import FEW, Refit
 from crosscheck.calibration.sets.linear_search import Names
 from crosscheck.calibration.sets.refits import ComparedSets
 
@@ -32,22 +32,24 @@ def alternatives(found: ComparedSets, classes: Classes) -> list[Names]:
         classes: equivalent effects; those of one class count as the same.
 
     Returns:
-        The sets, the best first, without the effects that the model has already: one if no other
-        explains as well, none if the best set has many effects or none.
+        The sets, the smallest first and of these the best, without the effects that the model has
+        already: one if no other explains as well, none if the best set has many effects or none.
     """
     first = {e: members[0] for members in classes.members for e in members}
+    if not _is_few(found, found.best):
+        return []
+    as_good = [r for r in found.refits.values() if r.score >= found.best.score - EQUAL]
     out: list[Names] = []
     kept: list[Names] = []
-    for refit in sorted(found.refits.values(), key=lambda r: -r.score):
+    for refit in sorted(as_good, key=lambda r: (len(r.names), -r.score)):
         own = refit.names - found.always
-        if not own or len(own) > FEW:
-            if refit is found.best:
-                return []
-            continue
-        if refit.score < found.best.score - EQUAL or len(out) == _MOST:
-            break
         kinds = frozenset(first.get(e, e) for e in own)
-        if not any(kinds <= other or other <= kinds for other in kept):
+        if _is_few(found, refit) and not any(kinds <= other or other <= kinds for other in kept):
             out.append(own)
             kept.append(kinds)
-    return out
+    return out[:_MOST]
+
+
+def _is_few(found: ComparedSets, refit: Refit) -> bool:
+    """Whether a set has a few effects, that is one at least."""
+    return 0 < len(refit.names - found.always) <= FEW

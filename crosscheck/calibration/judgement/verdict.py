@@ -78,6 +78,18 @@ class Judgement:
             verdict = DiagnosisVerdict.MANY_EFFECTS
         return replace(self, sure=sure, verdict=verdict)
 
+    def with_sure_ones(self, classes: Classes) -> Judgement:
+        """The same, given probabilities about just the effects that are listed.
+
+        That one of several effects is missing may be sure, as members of one class, and still be
+        open of each where two of them stand for the first.
+        """
+        sure = tuple(n for n in self.sure if classes.of(n) > SURE)
+        is_model = self.verdict is DiagnosisVerdict.EFFECTS_FOUND
+        if len(sure) == len(self.sure) or not is_model:
+            return self
+        return replace(self, sure=sure, verdict=DiagnosisVerdict.MANY_EFFECTS)
+
     def replacing(self, some: Names) -> Judgement:
         """The same, but effects that others together can replace are not sure."""
         return replace(self.without(some), replaceable=some)

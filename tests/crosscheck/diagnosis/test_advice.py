@@ -124,8 +124,10 @@ def test_without_a_lead_the_same_poses_are_repeated(found: Search) -> None:
 
 
 def test_where_it_is_open_which_effects_it_is_what_is_not_common_is_checked_by_hand(
-    found: Search,
+    found: Search, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("crosscheck.diagnosis.advice.extensions", lambda _plan: [])
+    monkeypatch.setattr("crosscheck.diagnosis.advice.telling_models_apart", lambda *_some: [])
     names = ("gravity_tilt", "stiffness"), ("drum_gain", "stiffness")
     either = {frozenset(both): Terms() for both in names}  # models that nothing tells apart
     *checks, _calibrate = measure_next(found, [], DiagnosisVerdict.MANY_EFFECTS, (), either)

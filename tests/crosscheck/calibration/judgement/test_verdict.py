@@ -12,7 +12,7 @@ import pytest
 
 from crosscheck.calibration import search
 from crosscheck.calibration.judgement.alternatives import alternatives, shared
-from crosscheck.calibration.judgement.probability import all_scores, probabilities
+from crosscheck.calibration.judgement.probability import Classes, all_scores, probabilities
 from crosscheck.calibration.judgement.verdict import Judgement, SignsOfUnknown, judge, too_large
 from crosscheck.calibration.linear_evidence.gram import ColumnGroup, gram_of
 from crosscheck.calibration.search import with_equivalents
@@ -297,9 +297,22 @@ def open_sets(scores: dict[str, float]) -> list[set[str]]:
     return [set(names) for names in alternatives(found, classes)]
 
 
-def test_others_that_explain_as_well_are_alternatives_and_parts_of_a_set_are_not() -> None:
+def test_others_that_explain_as_well_are_alternatives_of_a_set_and_its_part_just_one() -> None:
+    """The part: it was "a force with a mass" where the force alone explains as much."""
     others = {"a": -1.0, "abf": -0.5, "cd": -1.2, "cdg": -1.3, "ef": -2.9, "eg": -3.1}
-    assert open_sets({"": -900.0, "ab": 0.0, **others}) == [{*"ab"}, {*"cd"}, {*"ef"}]
+    assert open_sets({"": -900.0, "ab": 0.0, **others}) == [{*"a"}, {*"cd"}, {*"ef"}]
+
+
+def test_what_is_open_about_the_listed_effects_alone_is_not_found() -> None:
+    """A force had 75 % there, as a tilt with softer cables explained the same."""
+    both = Judgement(DiagnosisVerdict.EFFECTS_FOUND, ("a", "b"), 0.0)
+    sure = Classes({"a": 0.99, "b": 0.96}, [("a",), ("b",)], [0.99, 0.96], {})
+    assert both.with_sure_ones(sure) is both
+    open_one = replace(sure, probability=[0.99, 0.75], effect={"a": 0.99, "b": 0.75})
+    left = both.with_sure_ones(open_one)
+    assert left.verdict is DiagnosisVerdict.MANY_EFFECTS and left.sure == ("a",)
+    many = replace(both, verdict=DiagnosisVerdict.MANY_EFFECTS)
+    assert many.with_sure_ones(open_one) is many
 
 
 def test_a_swap_within_a_class_is_no_alternative() -> None:
