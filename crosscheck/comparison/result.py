@@ -232,11 +232,11 @@ class Comparison(Result):
         return [head, *sizes, self.sentence]
 
     def records(self) -> list[Record]:
-        """The errors of every row; None for a reading that was not compared."""
-        data = self.problem.data
-        names, units = channels(self.problem)
-        heads = [f"{n.replace(' ', '_')}_{u}" for n, u in zip(names, units, strict=True)]
-        errors = np.where(self.problem.counted, self.state.raw, np.nan)
+        """The errors of every row, readings that were measured; None where one was not compared."""
+        data, measured = self.problem.data, np.asarray(self.problem.measured.any(axis=0))
+        every = zip(*channels(self.problem), measured, strict=True)
+        heads = [f"{name.replace(' ', '_')}_{unit}" for name, unit, there in every if there]
+        errors = np.where(self.problem.counted, self.state.raw, np.nan)[:, measured]
         values = [[None if e != e else e for e in row] for row in errors.tolist()]
         return [
             {"line": line, "run": run, **dict(zip(heads, row, strict=True))}

@@ -135,6 +135,19 @@ def test_noise_goes_with_nothing(robot):
     assert min(firsts) > 1e-4
 
 
+def test_rounding_goes_with_nothing(robot, data):
+    """Readings that differ by rounding alone, with a constant offset of many times the noise."""
+    same = data.rows([0] * 12)
+    shift = np.linspace(3e-4, 3e-4 * (1 + 1e-15), 12)[:, None]
+    found = compare(robot, replace(same, position=same.position + shift))
+    assert found.problem.use.all() and not found.is_noise
+    assert [a.against for a in found.associations if a.significant] == [EVERYWHERE]
+    # the same rows with errors of two sizes
+    shift = np.where(np.arange(12) == 0, 4e-4, 3e-4)[:, None]
+    found = compare(robot, replace(same, position=same.position + shift))
+    assert "direction of travel" in [a.against for a in found.associations if a.significant]
+
+
 def test_a_longer_cable_shows_as_that_cable(robot):
     plain = compare(robot, measured(robot))
     offset = {"offset_3_m": 1e-3}
@@ -167,6 +180,7 @@ def test_tensions_are_compared(robot):
     assert found.rms["tension_rms_N"] > 0.05
     assert sum(c.unit == "N" for c in found.coordinates) == robot.n_cables
     assert found.errors_of("tension").max() > 0.1
+    assert f"tension_of_{robot.cable_names[0]}_N" in found.to_frame().column_names
 
 
 def test_noise_nobody_stated_is_estimated_and_said_so(robot, data):
@@ -320,6 +334,8 @@ def test_a_comparison_shows_itself(off):
     assert lines[1].startswith("position ") and lines[-1] == off.sentence
     rows = off.records()
     assert [row["line"] for row in rows] == off.problem.data.line.tolist()
+    read = [*(f"{axis}_m" for axis in "xyz"), *(f"rotation_about_{axis}_rad" for axis in "xyz")]
+    assert off.to_frame().column_names == ["line", "run", *read]  # nobody measured tensions
     assert [row["z_m"] for row in rows] == off.state.raw[:, 2].tolist()
     assert off.to_frame().num_rows == len(rows) and "<table>" in off._repr_html_()
 
