@@ -10,7 +10,15 @@ import click
 from crosscheck.cli.choices import figures_in, figures_option, listed, sigma_option
 from crosscheck.cli.following import after_plan
 from seecr.cli.arguments import check_places
-from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
+from seecr.cli.options import (
+    FILE,
+    Number,
+    WholeNumber,
+    json_option,
+    made_by,
+    out_option,
+    progress_share,
+)
 
 
 @click.command(
@@ -25,7 +33,7 @@ Examples:
 @click.argument("poses", type=FILE, metavar="[POSES.csv]", required=False)
 @click.option(
     "--rows",
-    type=click.IntRange(min=6),
+    type=WholeNumber(min=6),
     metavar="N",
     help="Choose this many poses instead of reading a file.",
 )
@@ -40,14 +48,14 @@ Examples:
 @sigma_option
 @click.option(
     "--lowest",
-    type=float,
+    type=Number(),
     metavar="N",
     default=0.0,
     help="Lowest cable tension at proposed poses.",
 )
 @click.option(
     "--highest",
-    type=float,
+    type=Number(),
     metavar="N",
     default=math.inf,
     help="Highest cable tension at proposed poses.",

@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 from crosscheck.cli.choices import sigma_option
 from seecr.cli.following import following, typed
-from seecr.cli.options import FILE, json_option, made_by, out_option, progress_bar
+from seecr.cli.options import FILE, WholeNumber, json_option, made_by, out_option, progress_bar
 
 if TYPE_CHECKING:
     from crosscheck import Twin
@@ -33,7 +33,7 @@ Examples:
 @click.option(
     "--hide",
     "seed",
-    type=click.IntRange(min=0),
+    type=WholeNumber(min=0),
     metavar="SEED",
     help=(
         "Seed from which the hidden effects, their sizes and the noise are drawn; the same seed "
@@ -43,7 +43,7 @@ Examples:
 @click.option(
     "--effects",
     "count",
-    type=click.IntRange(min=0),
+    type=WholeNumber(min=0),
     metavar="K",
     help="How many effects to hide.  [default: none, one or two, drawn from the seed]",
 )

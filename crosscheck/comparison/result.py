@@ -20,6 +20,7 @@ from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.problem import BY_NAME, KINDS, Problem, Rms, kinds_read, kinds_stated
 from crosscheck.fit.reasons import Refusal
 from crosscheck.fit.state import State
+from crosscheck.fit.unstated import errors_are_noise
 from crosscheck.units import short
 from seecr.counted import counted
 from seecr.effects import Terms
@@ -188,6 +189,8 @@ class Comparison(Result):
             said = f"No verdict: {self.refusal}; {self.refusal.remedy}."
             if w.is_noise or self.coloured is not None:
                 return said
+            if errors_are_noise(self.problem, self.state.prediction):
+                return said  # so many times themselves says nothing
             return f"{said} The errors are {w.scale:.3g} times the noise."
         if w.is_noise:
             times = f"{w.scale:.2f} times the {self._known_as} noise"

@@ -71,6 +71,11 @@ class MissingEffect(Result):
         return tuple(rival.name for rival in self.rivals)
 
     @property
+    def confirmation(self) -> str:
+        """Its check, as an item of what to measure next."""
+        return f"to confirm {self.effect}: {self.check}"
+
+    @property
     def layout(self) -> Layout:
         """The parameters of the effect."""
         return self.term.layout
@@ -180,6 +185,14 @@ class Diagnosis(Result):
         return self.refusal is None or not self.refusal.unsolved
 
     @property
+    def reason(self) -> str:
+        """The sentence, to stand beside the verdict's name, which it does not say again."""
+        if self.refusal is None:
+            return self.sentence
+        why = str(self.refusal)
+        return f"{why[0].upper()}{why[1:]}."
+
+    @property
     def within_catalogue(self) -> bool:
         """Whether probabilities assume the catalogue though something unknown is there."""
         imitated = self.chances is not None and self.chances.imitated is not None
@@ -190,10 +203,16 @@ class Diagnosis(Result):
         """The missing effects with their values, as a model for the next call."""
         return Terms(found.term for found in self.missing)
 
+    @property
+    def measure_further(self) -> tuple[str, ...]:
+        """What to measure next beside the checks of the listed effects, which say it themselves."""
+        said = {found.confirmation for found in self.missing}
+        return tuple(line for line in self.measure_next if line not in said)
+
     def lines(self) -> list[str]:
         """The verdict, how the error falls, and what to measure next."""
         out = [] if self.sight is None else self.sight.lines()
-        out.append(f"{self.verdict.value}: {self.sentence}")
+        out.append(f"{self.verdict.value}: {self.reason}")
         if self.refusal is None:
             out.append(f"before: {rms_words(self.before)}")
             out += [line for found in self.missing for line in found.lines()]
@@ -201,7 +220,7 @@ class Diagnosis(Result):
         if self.left is not None:
             out.append(f"error beyond the noise: {self.left.words}")
         out += [f"note: {note}" for note in self.notes]
-        return [*out, *(f"measure next: {line}" for line in self.measure_next)]
+        return [*out, *(f"measure next: {line}" for line in self.measure_further)]
 
     def records(self) -> list[Record]:
         """A record for each parameter of a missing effect: value and standard error, SI."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tomlkit
+from tomlkit.items import InlineTable
 
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.own import Kept, kept, without_parts
@@ -246,11 +247,24 @@ def _fill_cells(parameters: Any, fitted: Fitted) -> None:
             continue  # stays as somebody wrote it
         cell = _cell(layout, i, fitted)
         if isinstance(parameters.get(key), Mapping):
-            parameters[key].update(cell)
-            if "stderr" not in cell:
-                parameters[key].pop("stderr", None)
+            _renew(parameters, key, cell)
         else:
             parameters[key] = _inline(cell | _known(fitted.term.knowledge, i))
+
+
+def _renew(parameters: Any, key: str, cell: Mapping[str, object]) -> None:
+    """Put fitted numbers into a cell; what else people wrote into it stays, with its comment."""
+    old = parameters[key]
+    values = {**{word: value for word, value in old.items() if word != "stderr"}, **cell}
+    if not isinstance(old, InlineTable):
+        old.update(cell)
+        if "stderr" not in cell:
+            old.pop("stderr", None)
+        return
+    fresh, comment = _inline(values), old.trivia.comment
+    parameters[key] = fresh
+    if comment:
+        parameters[key].comment(comment)
 
 
 def _known(knowledge: Knowledge, i: int) -> dict[str, object]:

@@ -52,6 +52,7 @@ from seecr.pose import Array
 from seecr.prediction.cells import Where, term_of
 from seecr.prediction.data_reach import TABLE, DataReach
 from seecr.result import Record, Result
+from seecr.units import with_error
 
 if TYPE_CHECKING:
     from seecr.statics.solution import Solution
@@ -168,11 +169,17 @@ class Model(Result):
         return [("", term.vector, self.errors_of(name)), *tables]
 
 
+def _known(value: float, error: float) -> str:
+    """A value with its standard error, to the digits that are known; alone if there is none."""
+    if not (math.isfinite(error) and error > 0.0):
+        return f"{value:.6g}"
+    return " ± ".join(with_error(value, error))
+
+
 def _shown(term: Term, stderr: Array, most: int = 3) -> str:
     """The first few values of an effect, as text."""
     parts = [
-        f"{key} = {value:.6g}"
-        + (" (fixed)" if fixed else f" +- {error:.2g}" if math.isfinite(error) else "")
+        f"{key} = {_known(value, error)}" + (" (fixed)" if fixed else "")
         for key, value, error, fixed in zip(
             term.layout.names, term.vector, stderr, term.knowledge.fixed, strict=True
         )
