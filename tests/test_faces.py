@@ -59,6 +59,12 @@ def test_every_public_name_is_there_and_documented(face: ModuleType) -> None:
 
 
 @pytest.mark.parametrize("face", FACES, ids=lambda face: face.__name__)
+def test_help_shows_defaults_that_people_can_read(face: ModuleType) -> None:
+    functions = filter(inspect.isfunction, (getattr(face, name) for name in face.__all__))
+    assert [one.__name__ for one in functions if " at 0x" in str(inspect.signature(one))] == []
+
+
+@pytest.mark.parametrize("face", FACES, ids=lambda face: face.__name__)
 def test_a_shell_completes_public_names_before_their_first_use(face: ModuleType) -> None:
     shown = {name for name in dir(face) if not name.startswith("__")}
     assert shown == {*face.__all__, *(("inverse", "workspace") if face is seecr else ())}

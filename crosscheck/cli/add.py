@@ -74,8 +74,7 @@ def command(
     Exit status: 0 added, 1 not added because it is not worth adding, 2 bad input, 3 rows without an
     equilibrium or a fit that does not converge.
     """
-    from crosscheck import add_effect, add_effects, load_measurements, save_model
-    from crosscheck.measurements.stated import with_stated
+    from crosscheck import Sigma, add_effect, add_effects, load_measurements, save_model
     from crosscheck.model import check_place, load_diagnosed
     from seecr import load_model, load_robot, new_model
     from seecr.effects import effect_named
@@ -92,7 +91,7 @@ def command(
     old = load_model(model, machine) if model.exists() else new_model(machine)
     for name in names:
         _check_names(old, name, refit, model)
-    measured = with_stated(load_measurements(data, machine), sigmas)
+    measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     check_place(model)
     with result_in(out, "add.json") as keep:
         with progress_share(f"adding {' + '.join(names)}") as progress:

@@ -66,9 +66,8 @@ def command(
     components, as in the tables, or on the worst row (the length of its error vector).
     Exit status: 0 all well, 1 a limit exceeded, 2 bad input, 3 rows without an equilibrium.
     """
-    from crosscheck import compare, load_measurements
+    from crosscheck import Sigma, compare, load_measurements
     from crosscheck.comparison import Limits, check, load_limits, with_options
-    from crosscheck.measurements.stated import with_stated
     from crosscheck.report import write_page
     from seecr import load_model, load_robot
     from seecr.files import json_text, staged, write_text
@@ -76,7 +75,7 @@ def command(
 
     limits = with_options(load_limits(limits_file) if limits_file else Limits(), options)
     machine = load_robot(robot)
-    measured = with_stated(load_measurements(data, machine), sigmas)
+    measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     own = load_model(model, machine) if model is not None else None
     with (
         staged(out, sometimes=["comparison.rrd"]) as folder,

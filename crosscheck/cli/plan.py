@@ -106,7 +106,6 @@ def command(
         got = "neither" if poses is None else "both"
         raise click.UsageError(f"expected POSES.csv or --rows N, got {got}")
     from crosscheck import Sigma, choose_poses, load_commands, make_plan, write_plan
-    from crosscheck.measurements.stated import stated
     from crosscheck.planning import box_of
     from crosscheck.planning.write import NAME, check_own, sometimes_written
     from crosscheck.report import write_page
@@ -119,8 +118,9 @@ def command(
     if room is not None:
         check_places(room, machine)
     limits = (lowest, highest)
-    given = None if poses is None else load_commands(poses, machine)
-    sigma = stated(Sigma() if given is None else given.sigma, sigmas)
+    sigma = Sigma.parsed(sigmas)
+    given = None if poses is None else load_commands(poses, machine, sigma=sigma)
+    sigma = sigma if given is None else given.sigma
     if poses is None:
         check_own(out)
     sometimes = sometimes_written(out, poses)

@@ -112,9 +112,9 @@ def command(
             "--effect already sets how many effects are hidden; leave out --effects"
         )
     from crosscheck import Sigma, load_commands, make_twin
-    from crosscheck.measurements.stated import stated
 
-    commands = load_commands(poses, robot) if poses is not None else None
+    noise = Sigma.parsed(sigmas)
+    commands = load_commands(poses, robot, sigma=noise) if poses is not None else None
     # whatever is hidden, the bar shows the same: rows of one kind, done or not
     with progress_bar("measuring", 1) as advance:
         twin = make_twin(
@@ -125,7 +125,7 @@ def command(
             out=out,
             tensions=tensions,
             poses=commands,
-            sigma=stated(commands.sigma if commands else Sigma(), sigmas),
+            sigma=commands.sigma if commands else noise,
             progress=lambda rows, now: advance(0, "measuring"),
         )
         advance(1, "measured")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,10 @@ from seecr.effects.base import Layout
 from seecr.files import plain
 from seecr.pose import Array
 from seecr.result import Record, Result
+
+if TYPE_CHECKING:
+    from crosscheck.diagnosis.kept import Diagnosed
+    from seecr.prediction.model import Model
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -159,6 +164,7 @@ class Diagnosis(Result):
         left: the remainder beyond noise, and whether it matters; None without a verdict.
         chances: posterior probabilities of all effects; None without a verdict.
         sight: what the data can show and what not, whatever the verdict; None without one.
+        of: the robot, the data and the model that it is of.
     """
 
     verdict: DiagnosisVerdict
@@ -178,6 +184,24 @@ class Diagnosis(Result):
     left: LeftOver | None = None
     chances: Chances | None = None
     sight: Sight | None = None
+    of: Diagnosed | None = None
+
+    @property
+    def model(self) -> Model | None:
+        """The model with the missing effects, to be saved or used; None without a verdict.
+
+        All its effects are fitted together, as ``crosscheck diagnose --model-out`` writes them.
+        """
+        return self._model
+
+    @cached_property
+    def _model(self) -> Model | None:
+        return None if self.of is None else self.of.with_found(self)
+
+    @property
+    def refitted(self) -> tuple[str, ...]:
+        """Effects of the given model that agree with the data only with other values."""
+        return () if self.of is None else self.of.refitted(self)
 
     @property
     def converged(self) -> bool:
@@ -200,7 +224,7 @@ class Diagnosis(Result):
 
     @property
     def terms(self) -> Terms:
-        """The missing effects with their values, as a model for the next call."""
+        """The missing effects with the values that are listed; :attr:`model` has all effects."""
         return Terms(found.term for found in self.missing)
 
     @property

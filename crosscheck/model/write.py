@@ -29,7 +29,7 @@ from seecr.pose import Array
 from seecr.prediction.cells import UNSEEN
 from seecr.prediction.data_reach import TABLE, DataReach
 from seecr.prediction.experiment import predict
-from seecr.prediction.model import CALIBRATION, FIT, Model
+from seecr.prediction.model import CALIBRATION, FIT, Model, its_model
 from seecr.prediction.uncertainty import CORRELATION, PARAMETERS, STDERR
 
 if TYPE_CHECKING:
@@ -341,7 +341,7 @@ def save_model(path: str | Path, model: Model) -> None:
 
     Args:
         path: of the TOML; its folder is made if need be.
-        model: as read, or the ``model`` of a calibration or an addition.
+        model: as read, or the ``model`` of a diagnosis, a calibration or an addition.
 
     Raises:
         InputFileError: the file cannot be written, or the file there is not a model.
@@ -349,7 +349,8 @@ def save_model(path: str | Path, model: Model) -> None:
     """
     if not isinstance(model, Model):
         raise InputError(
-            f"expected a model, such as the .model of a calibration, got {type(model).__name__}"
+            "expected a model, such as the .model of a diagnosis, got "
+            f"{type(model).__name__}{its_model(model)}"
         )
     path = Path(path)
     check_place(path)

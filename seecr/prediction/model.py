@@ -221,8 +221,14 @@ def no_effects(got: object) -> InputError:
     what = repr(got) if isinstance(got, str) else type(got).__name__
     return InputError(
         "expected a model, its path, or a list of effects with their values, as "
-        f"seecr.Term.of(robot, name, ...) gives each, got {what}"
+        f"seecr.Term.of(robot, name, ...) gives each, got {what}{its_model(got)}"
     )
+
+
+def its_model(got: object) -> str:
+    """Of a result that has a model, such as a diagnosis: that it has."""
+    has = hasattr(type(got), "model") or "model" in getattr(got, "__dict__", {})
+    return "; its .model is one" if has else ""
 
 
 def model_given(given: Model | str | Path, robot: Robot) -> Model:
@@ -236,7 +242,7 @@ def model_given(given: Model | str | Path, robot: Robot) -> Model:
         return given
     if isinstance(given, str | Path):
         return load_model(given, robot)
-    raise InputError(f"expected a model or its path, got {type(given).__name__}")
+    raise InputError(f"expected a model or its path, got {type(given).__name__}{its_model(given)}")
 
 
 def new_model(robot: GivenRobot) -> Model:
