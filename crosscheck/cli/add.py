@@ -74,10 +74,16 @@ def command(
     Exit status: 0 added, 1 not added because it is not worth adding, 2 bad input, 3 rows without an
     equilibrium or a fit that does not converge.
     """
-    from crosscheck import Sigma, add_effect, add_effects, load_measurements, save_model
-    from crosscheck.model import check_place, load_diagnosed
-    from seecr import load_model, load_robot, new_model
-    from seecr.effects import effect_named
+    from crosscheck import (
+        Sigma,
+        add_effect,
+        add_effects,
+        load_diagnosed,
+        load_measurements,
+        save_model,
+    )
+    from crosscheck.model.place import check_place
+    from seecr import effect_named, load_model, load_robot, new_model
 
     _check_not_both(words, all_from)
     effect, robot, data = _arguments(words, all_from)
@@ -119,7 +125,7 @@ def command(
 
 def _check_not_both(words: Sequence[str], all_from: Path | None) -> None:
     """Beside --all-from the first word is the robot's file; an effect there was meant as one."""
-    from seecr.effects import catalogue
+    from seecr import catalogue
 
     if all_from is not None and words and words[0] in catalogue() and not Path(words[0]).exists():
         raise click.UsageError(

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from crosscheck.cli.choices import (
+    check_effects,
     exclude_option,
     grown_model_option,
     only_option,
@@ -60,13 +61,12 @@ def command(
     2 bad input, 3 rows without an equilibrium or a fit that does not converge.
     """
     from crosscheck import Sigma, calibrate, load_measurements, save_model
-    from crosscheck.given import considered
-    from crosscheck.model import check_place
+    from crosscheck.model.place import check_place
     from crosscheck.terminal import print_calibration
     from seecr import load_model, load_robot, new_model
     from seecr.files import json_text
 
-    considered(only, exclude)  # a wrong name is told before any file is read
+    check_effects(only, exclude)  # a wrong name is told before any file is read
     machine = load_robot(robot)
     old = load_model(model, machine) if model.exists() else new_model(machine)
     measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))

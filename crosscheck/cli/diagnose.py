@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from crosscheck.cli.choices import (
+    check_effects,
     exclude_option,
     figures_in,
     figures_option,
@@ -75,17 +76,15 @@ def command(
     input, 3 rows without an equilibrium.
     """
     from crosscheck import DiagnosisVerdict, Sigma, Tolerance, diagnose, load_measurements
-    from crosscheck.given import considered
-    from crosscheck.model import check_place
+    from crosscheck.model.place import check_place
     from crosscheck.report import write_page
-    from seecr import load_model, load_robot, new_model
+    from seecr import load_model, load_robot, new_model, with_history
     from seecr.description.fingerprint import fingerprint
     from seecr.files import json_text, staged, write_text
-    from seecr.workspace.maps import with_history
 
     gates = [DiagnosisVerdict.named(word) for word in fail_on]
     tolerance = Tolerance.parsed(tolerances)
-    considered(only, exclude)  # a wrong name is told before any file is read
+    check_effects(only, exclude)  # a wrong name is told before any file is read
     machine = load_robot(robot)
     measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     own = load_model(model, machine) if model is not None else new_model(machine)

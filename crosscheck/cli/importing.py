@@ -125,7 +125,8 @@ def command(
       dwells.csv       when each dwell was, its samples and their scatter
       import.json      what was done
     """
-    from crosscheck.importing import ImportChoices, check_case, import_case, write_case
+    from crosscheck import ImportChoices, import_case
+    from crosscheck.importing import check_case, write_case
     from seecr import load_robot
     from seecr.files import json_text
 

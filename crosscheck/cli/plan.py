@@ -106,8 +106,7 @@ def command(
         got = "neither" if poses is None else "both"
         raise click.UsageError(f"expected POSES.csv or --rows N, got {got}")
     from crosscheck import Sigma, choose_poses, load_commands, make_plan, write_plan
-    from crosscheck.planning import box_of
-    from crosscheck.planning.write import NAME, check_own, sometimes_written
+    from crosscheck.planning.write import NAME, box_of, check_own, sometimes_written
     from crosscheck.report import write_page
     from crosscheck.terminal import print_plan
     from seecr import load_robot

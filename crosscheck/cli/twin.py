@@ -174,8 +174,9 @@ def _noises(sigma: Mapping[str, float]) -> Iterator[str]:
 
 
 def _open(path: Path, as_json: bool) -> int:
+    from crosscheck import unseal
     from crosscheck.terminal import parameter_lines
-    from crosscheck.twin import FILES, unseal
+    from crosscheck.twin import FILES
     from seecr.files import json_text
 
     answer = unseal(path)

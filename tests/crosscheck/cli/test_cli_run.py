@@ -282,12 +282,12 @@ def test_an_output_folder_that_cannot_be_written(tmp_path):
 
 @pytest.mark.slow
 def test_an_error_half_way_leaves_nothing(tmp_path, monkeypatch):
-    from crosscheck import suite
+    from crosscheck.suite import write
 
     def full(*arguments):
         raise OSError(28, "No space left on device", "results.json")
 
-    monkeypatch.setattr(suite, "write_worst_pose", full)
+    monkeypatch.setattr(write, "write_worst_pose", full)
     assert "results.json: No space left on device" in refused(*SMALL, "--out", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
