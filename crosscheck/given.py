@@ -30,6 +30,7 @@ __all__ = [
     "copy_robot",
     "file_of",
     "model_of",
+    "opened",
     "robot_of",
 ]
 
@@ -99,6 +100,15 @@ def file_of(given: GivenRobot) -> Path:
     if isinstance(given, Robot) and not _same_numbers(given, load_robot(robot.source)):
         raise InputError(f"robot {robot.name} has different numbers from {robot.source}; {wanted}")
     return robot.source
+
+
+def opened(given: GivenModel, robot: Robot) -> GivenModel:
+    """The same, read if it is a path, so that it is read once.
+
+    Raises:
+        InputFileError: no such file, or no model of this robot in it.
+    """
+    return model_given(given, robot) if isinstance(given, str | Path) else given
 
 
 def basis_of(given: GivenModel, robot: Robot) -> Model:

@@ -37,7 +37,8 @@ SI and radians throughout; quaternions are scalar first.
 
 Paths and loaded objects both work. `GivenRobot` is a `Robot`, the path of its MJCF, or the name of
 a shipped one; `GivenModel` and `GivenEffects` are a `Model`, the path of its TOML, or a list of
-`Term`s; `GivenData` is `Measurements`, their file, or several files; `GivenCommands` is poses
+`Term`s; `GivenSeveral` is names of effects, `Term`s, or a result with `.terms`, such as a
+diagnosis; `GivenData` is `Measurements`, their file, or several files; `GivenCommands` is poses
 (n, 7), `seecr.Commands`, a file of commands, or what was read from it; `Commanded` is poses (n, 7),
 `seecr.Commands`, or `Measurements`; `GivenCase` is a case of the suite, the name of shipped ones
 or a pattern such as `"cogiro-*"`, or a robot.
@@ -104,7 +105,7 @@ def _parameter(one: Parameter) -> str:
     if one.default is one.empty:
         return named
     default = repr(one.default)
-    return f"{named} = {'...' if callable(one.default) or default[0] == '<' else default}"
+    return f"{named} = {'...' if default[0] == '<' else default}"
 
 
 def _plain(annotation: Any) -> str:

@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from seecr.planar import BarRest, bar_equilibria, bar_tilt, midline_point, solution_manifold
     from seecr.prediction.experiment import Experiment, Prediction, predict
     from seecr.prediction.model import Model, load_model, new_model
+    from seecr.prediction.sensed import placed, tracked
     from seecr.prediction.sensitivity import sensitivities
     from seecr.prediction.uncertainty import Spread, spread_of
     from seecr.statics.solution import Solution, Status
@@ -59,7 +60,7 @@ if TYPE_CHECKING:
     from seecr.workspace.chances import held_chance, kept_chance
     from seecr.workspace.edges import boundary
     from seecr.workspace.grid import Workspace
-    from seecr.workspace.maps import default_axes, workspace_map
+    from seecr.workspace.maps import default_axes, with_history, workspace_map
     from seecr.workspace.midlines import Midlines, midline_points
     from seecr.workspace.spans import SlackSpan, slack_spans
     from seecr.workspace.zones import Zone, feasible, slack_zones, tension_margin
@@ -87,12 +88,13 @@ _MODULES = {
     "inverse.correction": ("Correction", "correct"),
     "workspace.edges": ("boundary",),
     "workspace.grid": ("Workspace",),
-    "workspace.maps": ("default_axes", "workspace_map"),
+    "workspace.maps": ("default_axes", "with_history", "workspace_map"),
     "description.mjcf": ("load_robot",),
     "prediction.model": ("Model", "load_model", "new_model"),
     "equilibrium.multiple": ("equilibria",),
     "planar": ("BarRest", "bar_equilibria", "bar_tilt", "midline_point", "solution_manifold"),
     "description.robot": ("Joint", "Robot"),
+    "prediction.sensed": ("placed", "tracked"),
     "prediction.sensitivity": ("sensitivities",),
     "effects.setup": ("Setup",),
     "statics.solution": ("Solution", "Status"),
@@ -163,6 +165,7 @@ __all__ = [
     "model_path",
     "new_model",
     "parameter",
+    "placed",
     "predict",
     "sensitivities",
     "slack_spans",
@@ -171,6 +174,8 @@ __all__ = [
     "solve",
     "spread_of",
     "tension_margin",
+    "tracked",
+    "with_history",
     "workspace_map",
 ]
 

@@ -11,6 +11,20 @@ from seecr.errors import InputError
 from seecr.pose import LARGEST, Array, all_finite
 
 
+class _Silent:
+    """What functions tell their progress where nobody asked."""
+
+    def __call__(self, *told: object) -> None:
+        """Do nothing."""
+
+    def __repr__(self) -> str:
+        return "silent"
+
+
+silent = _Silent()
+"""The default of ``progress``: nothing is told. ``help`` shows it by this name."""
+
+
 def numbers(values: ArrayLike, name: str) -> Array:
     """An array of real numbers; ``name`` is for errors.
 

@@ -145,5 +145,6 @@ def with_error(value: float, error: float, digits: int = 2) -> tuple[str, str]:
     decimals = digits - 1 - int(np.floor(np.log10(error)))
     if decimals > 9 or endless:
         return significant(value, 6), significant(error, 2)
-    decimals = max(decimals, 0)
+    # of errors of hundreds too, no more digits than so many are known
+    value, error, decimals = round(value, decimals), round(error, decimals), max(decimals, 0)
     return figures(value, f".{decimals}f"), f"{error:.{decimals}f}"

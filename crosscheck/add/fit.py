@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import TypeAlias
+from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
@@ -21,16 +21,31 @@ from crosscheck.fit.preparation.prepare import Progress, prepare
 from crosscheck.fit.reasons import Why
 from crosscheck.given import GivenModel, GivenRobot, basis_of, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
+from seecr.arguments import silent
+from seecr.description.robot import Robot
 from seecr.effects import ApartLayout, Own, Term, Terms, layout_of
 from seecr.effects.base import Layout
+from seecr.errors import InputError
 from seecr.pose import Array
-from seecr.prediction.model import no_effects
 
 # Steps of a fit, and how often it may be continued after that many.
 _STEPS, _TIMES = 40, 2
 # Most times that outliers are looked for. A tracker that throws one row in ten far off has more
 # than that now and then; the diagnosis allows as many.
 _PASSES, _MOST_OUTLIERS = 3, 0.15
+
+
+@runtime_checkable
+class HasTerms(Protocol):
+    """A result with effects and their values, such as a diagnosis."""
+
+    @property
+    def terms(self) -> Terms:
+        """The effects."""
+
+
+GivenSeveral: TypeAlias = Iterable[Term | str] | str | HasTerms
+"""Names of effects, effects with their values, or a result that has some."""
 
 Fitter: TypeAlias = Callable[[Problem, Terms, Array], Fit]
 """Fits effects to a problem, given the effects of the model and the noise."""
@@ -41,7 +56,7 @@ def add_effect(
     data: GivenData,
     name: str,
     model: GivenModel = (),
-    progress: Progress = lambda _text, _part: None,
+    progress: Progress = silent,
     *,
     per: str | None = None,
 ) -> Addition:
@@ -74,36 +89,66 @@ def add_effect(
 def add_effects(
     robot: GivenRobot,
     data: GivenData,
-    effects: Iterable[Term],
+    effects: GivenSeveral,
     model: GivenModel = (),
-    progress: Progress = lambda _text, _part: None,
+    progress: Progress = silent,
 ) -> Addition:
     """Fit several effects to data at once, starting from the values that they have.
+
+    Effects that are only named have none: they are fitted one after the other beside the others,
+    from their most promising starts, and then all at once.
 
     Args:
         robot: a robot, or its MJCF file.
         data: measurements, or their file.
-        effects: such as ``diagnose(...).terms``.
+        effects: names of effects, or effects with their values, or a result such as a diagnosis.
         model: effects of the model, or their file; by default the plain model.
         progress: called with what is being done and the fraction that is done.
 
     Raises:
+        InputError: there is no effect of a name, or something else than effects was given.
         CrosscheckError: no effects were given, or the data do not allow the fit.
         UnsolvedError: rows have no equilibrium, or the fit does not converge.
     """
-    some = list(effects) if isinstance(effects, Iterable) else [effects]
-    wrong = [one for one in some if not isinstance(one, Term)]
-    if wrong:
-        raise no_effects(wrong[0])
-    if not some:
-        raise CrosscheckError("expected at least one effect to add, got none")
+    robot = robot_of(robot)
+    valued, named = _several(effects, robot)
 
     def fitter(problem: Problem, terms: Terms, factor: Array) -> Fit:
-        every = {term.name: term for term in (*terms, *some)}
+        every = {term.name: term for term in (*terms, *valued)}
         known = {term.name: term for term in terms if term.knowledge.any}
-        return _to_the_end(problem, Terms((every | known).values()), factor)
+        start = Terms((every | known).values())
+        if not named:
+            return _to_the_end(problem, start, factor)
+        for layout in named:
+            best = _fitted(problem, start, layout, factor)
+            start = best.terms
+        return best
 
-    return _added(robot, data, [term.layout for term in some], model, progress, fitter)
+    layouts = [*(term.layout for term in valued), *named]
+    return _added(robot, data, layouts, model, progress, fitter)
+
+
+def _several(effects: GivenSeveral, robot: Robot) -> tuple[list[Term], list[Layout]]:
+    """Effects with values, and parameters of those that are only named.
+
+    Raises:
+        InputError: there is no effect of a name, or something else was given.
+        CrosscheckError: nothing was given.
+    """
+    given = effects.terms if isinstance(effects, HasTerms) else effects
+    some = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
+    wrong = [one for one in some if not isinstance(one, Term | str)]
+    if wrong:
+        raise InputError(
+            "expected names of effects, effects with their values, or a result such as a "
+            f"diagnosis, got {type(wrong[0]).__name__}"
+        )
+    if not some:
+        raise CrosscheckError("expected at least one effect to add, got none")
+    valued = [one for one in some if isinstance(one, Term)]
+    has = {term.name for term in valued}
+    names = dict.fromkeys(one for one in some if isinstance(one, str) and one not in has)
+    return valued, [layout_of(name, robot) for name in names]
 
 
 def _added(

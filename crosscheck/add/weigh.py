@@ -195,14 +195,12 @@ def _warnings_of(robot: Robot, f: Fitted) -> Iterator[str]:
             if large.sum() > 1
             else "its plausible size: check it"
         )
-        yield (
-            f"{name}: {_are(names[large])} up to {size[large].max():.3g} times {whose} on the robot"
-        )
+        yield (f"{name}: {_are(names[large])} {size[large].max():.3g} times {whose} on the robot")
 
 
 def _are(names: NDArray[np.str_]) -> str:
-    """Parameters as the subject of a sentence, with its verb."""
-    return f"{some(names.tolist())} {'is' if len(names) == 1 else 'are'}"
+    """Parameters as the subject of a sentence about their largest number, with its verb."""
+    return f"{some(names.tolist())} {'is' if len(names) == 1 else 'are up to'}"
 
 
 def _widened(best: Fit, moved: Array, own: NDArray[np.bool_]) -> list[str]:

@@ -21,6 +21,7 @@ from crosscheck.given import GivenModel, GivenRobot, basis_of, considered, model
 from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import calibrated, provenance_of, renewed
+from seecr.arguments import silent
 from seecr.counted import counted, plural, some
 from seecr.effects import Terms
 from seecr.pose import Array
@@ -134,7 +135,7 @@ def calibrate(
     robot: GivenRobot,
     data: GivenData,
     model: GivenModel = (),
-    progress: Progress = lambda _text, _part: None,
+    progress: Progress = silent,
     *,
     only: Iterable[str] = (),
     exclude: Iterable[str] = (),

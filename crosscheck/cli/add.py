@@ -73,11 +73,9 @@ def command(
     Exit status: 0 added, 1 not added because it is not worth adding, 2 bad input, 3 rows without an
     equilibrium or a fit that does not converge.
     """
-    from crosscheck import add_effect, add_effects, load_measurements
-    from crosscheck.measurements.stated import with_stated
-    from crosscheck.model import check_place, load_diagnosed
-    from seecr import load_robot
-    from seecr.effects import effect_named
+    from crosscheck import Sigma, add_effect, add_effects, load_diagnosed, load_measurements
+    from crosscheck.model.place import check_place
+    from seecr import effect_named, load_robot
 
     _check_not_both(words, all_from)
     effect, robot, data = _arguments(words, all_from)
@@ -91,7 +89,7 @@ def command(
     old = model_or_new(model, machine)
     for name in names:
         _check_names(old, name, refit, model)
-    measured = with_stated(load_measurements(data, machine), sigmas)
+    measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     check_place(model)
     with result_in(out, "add.json") as keep:
         with progress_share(f"adding {' + '.join(names)}") as progress:
@@ -116,7 +114,7 @@ def command(
 
 def _check_not_both(words: Sequence[str], all_from: Path | None) -> None:
     """Beside --all-from the first word is the robot's file; an effect there was meant as one."""
-    from seecr.effects import catalogue
+    from seecr import catalogue
 
     if all_from is not None and words and words[0] in catalogue() and not Path(words[0]).exists():
         raise click.UsageError(

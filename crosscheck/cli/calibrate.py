@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from crosscheck.cli.choices import (
+    check_effects,
     exclude_option,
     grown_model_option,
     only_option,
@@ -60,17 +61,15 @@ def command(
     Exit status: 0 written, 1 not written because the prediction of held-out runs does not improve,
     2 bad input, 3 rows without an equilibrium or a fit that does not converge.
     """
-    from crosscheck import calibrate, load_measurements
-    from crosscheck.given import considered
-    from crosscheck.measurements.stated import with_stated
-    from crosscheck.model import check_place
+    from crosscheck import Sigma, calibrate, load_measurements
+    from crosscheck.model.place import check_place
     from crosscheck.terminal import print_calibration
     from seecr import load_robot
 
-    considered(only, exclude)  # a wrong name is told before any file is read
+    check_effects(only, exclude)  # a wrong name is told before any file is read
     machine = load_robot(robot)
     old = model_or_new(model, machine)
-    measured = with_stated(load_measurements(data, machine), sigmas)
+    measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     check_place(model)
     with result_in(out, "calibration.json") as keep:
         with progress_share("calibrating") as progress:

@@ -48,6 +48,19 @@ exclude_option = click.option(
 )
 """``--exclude EFFECT,...``, given to the command as ``exclude``, a tuple of names."""
 
+
+def check_effects(*names: Sequence[str]) -> None:
+    """Check that there are effects of all these names.
+
+    Raises:
+        InputError: there is none of a name; the known ones are listed, nearest first.
+    """
+    from seecr import effect_named
+
+    for name in (name for some in names for name in some):
+        effect_named(name)
+
+
 grown_model_option = click.option(
     "--model",
     type=FILE,

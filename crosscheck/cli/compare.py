@@ -66,31 +66,28 @@ def command(
     components, as in the tables, or on the worst row (the length of its error vector).
     Exit status: 0 all well, 1 a limit exceeded, 2 bad input, 3 rows without an equilibrium.
     """
-    from crosscheck import compare, load_measurements
-    from crosscheck.comparison import Limits, check, load_limits, with_options
-    from crosscheck.measurements.stated import with_stated
+    from crosscheck import Limits, Sigma, compare, exceeded, load_limits, load_measurements
     from crosscheck.report import write_page
-    from seecr import load_model, load_robot
+    from seecr import load_model, load_robot, with_history
     from seecr.files import json_text, staged, write_text
-    from seecr.workspace.maps import with_history
 
-    limits = with_options(load_limits(limits_file) if limits_file else Limits(), options)
+    limits = (load_limits(limits_file) if limits_file else Limits()).but(options)
     machine = load_robot(robot)
-    measured = with_stated(load_measurements(data, machine), sigmas)
+    measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     own = load_model(model, machine) if model is not None else None
     with (
         staged(out, sometimes=["comparison.rrd"]) as folder,
         progress_share("comparing") as progress,
     ):
         found = compare(machine, measured, own.terms if own else ())
-        exceeded = check(limits, found)
-        status = 1 if exceeded else (0 if found.converged else 3)
+        beyond = exceeded(limits, found)
+        status = 1 if beyond else (0 if found.converged else 3)
         made = made_by(machine.source, *data, model)
         document = {
             "made": made,
             "exit_status": status,
             "limits": {k: v for k, v in vars(limits).items() if v is not None},
-            "exceeded": exceeded,
+            "exceeded": beyond,
             **found.as_json(),
             "model_notes": list(own.notes) if own else [],
         }
@@ -113,7 +110,7 @@ def command(
 
     for note in own.notes if own else ():
         click.echo(f"note: {note}")
-    print_comparison(found, exceeded, limits != Limits(), out)
+    print_comparison(found, beyond, limits != Limits(), out)
     history = own is not None and bool(with_history(machine, own))
     given = Given.with_data(measured, robot, data, model, sigmas, history)
     click.echo(after_comparison(found, given))

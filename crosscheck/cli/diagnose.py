@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from crosscheck.cli.choices import (
+    check_effects,
     exclude_option,
     figures_in,
     figures_option,
@@ -21,8 +21,7 @@ from crosscheck.cli.following import Given, after_diagnosis
 from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
 
 if TYPE_CHECKING:
-    from crosscheck import Diagnosis, Measurements
-    from seecr import Model, Robot
+    from crosscheck import Diagnosis
 
 
 @click.command(
@@ -76,22 +75,18 @@ def command(
     Exit status: 0 with a verdict, or without one for lack of data; 1 a verdict of --fail-on, 2 bad
     input, 3 rows without an equilibrium.
     """
-    from crosscheck import DiagnosisVerdict, Tolerance, diagnose, load_measurements
-    from crosscheck.diagnosis import refitted
-    from crosscheck.given import considered
-    from crosscheck.measurements.stated import with_stated
-    from crosscheck.model import check_place
+    from crosscheck import DiagnosisVerdict, Sigma, Tolerance, diagnose, load_measurements
+    from crosscheck.model.place import check_place
     from crosscheck.report import write_page
-    from seecr import load_model, load_robot, new_model
+    from seecr import load_model, load_robot, new_model, with_history
     from seecr.description.fingerprint import fingerprint
     from seecr.files import json_text, staged, write_text
-    from seecr.workspace.maps import with_history
 
     gates = [DiagnosisVerdict.named(word) for word in fail_on]
     tolerance = Tolerance.parsed(tolerances)
-    considered(only, exclude)  # a wrong name is told before any file is read
+    check_effects(only, exclude)  # a wrong name is told before any file is read
     machine = load_robot(robot)
-    measured = with_stated(load_measurements(data, machine), sigmas)
+    measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     own = load_model(model, machine) if model is not None else new_model(machine)
     if model_out is not None:
         check_place(model_out)
@@ -110,8 +105,7 @@ def command(
             from crosscheck.recording import write_diagnosis_recording
 
             write_diagnosis_recording(found, folder / "diagnosis.rrd")
-        moved = refitted(found, own)
-        note = "" if model_out is None else _keep(found, own, moved, machine, measured, model_out)
+        note = "" if model_out is None else _keep(found, model_out)
     if as_json:
         click.echo(text)
     else:
@@ -123,38 +117,29 @@ def command(
     if not as_json:
         history = bool(with_history(machine, own))
         given = Given.with_data(measured, robot, data, model, sigmas, history)
-        click.echo(after_diagnosis(found, given, model_out, out, moved))
+        click.echo(after_diagnosis(found, given, model_out, out))
     if found.verdict in gates:
         return 1
     return 0 if found.converged else 3
 
 
-def _keep(
-    found: Diagnosis, own: Model, moved: Sequence[str], robot: Robot, measured: Measurements,
-    path: Path,
-) -> str:  # fmt: skip
-    """Write the model that was found, if there was a verdict; what was done."""
-    from crosscheck import DiagnosisVerdict
-    from crosscheck.diagnosis import found_covariance, found_effects
-    from crosscheck.model import provenance_of, renewed, save_model, with_fit
+_PART = (
+    ", with the values that explain most by themselves, not those above, which are nearer to the "
+    "truth beside the other missing effects"
+)
 
-    if found.refusal is not None:
+
+def _keep(found: Diagnosis, path: Path) -> str:
+    """Write the model that was found, if there was a verdict; what was done."""
+    from crosscheck import DiagnosisVerdict, save_model
+
+    if found.model is None:
         return f"{path} was not written: there is no verdict"
-    if not found.missing and not moved:
-        save_model(path, own)
-        return f"Written to {path}: the model as it was, with nothing added"
-    names = [effect.effect for effect in found.missing]
-    errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
-    source = provenance_of(measured.name, "crosscheck diagnose")
-    fitted, covariance = found_effects(found), found_covariance(found)
-    new = with_fit(own, fitted, names, source, errors, covariance)
-    save_model(path, renewed(new, robot, measured))
-    if not names:
-        return f"Written to {path}: {', '.join(moved)}, refitted to these data; nothing added"
-    text = f"Written to {path}: {', '.join(names)}"
-    if found.verdict is not DiagnosisVerdict.MANY_EFFECTS:
-        return text
-    return (
-        f"{text}, with the values that explain most by themselves, not those above, which are "
-        "nearer to the truth beside the other missing effects"
-    )
+    save_model(path, found.model)
+    if found.missing:
+        text = f"Written to {path}: {', '.join(one.effect for one in found.missing)}"
+        return text + _PART * (found.verdict is DiagnosisVerdict.MANY_EFFECTS)
+    if found.refitted:
+        names = ", ".join(found.refitted)
+        return f"Written to {path}: {names}, refitted to these data; nothing added"
+    return f"Written to {path}: the model as it was, with nothing added"

@@ -34,8 +34,7 @@ def command(name: str | None, robot: Path | None, out: Path | None, as_json: boo
     deviation.
     """
     from crosscheck.terminal import effect_record, print_effect, print_effects
-    from seecr import load_robot
-    from seecr.effects import catalogue, effect_named
+    from seecr import catalogue, effect_named, load_robot
     from seecr.files import json_text
 
     machine = load_robot(robot) if robot is not None else None

@@ -66,13 +66,10 @@ def after_comparison(found: Comparison, given: Given) -> str:
     return _using(given, given.model)
 
 
-def after_diagnosis(
-    found: Diagnosis, given: Given, kept: Path | None, out: Path, refitted: Sequence[str] = ()
-) -> str:
+def after_diagnosis(found: Diagnosis, given: Given, kept: Path | None, out: Path) -> str:
     """Adding what was found, calibrating all, or measuring more.
 
-    A model that agrees only with its values ``refitted`` is used where these were kept, and gets
-    them otherwise.
+    A model that agrees only with other values is used where these were kept, else gets them.
     """
     from crosscheck import DiagnosisVerdict
 
@@ -81,8 +78,8 @@ def after_diagnosis(
         case DiagnosisVerdict.MANY_EFFECTS:
             return following("crosscheck", "calibrate", *files, *to, *given.options)
         case DiagnosisVerdict.NO_EFFECT_MISSING if given.model is not None:
-            if refitted and kept is None:
-                again = (refitted[0], *files, *to, "--refit", *given.options)
+            if found.refitted and kept is None:
+                again = (found.refitted[0], *files, *to, "--refit", *given.options)
                 return following("crosscheck", "add", *again)
             return _using(given, kept or given.model)
         case DiagnosisVerdict.NO_VERDICT:

@@ -8,7 +8,15 @@ from typing import Any
 import click
 
 from seecr.cli.following import following
-from seecr.cli.options import FILE, finite_option, json_option, made_by, out_option, progress_share
+from seecr.cli.options import (
+    FILE,
+    Number,
+    finite_option,
+    json_option,
+    made_by,
+    out_option,
+    progress_share,
+)
 
 
 @click.command(
@@ -73,7 +81,7 @@ Examples:
 )
 @click.option(
     "--rest-for",
-    type=click.FloatRange(min=0, min_open=True),
+    type=Number(min=0, min_open=True),
     callback=finite_option,
     metavar="S",
     default=0.5,
@@ -85,7 +93,7 @@ Examples:
 )
 @click.option(
     "--clock",
-    type=float,
+    type=Number(),
     callback=finite_option,
     metavar="S",
     help="How far the tracker's clock is ahead of that of the commands.  [default: estimated]",
@@ -117,7 +125,8 @@ def command(
       dwells.csv       when each dwell was, its samples and their scatter
       import.json      what was done
     """
-    from crosscheck.importing import ImportChoices, check_case, import_case, write_case
+    from crosscheck import ImportChoices, import_case
+    from crosscheck.importing import check_case, write_case
     from seecr import load_robot
     from seecr.files import json_text
 

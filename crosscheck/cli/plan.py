@@ -10,7 +10,15 @@ import click
 from crosscheck.cli.choices import figures_in, figures_option, listed, sigma_option
 from crosscheck.cli.following import after_plan
 from seecr.cli.arguments import check_places
-from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
+from seecr.cli.options import (
+    FILE,
+    Number,
+    WholeNumber,
+    json_option,
+    made_by,
+    out_option,
+    progress_share,
+)
 
 
 @click.command(
@@ -25,7 +33,7 @@ Examples:
 @click.argument("poses", type=FILE, metavar="[POSES.csv]", required=False)
 @click.option(
     "--rows",
-    type=click.IntRange(min=6),
+    type=WholeNumber(min=6),
     metavar="N",
     help="Choose this many poses instead of reading a file.",
 )
@@ -40,14 +48,14 @@ Examples:
 @sigma_option
 @click.option(
     "--lowest",
-    type=float,
+    type=Number(),
     metavar="N",
     default=0.0,
     help="Lowest cable tension at proposed poses.",
 )
 @click.option(
     "--highest",
-    type=float,
+    type=Number(),
     metavar="N",
     default=math.inf,
     help="Highest cable tension at proposed poses.",
@@ -98,9 +106,7 @@ def command(
         got = "neither" if poses is None else "both"
         raise click.UsageError(f"expected POSES.csv or --rows N, got {got}")
     from crosscheck import Sigma, choose_poses, load_commands, make_plan, write_plan
-    from crosscheck.measurements.stated import stated
-    from crosscheck.planning import box_of
-    from crosscheck.planning.write import NAME, check_own, sometimes_written
+    from crosscheck.planning.write import NAME, box_of, check_own, sometimes_written
     from crosscheck.report import write_page
     from crosscheck.terminal import print_plan
     from seecr import load_robot
@@ -111,8 +117,9 @@ def command(
     if room is not None:
         check_places(room, machine)
     limits = (lowest, highest)
-    given = None if poses is None else load_commands(poses, machine)
-    sigma = stated(Sigma() if given is None else given.sigma, sigmas)
+    sigma = Sigma.parsed(sigmas)
+    given = None if poses is None else load_commands(poses, machine, sigma=sigma)
+    sigma = sigma if given is None else given.sigma
     if poses is None:
         check_own(out)
     sometimes = sometimes_written(out, poses)

@@ -20,7 +20,8 @@ from seecr.cli.options import (
 from seecr.threads import processors
 
 if TYPE_CHECKING:
-    from crosscheck.suite import Case, CaseResult, EffectCase, Run, Thresholds
+    from crosscheck import Case, CaseResult, Run, Thresholds
+    from crosscheck.suite.effects import EffectCase
 
 
 @click.command(
@@ -106,13 +107,8 @@ def command(
     Exit status: 0 all agree, 1 a threshold exceeded, 2 bad input, 3 a solve did not converge
     (and nothing exceeded a threshold).
     """
-    from crosscheck.suite import (
-        every_shipped,
-        load_thresholds,
-        select,
-        shipped_like,
-        user_cases,
-    )
+    from crosscheck import load_thresholds, user_cases
+    from crosscheck.suite.chosen import every_shipped, select, shipped_like
 
     if mujoco_robot is not None and robot is None:
         raise click.UsageError("--mujoco-robot needs --robot: the MJCF that SEECR reads")
@@ -128,7 +124,7 @@ def command(
 
 
 def _list(chosen: list[Case | EffectCase]) -> None:
-    from crosscheck.suite import Case
+    from crosscheck import Case
     from seecr.counted import counted
 
     width = max(len(case.name) for case in chosen)
@@ -146,6 +142,7 @@ def _run(
     out: Path,
     as_json: bool,
 ) -> int:
+    from crosscheck import write_run
     from crosscheck.suite.worst_pose import FILE_NAME
     from seecr.files import staged
 
@@ -154,7 +151,7 @@ def _run(
     with staged(out, sometimes=sometimes) as folder:
         record = partial(_record, folder=folder) if recordings else None
         with progress_bar("compiling", sum(map(len, chosen))) as advance:
-            from crosscheck.suite import run_suite
+            from crosscheck import run_suite
 
             run = run_suite(
                 chosen,
@@ -164,18 +161,18 @@ def _run(
                 record=record,
                 progress=lambda result: advance(len(result), result.case.name),
             )
-        _write(run, folder)
+        write_run(run, folder)
     _tell(run, out, recordings, as_json)
     return run.outcome.exit_status
 
 
 def _tell(run: Run, out: Path, recordings: bool, as_json: bool) -> None:
+    from crosscheck.suite.write import RESULTS
+
     for note in run.notes:
         click.echo(f"note: {note}", err=True)
     if as_json:
-        from crosscheck.suite import results_json
-
-        click.echo(results_json(run), nl=False)
+        click.echo((out / RESULTS).read_text(encoding="utf-8"), nl=False)
     else:
         from crosscheck.terminal import print_run
 
@@ -192,24 +189,3 @@ def _record(result: CaseResult, folder: Path) -> str:
     name = f"{result.case.name}.rrd"
     write_case_recording(result, folder / name)
     return name
-
-
-def _write(run: Run, folder: Path) -> None:
-    from crosscheck.suite import (
-        junit_xml,
-        results_json,
-        summary_md,
-        thresholds_toml,
-        write_worst_pose,
-    )
-    from seecr.files import write_text
-
-    sentence = write_worst_pose(run.results, folder) if run.results else ""
-    texts = {
-        "results.json": results_json(run),
-        "junit.xml": junit_xml(run),
-        "summary.md": summary_md(run, sentence),
-        "thresholds.toml": thresholds_toml(run.thresholds),
-    }
-    for name, text in texts.items():
-        write_text(folder / name, text)

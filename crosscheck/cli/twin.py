@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 from crosscheck.cli.choices import sigma_option
 from seecr.cli.following import following, typed
-from seecr.cli.options import FILE, json_option, made_by, out_option, progress_bar
+from seecr.cli.options import FILE, WholeNumber, json_option, made_by, out_option, progress_bar
 
 if TYPE_CHECKING:
     from crosscheck import Twin
@@ -33,7 +33,7 @@ Examples:
 @click.option(
     "--hide",
     "seed",
-    type=click.IntRange(min=0),
+    type=WholeNumber(min=0),
     metavar="SEED",
     help=(
         "Seed from which the hidden effects, their sizes and the noise are drawn; the same seed "
@@ -43,7 +43,7 @@ Examples:
 @click.option(
     "--effects",
     "count",
-    type=click.IntRange(min=0),
+    type=WholeNumber(min=0),
     metavar="K",
     help="How many effects to hide.  [default: none, one or two, drawn from the seed]",
 )
@@ -112,9 +112,9 @@ def command(
             "--effect already sets how many effects are hidden; leave out --effects"
         )
     from crosscheck import Sigma, load_commands, make_twin
-    from crosscheck.measurements.stated import stated
 
-    commands = load_commands(poses, robot) if poses is not None else None
+    noise = Sigma.parsed(sigmas)
+    commands = load_commands(poses, robot, sigma=noise) if poses is not None else None
     # whatever is hidden, the bar shows the same: rows of one kind, done or not
     with progress_bar("measuring", 1) as advance:
         twin = make_twin(
@@ -125,7 +125,7 @@ def command(
             out=out,
             tensions=tensions,
             poses=commands,
-            sigma=stated(commands.sigma if commands else Sigma(), sigmas),
+            sigma=commands.sigma if commands else noise,
             progress=lambda rows, now: advance(0, "measuring"),
         )
         advance(1, "measured")
@@ -174,8 +174,9 @@ def _noises(sigma: Mapping[str, float]) -> Iterator[str]:
 
 
 def _open(path: Path, as_json: bool) -> int:
+    from crosscheck import unseal
     from crosscheck.terminal import parameter_lines
-    from crosscheck.twin import FILES, unseal
+    from crosscheck.twin import FILES
     from seecr.files import json_text
 
     answer = unseal(path)

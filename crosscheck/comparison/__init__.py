@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from crosscheck.comparison.limits import Exceeded, Limits, check, load_limits, with_options
+from crosscheck.comparison.limits import Exceeded, Limits, exceeded, load_limits
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
 
@@ -10,8 +10,7 @@ __all__ = [
     "Comparison",
     "Exceeded",
     "Limits",
-    "check",
     "compare",
+    "exceeded",
     "load_limits",
-    "with_options",
 ]

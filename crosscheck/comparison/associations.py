@@ -38,6 +38,8 @@ SIGNIFICANT = 0.01
 _BINS, _IN_A_BIN = 6, 4
 # A period in time counts if it explains more of the variance than anything else by this share.
 _CLEARLY = 0.15
+# What differs from its mean by less than these parts of its rms, or of the noise, is rounding.
+_OF_THE_RMS, _OF_THE_NOISE = 1e-9, 1e-6
 
 
 @dataclass(frozen=True)
@@ -120,6 +122,8 @@ def _in_cables(
     errors, noise = cable_errors(problem, raw, prediction)
     if not np.isfinite(errors).any() or not np.all(noise > 0):
         return []
+    if not _vary(errors / noise).any():
+        return []  # of one pose all cables have errors; nothing says what these depend on
     part = independent_part(problem, prediction)
     table = (errors / noise).reshape(-1, 1)
     return [
@@ -152,7 +156,7 @@ def _row(
     units: list[str],
     part: float,
 ) -> Association | None:
-    """The association with one quantity; None if the quantity never changes."""
+    """The association with one quantity; None if the quantity or the residuals never change."""
     index, labels = _binned(quantity, np.asarray(np.isfinite(table).any(axis=1)))
     constant = quantity.kind is QuantityKind.EVERYWHERE
     if len(labels) < (1 if constant else 2):
@@ -168,6 +172,8 @@ def _row(
         part * within.sum(keepdims=True), lost.sum(keepdims=True),
     )[0]  # fmt: skip
     total = between.sum() + within.sum()
+    if total <= 0.0:
+        return None
     spread = within.sum() / max(lost.sum(), 1e-9)
     share = 1.0 - spread / max(total / (lost.sum() + won.sum()), 1e-300)
     k = int(np.argmax(np.where(counts > len(labels), between, -1.0)))
@@ -198,13 +204,24 @@ def _squares(table: Array, index: Any, bins: int, constant: bool) -> tuple[Array
     values = np.where(finite, table, 0.0)
     counts = finite.sum(axis=0).astype(float)
     mean = np.zeros(table.shape[1]) if constant else values.sum(axis=0) / np.maximum(counts, 1)
-    values = np.where(finite, values - mean, 0.0)
+    varies = _vary(np.where(finite, table, np.nan)) | constant
+    values = np.where(finite & varies, values - mean, 0.0)
     between = np.zeros(table.shape[1])
     for b in range(bins):
         rows = index == b
         number = finite[rows].sum(axis=0)
         between += values[rows].sum(axis=0) ** 2 / np.maximum(number, 1)
     return between, np.maximum((values**2).sum(axis=0) - between, 0.0), counts
+
+
+def _vary(table: Array) -> NDArray[np.bool_]:
+    """(c,) whether columns (n, c) in units of the noise, NaN if not read, vary beyond rounding."""
+    read = np.isfinite(table)
+    counts = np.maximum(read.sum(axis=0), 1)
+    mean = np.where(read, table, 0.0).sum(axis=0) / counts
+    spread = np.sqrt((np.where(read, table - mean, 0.0) ** 2).sum(axis=0) / counts)
+    rms = np.hypot(mean, spread)
+    return np.asarray(spread > np.maximum(_OF_THE_RMS * rms, _OF_THE_NOISE))
 
 
 def _binned(quantity: Abscissa, some: NDArray[np.bool_]) -> tuple[NDArray[np.int64], list[str]]:

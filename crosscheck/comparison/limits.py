@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from crosscheck.comparison.result import Comparison
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.least_squares.problem import KINDS, Kind
 from crosscheck.units import EXAMPLE, parse_quantity
-from seecr.files import read_toml
+from seecr.files import path_of, read_toml
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,15 @@ class Limits:
     max_position_worst: float | None = None
     max_orientation_worst: float | None = None
     max_tension_worst: float | None = None
+
+    def but(self, texts: Mapping[str, str | None]) -> Limits:
+        """The same with some limits replaced by texts such as ``"0.5mm"``; those of None stay.
+
+        Raises:
+            CrosscheckError: a text is no positive number with a unit of that kind.
+        """
+        given = {name: parse_limit(name, text) for name, text in texts.items() if text is not None}
+        return replace(self, **given)
 
 
 @dataclass(frozen=True)
@@ -88,9 +98,10 @@ def load_limits(path: str | Path) -> Limits:
 
     Raises:
         InputFileError: the file is no TOML or empty, has an unknown key or a value without a unit.
+        InputError: no path.
     """
     expected = 'expected a TOML file with lines such as max_position = "0.5mm"'
-    toml = read_toml(Path(path), expected)
+    toml = read_toml(path_of(path, "limits"), expected)
     if not toml.content:  # nothing could ever exceed such limits
         raise toml.error(f"is empty; {expected}")
     values: dict[str, float] = {}
@@ -112,14 +123,8 @@ def load_limits(path: str | Path) -> Limits:
     return Limits(**values)
 
 
-def with_options(limits: Limits, options: dict[str, str | None]) -> Limits:
-    """Limits of a file, replaced by those of the command line where given."""
-    given = {k: parse_limit(k, v) for k, v in options.items() if v is not None}
-    return replace(limits, **given)
-
-
-def check(limits: Limits, found: Comparison) -> list[Exceeded]:
-    """The limits that are exceeded.
+def exceeded(limits: Limits, found: Comparison) -> list[Exceeded]:
+    """The limits that a comparison exceeds: each with its ``name``, ``limit``, ``value`` and words.
 
     Raises:
         CrosscheckError: a limit is on something that was not measured.

@@ -25,6 +25,7 @@ from crosscheck.fit.least_squares.problem import (
     kinds_stated,
 )
 from crosscheck.fit.least_squares.state import State
+from crosscheck.fit.noise.unstated import errors_are_noise
 from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.fit.reasons import Refusal
 from crosscheck.units import short
@@ -195,6 +196,8 @@ class Comparison(Result):
             said = f"No verdict: {self.refusal}; {self.refusal.remedy}."
             if w.is_noise or self.coloured is not None:
                 return said
+            if errors_are_noise(self.problem, self.state.prediction):
+                return said  # so many times themselves says nothing
             return f"{said} The errors are {w.scale:.3g} times the noise."
         if w.is_noise:
             times = f"{w.scale:.2f} times the {self._known_as} noise"
@@ -239,11 +242,11 @@ class Comparison(Result):
         return [head, *sizes, self.sentence]
 
     def records(self) -> list[Record]:
-        """The errors of every row; None for a reading that was not compared."""
-        data = self.problem.data
-        names, units = channels(self.problem)
-        heads = [f"{n.replace(' ', '_')}_{u}" for n, u in zip(names, units, strict=True)]
-        errors = np.where(self.problem.counted, self.state.raw, np.nan)
+        """The errors of every row, readings that were measured; None where one was not compared."""
+        data, measured = self.problem.data, np.asarray(self.problem.measured.any(axis=0))
+        every = zip(*channels(self.problem), measured, strict=True)
+        heads = [f"{name.replace(' ', '_')}_{unit}" for name, unit, there in every if there]
+        errors = np.where(self.problem.counted, self.state.raw, np.nan)[:, measured]
         values = [[None if e != e else e for e in row] for row in errors.tolist()]
         return [
             {"line": line, "run": run, **dict(zip(heads, row, strict=True))}

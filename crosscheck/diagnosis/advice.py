@@ -152,7 +152,7 @@ def measure_next(
     for effect in missing:
         out += _to_separate(plan, options, effect)
         if not effect.rivals:
-            out.append(f"to confirm {effect.effect}: {effect.check}")
+            out.append(effect.confirmation)
         if effect.common is not None:
             out.append(effect.common.advice)
     if len(alternatives) > 1 or (alternatives and verdict is DiagnosisVerdict.MANY_EFFECTS):

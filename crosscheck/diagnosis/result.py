@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,10 @@ from seecr.effects.base import Layout
 from seecr.files import plain
 from seecr.pose import Array
 from seecr.result import Record, Result
+
+if TYPE_CHECKING:
+    from crosscheck.diagnosis.kept import Diagnosed
+    from seecr.prediction.model import Model
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,6 +74,11 @@ class MissingEffect(Result):
     def indistinguishable(self) -> tuple[str, ...]:
         """Names of the rivals."""
         return tuple(rival.name for rival in self.rivals)
+
+    @property
+    def confirmation(self) -> str:
+        """Its check, as an item of what to measure next."""
+        return f"to confirm {self.effect}: {self.check}"
 
     @property
     def layout(self) -> Layout:
@@ -154,6 +164,7 @@ class Diagnosis(Result):
         left: the remainder beyond noise, and whether it matters; None without a verdict.
         chances: posterior probabilities of all effects; None without a verdict.
         sight: what the data can show and what not, whatever the verdict; None without one.
+        of: the robot, the data and the model that it is of.
     """
 
     verdict: DiagnosisVerdict
@@ -173,11 +184,37 @@ class Diagnosis(Result):
     left: LeftOver | None = None
     chances: Chances | None = None
     sight: Sight | None = None
+    of: Diagnosed | None = None
+
+    @property
+    def model(self) -> Model | None:
+        """The model with the missing effects, to be saved or used; None without a verdict.
+
+        All its effects are fitted together, as ``crosscheck diagnose --model-out`` writes them.
+        """
+        return self._model
+
+    @cached_property
+    def _model(self) -> Model | None:
+        return None if self.of is None else self.of.with_found(self)
+
+    @property
+    def refitted(self) -> tuple[str, ...]:
+        """Effects of the given model that agree with the data only with other values."""
+        return () if self.of is None else self.of.refitted(self)
 
     @property
     def converged(self) -> bool:
         """False if rows could not be solved; True even if the data were insufficient."""
         return self.refusal is None or not self.refusal.unsolved
+
+    @property
+    def reason(self) -> str:
+        """The sentence, to stand beside the verdict's name, which it does not say again."""
+        if self.refusal is None:
+            return self.sentence
+        why = str(self.refusal)
+        return f"{why[0].upper()}{why[1:]}."
 
     @property
     def within_catalogue(self) -> bool:
@@ -187,13 +224,19 @@ class Diagnosis(Result):
 
     @property
     def terms(self) -> Terms:
-        """The missing effects with their values, as a model for the next call."""
+        """The missing effects with the values that are listed; :attr:`model` has all effects."""
         return Terms(found.term for found in self.missing)
+
+    @property
+    def measure_further(self) -> tuple[str, ...]:
+        """What to measure next beside the checks of the listed effects, which say it themselves."""
+        said = {found.confirmation for found in self.missing}
+        return tuple(line for line in self.measure_next if line not in said)
 
     def lines(self) -> list[str]:
         """The verdict, how the error falls, and what to measure next."""
         out = [] if self.sight is None else self.sight.lines()
-        out.append(f"{self.verdict.value}: {self.sentence}")
+        out.append(f"{self.verdict.value}: {self.reason}")
         if self.refusal is None:
             out.append(f"before: {rms_words(self.before)}")
             out += [line for found in self.missing for line in found.lines()]
@@ -201,7 +244,7 @@ class Diagnosis(Result):
         if self.left is not None:
             out.append(f"error beyond the noise: {self.left.words}")
         out += [f"note: {note}" for note in self.notes]
-        return [*out, *(f"measure next: {line}" for line in self.measure_next)]
+        return [*out, *(f"measure next: {line}" for line in self.measure_further)]
 
     def records(self) -> list[Record]:
         """A record for each parameter of a missing effect: value and standard error, SI."""

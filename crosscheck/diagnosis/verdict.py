@@ -15,6 +15,7 @@ from crosscheck.diagnosis.contradicted import contradicted_values
 from crosscheck.diagnosis.explained import explained
 from crosscheck.diagnosis.found import found_effects
 from crosscheck.diagnosis.importance import weighed
+from crosscheck.diagnosis.kept import Diagnosed
 from crosscheck.diagnosis.pairs import pairs_instead
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.settled import settled
@@ -31,9 +32,10 @@ from crosscheck.fit.preparation.prepare import Prepared, Progress, noise_floor, 
 from crosscheck.fit.preparation.thinned import thinned
 from crosscheck.fit.reasons import DiagnosisVerdict, Refusal, Unfit, Why
 from crosscheck.fit.words import rms_words
-from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
+from crosscheck.given import GivenModel, GivenRobot, considered, model_of, opened, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.planning.sight import Sight, sight_of
+from seecr.arguments import silent
 from seecr.effects import catalogue
 from seecr.errors import InputError
 from seecr.pose import Array
@@ -52,7 +54,7 @@ def diagnose(
     robot: GivenRobot,
     data: GivenData,
     model: GivenModel = (),
-    progress: Progress = lambda _text, _part: None,
+    progress: Progress = silent,
     *,
     only: Iterable[str] = (),
     exclude: Iterable[str] = (),
@@ -77,19 +79,24 @@ def diagnose(
     if not isinstance(tolerance, Tolerance):
         raise InputError(f"tolerance: expected a crosscheck.Tolerance, got {tolerance!r}")
     robot = robot_of(robot)
-    thin = thinned(robot, measurements_of(data, robot))
+    measured = measurements_of(data, robot)
+    thin = thinned(robot, measured)
+    model = opened(model, robot)
     terms, said = model_of(model, robot)
+    of = Diagnosed.of(robot, measured, model, terms)
     # BLAS on several threads takes longer for matrices as narrow as these, and takes the
     # processors from the compiled loop
     with threadpool_limits(limits=1, user_api="blas"):
         ready = prepare(robot, thin.data, terms, considered(only, exclude))
         found = weighed(_diagnosed(ready, said, progress), ready.problem, tolerance)
+        found = replace(found, of=of)
         if found.search is None:
             return found
         if _may_be_noise(found, ready.problem):
             rows = Refusal(Unfit.STRUCTURE_OR_NOISE, int(ready.problem.use.sum()))
             base = found.search.steps[0].fit
-            return replace(no_verdict(ready.problem, base, found.notes, rows), sight=found.sight)
+            without = no_verdict(ready.problem, base, found.notes, rows)
+            return replace(without, sight=found.sight, of=of)
         others = thin.note_on_others(found.search.last.fit.terms, found.search.problem.sigma)
         against = contradictions(one.term for one in found_effects(found))
         doubts = contradicted_values(found)

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from crosscheck.given import check_above_zero
 from crosscheck.measurements.named import named_columns
+from crosscheck.measurements.stated import parsed
 from seecr.commands.data import Commands
 from seecr.commands.loads import Loads
 from seecr.counted import counted, plural, some
@@ -69,6 +70,20 @@ class Sigma:
 
     def __post_init__(self) -> None:
         check_above_zero(self)
+
+    @classmethod
+    def parsed(cls, texts: Iterable[str]) -> Sigma:
+        """Parse what the command line takes: kinds and quantities, such as ``tension=0.5N``.
+
+        Raises:
+            CrosscheckError: an unknown kind, no quantity, one in another unit, or two for one kind.
+        """
+        return cls(**parsed(texts))
+
+    @property
+    def stated(self) -> dict[str, float]:
+        """The kinds that are stated, with their noise in SI."""
+        return {name: value for name, value in vars(self).items() if value is not None}
 
 
 def origin_of(path: Path) -> str:

@@ -7,7 +7,7 @@ here on.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.beside import Beside, read_beside
-from crosscheck.measurements.data import Measurements
+from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.dwells import averaged_dwells
 from crosscheck.measurements.notice import notice
 from crosscheck.measurements.together import together
@@ -49,6 +49,7 @@ def load_measurements(
     path: str | Path | Sequence[str | Path],
     robot: GivenRobot,
     *,
+    sigma: Sigma | None = None,
     sigma_path: str | Path | None = None,
 ) -> Measurements:
     """Read measurements, and the TOML beside them if there is one: noise and the like.
@@ -56,20 +57,40 @@ def load_measurements(
     Args:
         path: CSV or Parquet, or several of them: each has its own TOML, and runs stay separate.
         robot: the measured robot, or its MJCF.
+        sigma: noise, in place of the TOML's for the kinds that it states, in all files.
         sigma_path: the TOML, if its name is not the data file's with ``.toml``.
 
     Raises:
         InputFileError: any mistake in either file.
-        InputError: no path.
+        InputError: no path, or ``sigma`` is something else than a :class:`crosscheck.Sigma`.
     """
     robot = robot_of(robot)
+    _check_sigma(sigma)
     paths = [path] if isinstance(path, str | Path) or not isinstance(path, Sequence) else path
     for one in paths:
         if not isinstance(one, str | Path):
             raise InputError(f"expected measurements or their files, got {type(one).__name__}")
     if not paths:
         raise InputError("expected measurements or their files, got none")
-    return together([_measured(Path(one), robot, sigma_path) for one in paths])
+    return _stated(together([_measured(Path(one), robot, sigma_path) for one in paths]), sigma)
+
+
+def _check_sigma(sigma: Sigma | None) -> None:
+    """Check that it is noise, if anything, before files are read."""
+    if sigma is not None and not isinstance(sigma, Sigma):
+        raise InputError(
+            "sigma: expected a crosscheck.Sigma, such as Sigma(position_m=1e-4), got "
+            f"{type(sigma).__name__}"
+        )
+
+
+def _stated(data: Measurements, sigma: Sigma | None) -> Measurements:
+    """The measurements with the noise that is stated for them, the same in all files."""
+    if sigma is None or not sigma.stated:
+        return data
+    ratio = data.sigma_ratio.copy()
+    ratio[:, [item.name in sigma.stated for item in fields(Sigma)]] = 1.0
+    return replace(data, sigma=replace(data.sigma, **sigma.stated), sigma_ratio=ratio)
 
 
 def _measured(path: Path, robot: Robot, sigma_path: str | Path | None) -> Measurements:
@@ -84,21 +105,27 @@ def _measured(path: Path, robot: Robot, sigma_path: str | Path | None) -> Measur
 
 
 def load_commands(
-    path: str | Path, robot: GivenRobot, *, sigma_path: str | Path | None = None
+    path: str | Path,
+    robot: GivenRobot,
+    *,
+    sigma: Sigma | None = None,
+    sigma_path: str | Path | None = None,
 ) -> Measurements:
     """Like :func:`load_measurements`, for commands that have not been measured yet.
 
     Args:
         path: CSV or Parquet.
         robot: the robot to be commanded, or its MJCF.
+        sigma: noise to expect, in place of the TOML's for the kinds that it states.
         sigma_path: the TOML, if its name is not the data file's with ``.toml``.
 
     Raises:
         InputFileError: any mistake in either file.
-        InputError: no path.
+        InputError: no path, or ``sigma`` is something else than a :class:`crosscheck.Sigma`.
     """
     robot = robot_of(robot)
-    return _load(_open(path_of(path, "commands"), robot), robot, sigma_path)
+    _check_sigma(sigma)
+    return _stated(_load(_open(path_of(path, "commands"), robot), robot, sigma_path), sigma)
 
 
 def measurements_of(given: GivenData, robot: Robot) -> Measurements:

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from seecr.description.fingerprint import check_robot
+from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects import Term, Terms
 from seecr.errors import InputError, InputFileError
-from seecr.files import read_text
+from seecr.files import path_of, read_text
 from seecr.made import digits_of
 from seecr.prediction.cells import number_of
 
@@ -20,20 +21,22 @@ __all__ = ["load_diagnosed"]
 _EXPECTED = "expected diagnosis.json as crosscheck diagnose writes it"
 
 
-def load_diagnosed(path: str | Path, robot: Robot) -> tuple[Terms, tuple[str, ...]]:
+def load_diagnosed(path: str | Path, robot: GivenRobot) -> tuple[Terms, tuple[str, ...]]:
     """The missing effects that a diagnosis lists, with the values that it found.
 
     Args:
         path: a ``diagnosis.json``.
-        robot: the robot that was diagnosed.
+        robot: the robot that was diagnosed, or its MJCF.
 
     Returns:
-        the effects, and notes about what has changed of the robot since.
+        the effects, as :func:`crosscheck.add_effects` takes them, and notes about what has changed
+        of the robot since.
 
     Raises:
         InputFileError: no such file, not a diagnosis, of another robot, or without missing effects.
+        InputError: no path.
     """
-    path = Path(path)
+    path, robot = path_of(path, "a diagnosis"), robot_of(robot)
     document = _document(path)
     missing = document.get("missing")
     if not isinstance(missing, list) or "verdict" not in document:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tomlkit
+from tomlkit.items import InlineTable
 
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.own import Kept, kept, without_parts
@@ -28,7 +29,7 @@ from seecr.pose import Array
 from seecr.prediction.cells import UNSEEN
 from seecr.prediction.data_reach import TABLE, DataReach
 from seecr.prediction.experiment import predict
-from seecr.prediction.model import CALIBRATION, FIT, Model
+from seecr.prediction.model import CALIBRATION, FIT, Model, its_model
 from seecr.prediction.uncertainty import CORRELATION, PARAMETERS, STDERR
 
 if TYPE_CHECKING:
@@ -246,11 +247,24 @@ def _fill_cells(parameters: Any, fitted: Fitted) -> None:
             continue  # stays as somebody wrote it
         cell = _cell(layout, i, fitted)
         if isinstance(parameters.get(key), Mapping):
-            parameters[key].update(cell)
-            if "stderr" not in cell:
-                parameters[key].pop("stderr", None)
+            _renew(parameters, key, cell)
         else:
             parameters[key] = _inline(cell | _known(fitted.term.knowledge, i))
+
+
+def _renew(parameters: Any, key: str, cell: Mapping[str, object]) -> None:
+    """Put fitted numbers into a cell; what else people wrote into it stays, with its comment."""
+    old = parameters[key]
+    values = {**{word: value for word, value in old.items() if word != "stderr"}, **cell}
+    if not isinstance(old, InlineTable):
+        old.update(cell)
+        if "stderr" not in cell:
+            old.pop("stderr", None)
+        return
+    fresh, comment = _inline(values), old.trivia.comment
+    parameters[key] = fresh
+    if comment:
+        parameters[key].comment(comment)
 
 
 def _known(knowledge: Knowledge, i: int) -> dict[str, object]:
@@ -327,7 +341,7 @@ def save_model(path: str | Path, model: Model) -> None:
 
     Args:
         path: of the TOML; its folder is made if need be.
-        model: as read, or the ``model`` of a calibration or an addition.
+        model: as read, or the ``model`` of a diagnosis, a calibration or an addition.
 
     Raises:
         InputFileError: the file cannot be written, or the file there is not a model.
@@ -335,7 +349,8 @@ def save_model(path: str | Path, model: Model) -> None:
     """
     if not isinstance(model, Model):
         raise InputError(
-            f"expected a model, such as the .model of a calibration, got {type(model).__name__}"
+            "expected a model, such as the .model of a diagnosis, got "
+            f"{type(model).__name__}{its_model(model)}"
         )
     path = Path(path)
     check_place(path)

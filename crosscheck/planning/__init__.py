@@ -5,6 +5,6 @@ from __future__ import annotations
 from crosscheck.planning.choosing import choose_poses
 from crosscheck.planning.design import make_plan
 from crosscheck.planning.result import Plan
-from crosscheck.planning.write import box_of, write_plan
+from crosscheck.planning.write import write_plan
 
-__all__ = ["Plan", "box_of", "choose_poses", "make_plan", "write_plan"]
+__all__ = ["Plan", "choose_poses", "make_plan", "write_plan"]

@@ -18,7 +18,7 @@ from crosscheck.planning.places import held_within, tilted_grid, trustworthy
 from crosscheck.planning.planned import Planned, Reads, expected_sigma, kinds_of, planned
 from crosscheck.planning.sight import all_visible
 from crosscheck.planning.visibility import EXACT, Signal, signal_left, signals
-from seecr.arguments import whole
+from seecr.arguments import silent, whole
 from seecr.counted import counted
 from seecr.description.joints import pose_of_values
 from seecr.description.robot import ITS_A_POINT, Robot
@@ -47,7 +47,7 @@ def choose_poses(
     reads: Collection[str] = (),
     limits: Limits = NO_LIMITS,
     box: Array | None = None,
-    progress: Progress = lambda _text, _part: None,
+    progress: Progress = silent,
 ) -> Measurements:
     """Choose poses to measure: those that together show and tell apart most effects.
 

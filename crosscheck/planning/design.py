@@ -27,6 +27,7 @@ from crosscheck.planning.proposer import propose
 from crosscheck.planning.result import Plan, Visible
 from crosscheck.planning.sight import all_visible
 from crosscheck.planning.visibility import Signal, signals, signals_like
+from seecr.arguments import silent
 from seecr.effects import Term, Terms, layout_of
 from seecr.equilibrium.strained import strained
 from seecr.pose import Array
@@ -36,7 +37,7 @@ def make_plan(
     robot: GivenRobot,
     commands: GivenCommands,
     sigma: Sigma | None = None,
-    progress: Progress = lambda _text, _part: None,
+    progress: Progress = silent,
     *,
     reads: Collection[str] = (),
     limits: Limits = NO_LIMITS,

@@ -19,6 +19,7 @@ from crosscheck.planning.adding import Adding, Extension
 from crosscheck.planning.greedy import Wanted, chosen_poses
 from crosscheck.planning.planned import Planned
 from crosscheck.planning.visibility import EXACT, Signal, signal_left, signals_together
+from seecr.arguments import silent
 from seecr.counted import counted
 from seecr.effects import Term
 from seecr.effects.base import Layout
@@ -109,7 +110,7 @@ def propose(
     own: Signals,
     wanted: Sequence[Wanted],
     signals: Callable[[Planned], Signals],
-    progress: Progress = lambda _text, _part: None,
+    progress: Progress = silent,
 ) -> tuple[Suggestion, ...]:
     """What to add, each tried by itself, the most useful first.
 

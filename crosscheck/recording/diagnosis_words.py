@@ -26,10 +26,10 @@ model, pink edges the first.
 
 def verdict_words(found: Diagnosis, shown: Misfit | None) -> str:
     """The verdict, what to measure next, what was assumed, and how to read the views."""
-    parts = [f"# {found.verdict.heading}\n{plain(found.sentence)}\n"]
+    parts = [f"# {found.verdict.heading}\n{plain(found.reason)}\n"]
     if shown is not None:
         parts.append(_PLAY.format(arrows=misfit.misfit_words(shown)))
-    parts += _listed("What to measure next", list(found.measure_next))
+    parts += _listed("What to measure next", list(found.measure_further))
     parts += _listed("Notes", list(found.notes))
     return "\n".join(parts)
 

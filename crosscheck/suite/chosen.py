@@ -12,7 +12,7 @@ from crosscheck.suite.effects import GROUP, PREFIX, EffectCase, shipped_effect_c
 from seecr.description.shipped import model_names
 from seecr.errors import InputError
 
-__all__ = ["GivenCase", "chosen_cases", "every_shipped", "shipped_like"]
+__all__ = ["GivenCase", "chosen_cases", "every_shipped", "select", "shipped_like"]
 
 GivenCase: TypeAlias = Case | EffectCase | GivenRobot
 """A case, the name of shipped ones or a pattern such as "cogiro-*", a robot or its MJCF."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from seecr.files import Toml, plain, read_toml
+from seecr.files import Toml, path_of, plain, read_toml
 
 SHIPPED = Path(__file__).with_name("thresholds.toml")
 
@@ -74,9 +74,10 @@ def load_thresholds(path: str | Path | None = None) -> Thresholds:
 
     Raises:
         InputFileError: not TOML, an unknown table or key, or a value of another kind.
+        InputError: no path.
     """
     shipped = _merge(Thresholds(), SHIPPED)
-    return shipped if path is None else _merge(shipped, Path(path))
+    return shipped if path is None else _merge(shipped, path_of(path, "thresholds"))
 
 
 def thresholds_toml(thresholds: Thresholds) -> str:

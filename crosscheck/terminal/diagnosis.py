@@ -33,7 +33,7 @@ def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None)
     console = console_for(console)
     for line in found.sight.lines() if found.sight is not None else ():
         say(console, line, "dim")
-    say(console, f"{found.verdict}: {found.sentence}", _STYLE[found.verdict])
+    say(console, f"{found.verdict}: {found.reason}", _STYLE[found.verdict])
     for note in found.notes:
         say(console, f"note: {note}", "dim")
     if found.verdict is not DiagnosisVerdict.NO_VERDICT:
@@ -49,7 +49,7 @@ def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None)
         _print_candidates(console, found)
         for line in equals_of(found):
             say(console, line, "dim")
-    for line in found.measure_next:
+    for line in found.measure_further:
         say(console, f"measure next: {line}")
     say(console, f"Results in {out}/ (open diagnosis.html)", "dim")
 

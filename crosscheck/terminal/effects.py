@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 from rich.table import Table
@@ -36,17 +37,41 @@ def effect_record(effect: type[Effect], robot: Robot | None) -> Record:
 
 def _parameters(effect: type[Effect], robot: Robot | None) -> list[Record]:
     if robot is None:
-        return [
-            {"name": f.name, "unit": f.metadata["unit"], "each": f.metadata["size"]}
-            for f in fields(effect)
-        ]
+        return [_parameter(f.name, f.metadata) for f in fields(effect)]
     layout = layout_of(effect, robot)
+    words = [size_words(f.metadata) for f in fields(effect) for _ in range(layout.count(f.name))]
     rows = zip(
         layout.names, layout.units, layout.null.tolist(), layout.lower.tolist(),
-        layout.upper.tolist(), layout.scale.tolist(), layout.shape.tolist(), strict=True,
+        layout.upper.tolist(), layout.scale.tolist(), layout.shape.tolist(), words, strict=True,
     )  # fmt: skip
-    keys = ("name", "unit", "absent", "lower", "upper", "plausible_size", "shapes_the_others")
+    keys = (
+        "name", "unit", "absent", "lower", "upper", "plausible_size", "shapes_the_others",
+        "plausible_size_words",
+    )  # fmt: skip
     return [dict(zip(keys, row, strict=True)) for row in rows]
+
+
+def _parameter(name: str, metadata: Mapping[str, Any]) -> Record:
+    """A parameter of any robot; no number where its plausible size depends on the robot."""
+    scale = metadata["scale"]
+    return {
+        "name": name,
+        "unit": metadata["unit"],
+        "each": metadata["size"],
+        "absent": metadata["null"],
+        "plausible_size": None if callable(scale) else scale,
+        "shapes_the_others": metadata["shape"],
+        "plausible_size_words": size_words(metadata),
+    }
+
+
+def size_words(metadata: Mapping[str, Any]) -> str:
+    """A parameter's plausible size in words: a number with its unit, or a formula of the robot."""
+    scale = metadata["scale"]
+    if callable(scale):
+        return str(getattr(scale, "words", "depends on the robot"))
+    factor, unit = in_unit(metadata["unit"])
+    return f"{factor * scale:.3g} {unit}".strip()
 
 
 def parameter_lines(name: str, values: Mapping[str, float]) -> list[str]:
@@ -88,10 +113,19 @@ def print_effect(effect: type[Effect], robot: Robot | None) -> None:
 
 
 def _plain_sizes(effect: type[Effect]) -> Iterator[str]:
-    """A line for each parameter of any robot."""
+    """A line for each parameter of any robot, with its plausible size or a formula of that."""
+    of_robot = False
     for item in fields(effect):
-        unit = in_unit(item.metadata["unit"])[1] or "no unit"
-        yield f"{item.name} [{unit}]{EACH[item.metadata['size']]}"
+        meta = item.metadata
+        factor, unit = in_unit(meta["unit"])
+        null = f"{factor * meta['null']:.4g}"
+        words = f"absent at {null}, plausible size {size_words(meta)}"
+        if meta["shape"]:
+            words = f"modifies the others, starts at {null}"
+        of_robot |= callable(meta["scale"]) and not meta["shape"]
+        yield f"{item.name} [{unit or 'no unit'}]{EACH[meta['size']]}: {words}"
+    if of_robot:
+        yield "plausible sizes depend on the robot: --robot ROBOT.xml gives their numbers"
 
 
 def _sizes_for(effect: type[Effect], robot: Robot) -> Iterator[str]:

@@ -21,7 +21,7 @@ import numpy as np
 from crosscheck.measurements.data import Sigma
 from crosscheck.twin.measure import Truth
 from seecr.errors import InputFileError
-from seecr.files import plain, read_text
+from seecr.files import path_of, plain, read_text
 from seecr.pose import pose_difference
 
 NAME = "answer.sealed"
@@ -109,8 +109,9 @@ def unseal(path: str | Path) -> Answer:
 
     Raises:
         InputFileError: there is no such file, or it is not a sealed answer.
+        InputError: no path.
     """
-    path = Path(path)
+    path = path_of(path, "a sealed answer")
     file = path / NAME if path.is_dir() else path
     first, _, body = read_text(file, _EXPECTED).partition("\n")
     try:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from seecr.cli.options import FILE
+from seecr.cli.options import FILE, Number
 
 if TYPE_CHECKING:
     import numpy as np
@@ -67,11 +67,11 @@ def robot_options(function: F) -> F:
 def limit_options(function: F) -> F:
     """``--lowest`` and ``--highest``, given as ``lowest`` and ``highest`` [N], None without."""
     function = click.option(
-        "--highest", type=float, metavar="N", help="Highest allowed tension of every cable [N]."
+        "--highest", type=Number(), metavar="N", help="Highest allowed tension of every cable [N]."
     )(function)
     return click.option(
         "--lowest",
-        type=float,
+        type=Number(),
         default=0.0,
         show_default=True,
         metavar="N",
@@ -84,7 +84,7 @@ def turned_option(of: str) -> Callable[[F], F]:
     return click.option(
         "--turned",
         nargs=4,
-        type=float,
+        type=Number(),
         metavar="QW QX QY QZ",
         callback=_unit_turn,
         help=f"Orientation of {of}.  [default: that of the reference pose]",

@@ -189,8 +189,7 @@ def _as_tracked(
     """Where the platform is to come to, and what the model's tracker has to do with it."""
     import numpy as np
 
-    from seecr import InputError
-    from seecr.prediction.sensed import placed, tracked
+    from seecr import InputError, placed, tracked
     from seecr.report.corrections import joint_lines
     from seecr.units import millimetres
 

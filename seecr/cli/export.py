@@ -14,7 +14,7 @@ from seecr.cli.arguments import (
     robot_options,
 )
 from seecr.cli.following import following
-from seecr.cli.options import FILE, json_option, made_by
+from seecr.cli.options import FILE, Number, json_option, made_by
 
 
 @click.command(
@@ -28,7 +28,7 @@ Examples:
 )
 @robot_options
 @click.argument("out", type=FILE, metavar="OUT.xml")
-@click.argument("coordinates", nargs=-1, type=float, metavar="[X Y Z [QW QX QY QZ]]")
+@click.argument("coordinates", nargs=-1, type=Number(), metavar="[X Y Z [QW QX QY QZ]]")
 @click.option("--out", "folder", type=FILE, metavar="DIR", help="Write OUT.xml into this folder.")
 @json_option
 def command(

@@ -45,7 +45,7 @@ def given_with(cable: str | None, model: Path | None) -> Words:
 
 def mapping(machine: Robot, robot: Path, cable: str | None, model: Model | None) -> str:
     """The workspace with a model; with one that has a history what maps know of it."""
-    from seecr.workspace.maps import with_history
+    from seecr import with_history
 
     file = None if model is None else model.path
     if model is None or not with_history(machine, model):

@@ -24,6 +24,39 @@ SECONDS_BETWEEN_LINES = 15.0
 """How often work that takes long tells where it is, without a terminal."""
 
 
+class WholeNumber(click.IntRange):
+    """A whole number in a range; what is none, or outside, is told what was expected."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """The number, or a usage error."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter:
+            self.fail(f"expected a whole number{_within(self)}, got {value!r}.", param, ctx)
+
+
+class Number(click.FloatRange):
+    """A number in a range; what is none, or outside, is told what was expected."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """The number, or a usage error."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter:
+            self.fail(f"expected a number{_within(self)}, got {value!r}.", param, ctx)
+
+
+def _within(numbers: click.IntRange | click.FloatRange) -> str:
+    """A range in words, with a space before; nothing if there is none."""
+    low, high = numbers.min, numbers.max
+    if low is None:
+        return "" if high is None else f" of at most {high:g}"
+    least = f"above {low:g}" if numbers.min_open else f"of at least {low:g}"
+    return f" {least}" if high is None else f" {least} and at most {high:g}"
+
+
 FILE = click.Path(path_type=Path)
 """A file that the command itself opens, so that the error is its own."""
 
@@ -53,7 +86,7 @@ json_option = click.option(
 
 jobs_option = click.option(
     "--jobs",
-    type=click.IntRange(min=1),
+    type=WholeNumber(min=1),
     default=None,
     metavar="N",
     help="Number of parallel processes.  [default: one per processor]",
@@ -62,7 +95,7 @@ jobs_option = click.option(
 
 seed_option = click.option(
     "--seed",
-    type=click.IntRange(min=0),
+    type=WholeNumber(min=0),
     default=0,
     show_default=True,
     metavar="N",

@@ -9,7 +9,7 @@ import click
 
 from seecr.cli.arguments import NumbersCommand, model_at, notes_of, pose_of, robot_at, robot_options
 from seecr.cli.following import after_pose
-from seecr.cli.options import FILE, json_option, made_by, progress_share
+from seecr.cli.options import FILE, Number, json_option, made_by, progress_share
 
 if TYPE_CHECKING:
     from seecr import Barrier
@@ -26,7 +26,7 @@ Examples:
 """,
 )
 @robot_options
-@click.argument("coordinates", nargs=-1, type=float, metavar="X Y Z [QW QX QY QZ]")
+@click.argument("coordinates", nargs=-1, type=Number(), metavar="X Y Z [QW QX QY QZ]")
 @click.option("--alone", is_flag=True, help="Do not search for other equilibria.")
 @click.option("--out", type=FILE, metavar="DIR", help="Folder for pose.json.  [default: none]")
 @json_option

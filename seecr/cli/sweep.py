@@ -25,7 +25,15 @@ from seecr.cli.arguments import (
     turned_option,
 )
 from seecr.cli.following import after_sweep
-from seecr.cli.options import FILE, json_option, made_by, out_option, progress_bar
+from seecr.cli.options import (
+    FILE,
+    Number,
+    WholeNumber,
+    json_option,
+    made_by,
+    out_option,
+    progress_bar,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -59,11 +67,15 @@ Examples:
 @robot_options
 @click.argument("poses", type=FILE, metavar="[POSES.csv]", required=False)
 @click.option(
-    "--line", nargs=6, type=float, metavar="X Y Z X Y Z", help="From one position to another [m]."
+    "--line",
+    nargs=6,
+    type=Number(),
+    metavar="X Y Z X Y Z",
+    help="From one position to another [m].",
 )
 @click.option(
     "--count",
-    type=click.IntRange(min=1),
+    type=WholeNumber(min=1),
     metavar="N",
     help=f"Poses of --line.  [default: {_COUNT}]",
 )

@@ -20,7 +20,7 @@ from seecr.cli.arguments import (
     turned_option,
 )
 from seecr.cli.following import following
-from seecr.cli.options import finite_option, json_option, made_by, out_option, progress_bar
+from seecr.cli.options import Number, finite_option, json_option, made_by, out_option, progress_bar
 
 if TYPE_CHECKING:
     import numpy as np
@@ -56,20 +56,20 @@ Examples:
     "--wrench",
     "wrenches",
     nargs=6,
-    type=float,
+    type=Number(),
     multiple=True,
     metavar="FX FY FZ MX MY MZ",
     help="The platform must also be held under this wrench [N, N m]; may be repeated for a set.",
 )
 @click.option(
     "--at-least",
-    type=click.FloatRange(0.0, 1.0, min_open=True),
+    type=Number(0.0, 1.0, min_open=True),
     metavar="P",
     help="Also show where poses can be held with this probability, from the model's covariance.",
 )
 @click.option(
     "--edge",
-    type=click.FloatRange(0.0, min_open=True),
+    type=Number(0.0, min_open=True),
     callback=finite_option,
     metavar="M",
     help="Also find the edge of the workspace, to this many metres, between poses of the grid.",

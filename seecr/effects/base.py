@@ -67,7 +67,7 @@ def parameter(
     Args:
         unit: as in the suffixes of CSV columns, such as "m" or "rad"; "" for none.
         scale: plausible size, one standard deviation from tolerances or data sheets; a number
-            or a function of the robot.
+            or a function of the robot, whose ``words`` are told where there is no robot.
         null: value at which the effect is absent.
         bounds: lowest and highest value, numbers or functions of the robot.
         size: "one" number, one per "cable", a "vector" of 3, or a "point" (3 per cable); what
@@ -215,6 +215,10 @@ class Layout:
         """Name of the effect."""
         return self.effect.name
 
+    def count(self, field: str) -> int:
+        """How many numbers a field of the effect has."""
+        return next(count for name, count, _size in self._parts if name == field)
+
     @property
     def cable_by_cable(self) -> list[NDArray[np.intp]]:
         """Parameters that every cable has one of, in their order: one (m,) index array each."""
@@ -263,6 +267,23 @@ def mean_length(robot: Robot) -> float:
     return float(np.mean(robot.nominal_lengths(robot.reference_pose[None])))
 
 
-def of_length(part: float) -> Callable[[Robot], float]:
+@dataclass(frozen=True)
+class OfRobot:
+    """A plausible size, or a bound, that depends on the robot.
+
+    Attributes:
+        words: the formula, such as "2 % of the mean cable length".
+        value: the number for a robot, in SI.
+    """
+
+    words: str
+    value: Callable[[Robot], float]
+
+    def __call__(self, robot: Robot) -> float:
+        return self.value(robot)
+
+
+def of_length(part: float) -> OfRobot:
     """A plausible size that is a part of the mean cable length."""
-    return lambda robot: part * mean_length(robot)
+    words = f"{100.0 * part:g} % of the mean cable length"
+    return OfRobot(words, lambda robot: part * mean_length(robot))

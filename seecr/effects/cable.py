@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from seecr.description.robot import Robot
-from seecr.effects.base import Effect, mean_length, of_length, parameter
+from seecr.effects.base import Effect, OfRobot, mean_length, of_length, parameter
 from seecr.effects.setup import Setup
 from seecr.effects.totals import Total
 from seecr.pose import Array
@@ -26,6 +26,14 @@ def usual_strain(robot: Robot) -> float:
 def usual_stretch(robot: Robot) -> float:
     """Stretch [m] of such a cable."""
     return usual_strain(robot) * mean_length(robot)
+
+
+_STRAIN = "the strain of a cable under half the weight (of the pretension, if that is more)"
+
+
+def _tenth_of_its_share(robot: Robot) -> float:
+    """A tenth of a cable's share [N] of the weight."""
+    return 0.1 * robot.usual_load / robot.n_cables
 
 
 def _heaviest(robot: Robot) -> float:
@@ -105,8 +113,10 @@ class NonlinearElasticity(Effect):
         "load, not {slope_nominal:.4g}"
     )
 
-    quadratic: float = parameter("", lambda r: 0.3 / usual_strain(r))
-    cubic: float = parameter("", lambda r: 0.3 / usual_strain(r) ** 2)
+    quadratic: float = parameter("", OfRobot(f"0.3 / {_STRAIN}", lambda r: 0.3 / usual_strain(r)))
+    cubic: float = parameter(
+        "", OfRobot(f"0.3 / the square of {_STRAIN}", lambda r: 0.3 / usual_strain(r) ** 2)
+    )
 
     def edit_setup(self, setup: Setup) -> None:
         setup.quadratic = setup.quadratic + self.quadratic
@@ -156,7 +166,12 @@ class CableWeight(Effect):
     advice: ClassVar[str] = "weigh ten metres of cable: expect {weight_10m:.2f} N"
 
     weight: float = parameter(
-        "N_per_m", lambda r: 0.02 * r.usual_load / mean_length(r), bounds=(0.0, _heaviest)
+        "N_per_m",
+        OfRobot(
+            "2 % of the weight / the mean cable length",
+            lambda r: 0.02 * r.usual_load / mean_length(r),
+        ),
+        bounds=(0.0, _heaviest),
     )
 
     def edit_setup(self, setup: Setup) -> None:
@@ -186,9 +201,17 @@ class Hysteresis(Effect):
         "load and unload one cable: expect the two curves to differ by twice {amplitude:.3f} N"
     )
 
-    amplitude: float = parameter("N", lambda r: 0.1 * r.usual_load / r.n_cables, bounds=(0.0, 1e6))
+    amplitude: float = parameter(
+        "N",
+        OfRobot("10 % of the weight / the number of cables", _tenth_of_its_share),
+        bounds=(0.0, 1e6),
+    )
     stretch: float = parameter(
-        "m", lambda r: 0.3 * usual_stretch(r), null=1e-3, bounds=(1e-9, 10.0), shape=True
+        "m",
+        OfRobot(f"30 % of the mean cable length x {_STRAIN}", lambda r: 0.3 * usual_stretch(r)),
+        null=1e-3,
+        bounds=(1e-9, 10.0),
+        shape=True,
     )
 
     def edit_setup(self, setup: Setup) -> None:

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from seecr.description.robot import Robot
-from seecr.effects.base import Effect, parameter
+from seecr.effects.base import Effect, OfRobot, parameter
 from seecr.effects.setup import Setup
 from seecr.effects.totals import Total
 from seecr.pose import Array, quat_from_rotvec, quat_rotate
@@ -17,6 +17,10 @@ from seecr.pose import Array, quat_from_rotvec, quat_rotate
 # No platform is lighter than this part of what its file says, nor has its centre of mass this
 # many of its own lengths outside of its anchor points.
 _LEAST_MASS, _FARTHEST = 0.05, 2.0
+# Plausible sizes, and what the robot's length is.
+_LENGTH = "half the largest distance of two anchor points"
+_TENTH = OfRobot("10 % of the platform's mass", lambda r: 0.1 * r.mass)
+_FORCE = OfRobot("3 % of the weight", lambda r: 0.03 * r.usual_load)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +32,7 @@ class PlatformMass(Effect):
     title: ClassVar[str] = "mass of the platform"
     advice: ClassVar[str] = "weigh the platform: expect {mass:.4g} kg, not {mass_nominal:.4g}"
 
-    added: float = parameter("kg", lambda r: 0.1 * r.mass, bounds=(lambda r: -0.99 * r.mass, 1e6))
+    added: float = parameter("kg", _TENTH, bounds=(lambda r: -0.99 * r.mass, 1e6))
 
     def edit_setup(self, setup: Setup) -> None:
         # a platform keeps a thousandth of its mass, whatever a search tries
@@ -55,7 +59,9 @@ class CentreOfMass(Effect):
         "({x_nominal:.1f}, {y_nominal:.1f}, {z_nominal:.1f})"
     )
 
-    shift: Array = parameter("m", lambda r: 0.1 * r.length, size="vector")
+    shift: Array = parameter(
+        "m", OfRobot(f"10 % of {_LENGTH}", lambda r: 0.1 * r.length), size="vector"
+    )
 
     def edit_setup(self, setup: Setup) -> None:
         setup.centre_of_mass = setup.centre_of_mass + self.shift
@@ -83,8 +89,10 @@ class ExternalWrench(Effect):
     title: ClassVar[str] = "a constant force and moment on the platform"
     advice: ClassVar[str] = "look for a hose or cable that pulls on the platform, and remove it"
 
-    force: Array = parameter("N", lambda r: 0.03 * r.usual_load, size="vector")
-    moment: Array = parameter("Nm", lambda r: 0.03 * r.usual_load * r.length, size="vector")
+    force: Array = parameter("N", _FORCE, size="vector")
+    moment: Array = parameter(
+        "Nm", OfRobot(f"{_FORCE.words} x {_LENGTH}", lambda r: _FORCE(r) * r.length), size="vector"
+    )
 
     def edit_setup(self, setup: Setup) -> None:
         setup.wrench = setup.wrench + np.concatenate([self.force, self.moment])

@@ -8,13 +8,16 @@ from typing import ClassVar
 import numpy as np
 
 from seecr.description.robot import Robot
-from seecr.effects.base import Effect, mean_length, parameter
+from seecr.effects.base import Effect, OfRobot, mean_length, parameter
 from seecr.effects.setup import Setup
 
 
-def _plausible(robot: Robot) -> float:
+def _third(robot: Robot) -> float:
     """A frame that yields a third as much as its cables stretch."""
     return 0.3 * mean_length(robot) / float(np.mean(robot.ea))
+
+
+_PLAUSIBLE = OfRobot("0.3 x the mean cable length / the mean E S", _third)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +41,8 @@ class FrameCompliance(Effect):
         "compliance_m_per_N": ("sideways_m_per_N", "upwards_m_per_N")
     }
 
-    sideways: float = parameter("m_per_N", _plausible, bounds=(0.0, 1e3))
-    upwards: float = parameter("m_per_N", _plausible, bounds=(0.0, 1e3))
+    sideways: float = parameter("m_per_N", _PLAUSIBLE, bounds=(0.0, 1e3))
+    upwards: float = parameter("m_per_N", _PLAUSIBLE, bounds=(0.0, 1e3))
 
     def edit_setup(self, setup: Setup) -> None:
         setup.compliance = setup.compliance + self.sideways

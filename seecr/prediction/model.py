@@ -52,6 +52,7 @@ from seecr.pose import Array
 from seecr.prediction.cells import Where, term_of
 from seecr.prediction.data_reach import TABLE, DataReach
 from seecr.result import Record, Result
+from seecr.units import with_error
 
 if TYPE_CHECKING:
     from seecr.statics.solution import Solution
@@ -168,11 +169,17 @@ class Model(Result):
         return [("", term.vector, self.errors_of(name)), *tables]
 
 
+def _known(value: float, error: float) -> str:
+    """A value with its standard error, to the digits that are known; alone if there is none."""
+    if not (math.isfinite(error) and error > 0.0):
+        return f"{value:.6g}"
+    return " ± ".join(with_error(value, error))
+
+
 def _shown(term: Term, stderr: Array, most: int = 3) -> str:
     """The first few values of an effect, as text."""
     parts = [
-        f"{key} = {value:.6g}"
-        + (" (fixed)" if fixed else f" +- {error:.2g}" if math.isfinite(error) else "")
+        f"{key} = {_known(value, error)}" + (" (fixed)" if fixed else "")
         for key, value, error, fixed in zip(
             term.layout.names, term.vector, stderr, term.knowledge.fixed, strict=True
         )
@@ -214,8 +221,14 @@ def no_effects(got: object) -> InputError:
     what = repr(got) if isinstance(got, str) else type(got).__name__
     return InputError(
         "expected a model, its path, or a list of effects with their values, as "
-        f"seecr.Term.of(robot, name, ...) gives each, got {what}"
+        f"seecr.Term.of(robot, name, ...) gives each, got {what}{its_model(got)}"
     )
+
+
+def its_model(got: object) -> str:
+    """Of a result that has a model, such as a diagnosis: that it has."""
+    has = hasattr(type(got), "model") or "model" in getattr(got, "__dict__", {})
+    return "; its .model is one" if has else ""
 
 
 def model_given(given: Model | str | Path, robot: Robot) -> Model:
@@ -229,7 +242,7 @@ def model_given(given: Model | str | Path, robot: Robot) -> Model:
         return given
     if isinstance(given, str | Path):
         return load_model(given, robot)
-    raise InputError(f"expected a model or its path, got {type(given).__name__}")
+    raise InputError(f"expected a model or its path, got {type(given).__name__}{its_model(given)}")
 
 
 def new_model(robot: GivenRobot) -> Model:

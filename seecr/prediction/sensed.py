@@ -16,6 +16,7 @@ from seecr.effects import Effect
 from seecr.errors import InputError
 from seecr.pose import Array, pose_add, pose_difference
 from seecr.prediction.experiment import Experiment, effects_of
+from seecr.statics.starts import Commanded, commands_from
 
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects
@@ -26,23 +27,41 @@ __all__ = ["placed", "tracked"]
 _ROUNDS, _READ = 50, 1e-12
 
 
-def tracked(robot: GivenRobot, commands: Commands, effects: GivenEffects) -> Array:
-    """Poses (n, 7) that a model's tracker reads when the platform is at the commanded poses."""
+def tracked(robot: GivenRobot, commands: Commanded, effects: GivenEffects) -> Array:
+    """Poses (n, 7) that a model's tracker reads when the platform is at the commanded poses.
+
+    Args:
+        robot: as described, or its MJCF.
+        commands: poses (n, 7), or what has poses.
+        effects: a model, its file, or effects with values.
+
+    Raises:
+        InputError: poses, robot or effects of a wrong type or shape.
+    """
     robot = robot_of(robot)
-    return _tracked(robot, commands, effects_of(effects, robot))
+    return _tracked(robot, commands_from(commands, robot), effects_of(effects, robot))
 
 
-def placed(robot: GivenRobot, commands: Commands, effects: GivenEffects) -> Commands:
+def placed(robot: GivenRobot, commands: Commanded, effects: GivenEffects) -> Commands:
     """Commands at whose poses a model's tracker reads the poses of ``commands``.
+
+    These are what :func:`seecr.correct` takes to bring the platform to where its tracker reads the
+    wanted poses, as ``seecr correct --as-read`` does.
 
     How a calibration shares an error between tracker and robot hardly matters for what is read, but
     matters much for where the platform is taken to be. Joints keep a platform from some poses: it
     is then read as nearly so as they allow.
 
+    Args:
+        robot: as described, or its MJCF.
+        commands: poses (n, 7) to be read, or what has poses.
+        effects: a model, its file, or effects with values.
+
     Raises:
-        InputError: no pose is read so.
+        InputError: poses, robot or effects of a wrong type or shape, or no pose is read so.
     """
     robot = robot_of(robot)
+    commands = commands_from(commands, robot)
     acting, at = effects_of(effects, robot), commands
     for _ in range(_ROUNDS):
         missed = pose_difference(commands.pose, _tracked(robot, at, acting))

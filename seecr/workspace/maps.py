@@ -182,8 +182,15 @@ def _refuse_memory(robot: Robot, effects: GivenEffects) -> None:
         )
 
 
-def with_history(robot: Robot, effects: GivenEffects) -> list[str]:
-    """Names of the effects by which a row depends on the rows before it."""
+def with_history(robot: GivenRobot, effects: GivenEffects) -> list[str]:
+    """Names of the effects by which a row depends on the rows before it.
+
+    Maps know none of them, and what one is asked for with such effects is refused.
+
+    Raises:
+        InputError: something other than a robot, or than effects with values.
+    """
+    robot = robot_of(robot)
     at_home = Experiment(robot, Commands(robot.reference_pose[None]))
     return [one.name for one in effects_of(effects, robot) if at_home.setup([one]).has_history]
 

@@ -14,7 +14,6 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.fit.reasons import Why
 from crosscheck.given import considered
 from crosscheck.measurements.data import Sigma
-from crosscheck.measurements.stated import stated
 from seecr.effects import Term, catalogue
 from seecr.errors import InputError
 
@@ -48,10 +47,11 @@ def test_a_calibration_fits_what_it_is_told_to_and_what_the_model_has() -> None:
 
 
 def test_noise_is_stated_with_its_unit() -> None:
-    told = stated(Sigma(position_m=1.0, tension_N=2.0), ["position=0.1mm", "orientation=0.1 deg"])
-    assert told.position_m == pytest.approx(1e-4) and told.tension_N == 2.0
+    told = Sigma.parsed(["position=0.1mm", "orientation=0.1 deg"])
+    assert told.position_m == pytest.approx(1e-4) and told.tension_N is None
     assert told.orientation_rad == pytest.approx(1.7453e-3, rel=1e-4)
-    assert stated(Sigma(), ["length=0.2mm"]).length_m == pytest.approx(2e-4)
+    assert Sigma.parsed(["length=0.2mm"]) == Sigma(length_m=2e-4)
+    assert told.stated.keys() == {"position_m", "orientation_rad"}
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_noise_is_stated_with_its_unit() -> None:
 )
 def test_noise_that_is_none_is_refused(text: str, words: str) -> None:
     with pytest.raises(CrosscheckError, match=words):
-        stated(Sigma(), [text])
+        Sigma.parsed([text])
 
 
 def test_from_the_command_line(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, cast
 
+import made_diagnoses
 import numpy as np
 import pytest
 
@@ -15,6 +16,7 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.data import Measurements
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
+from seecr.effects import Terms
 from seecr.errors import InputError
 
 
@@ -58,10 +60,26 @@ BAD: dict[str, tuple[Callable[[], Any], str]] = {
         "tolerance: expected a crosscheck.Tolerance, got '1mm'",
     ),
     "names": (
-        lambda: crosscheck.add_effects(ROBOT, DATA, cast(Any, ["creep"])),
-        "expected a model, its path, or a list of effects with their values, .* got 'creep'",
+        lambda: crosscheck.add_effects(ROBOT, DATA, ["creep", cast(Any, 3)]),
+        "expected names of effects, effects with their values, or a result .* got int",
     ),
     "a number": (lambda: crosscheck.add_effects(ROBOT, DATA, cast(Any, 3)), "effects .* got int"),
+    "noise": (
+        lambda: crosscheck.load_measurements("m.csv", ROBOT, sigma=cast(Any, {"position": 1.0})),
+        "sigma: expected a crosscheck.Sigma, such as .* got dict",
+    ),
+    "a diagnosis": (
+        lambda: crosscheck.compare(ROBOT, DATA, cast(Any, made_diagnoses.none())),
+        "expected a model, .*, got Diagnosis; its .model is one",
+    ),
+    "a diagnosis to save": (
+        lambda: crosscheck.save_model("m.toml", cast(Any, made_diagnoses.none())),
+        "expected a model, .*, got Diagnosis; its .model is one",
+    ),
+    "effects to save": (
+        lambda: crosscheck.save_model("m.toml", cast(Any, Terms())),
+        "expected a model, such as the .model of a diagnosis, got Terms$",
+    ),
     "seed": (lambda: crosscheck.make_twin(ROBOT, -1), "seed: expected a whole number from 0 on"),
     "count": (
         lambda: crosscheck.make_twin(ROBOT, 1, n_effects=-2), "n_effects: expected a whole number",

@@ -156,7 +156,7 @@ class Exact:
         """
         shapes = tuple((name, scores.shapes.get(name)) for name in sorted(names))
         if names not in self.fitted:
-            self.report(" + ".join(sorted(names)) or "none")
+            self.report(" + ".join(sorted(names)) or "the model as it is")
             self._fit(scores, names)
         elif shapes not in self._begun.get(names, set()) and self._promises_more(scores, names):
             self.report(" + ".join(sorted(names)))

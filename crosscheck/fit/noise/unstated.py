@@ -63,6 +63,21 @@ def estimate_sigma(problem: Problem, at: Prediction) -> tuple[Problem, tuple[str
     return problem.with_sigma(sigma), tuple(notes)
 
 
+def errors_are_noise(problem: Problem, at: Prediction) -> bool:
+    """Whether too few rows left nothing but the errors themselves to count as noise of a kind.
+
+    Args:
+        problem: the data. at: the prediction of the model as it stands.
+    """
+    raw, shapes = problem.residuals(at.readings), _shapes(problem, at)
+    open_ = [k for k in kinds_read(problem) if getattr(problem.data.sigma, k.sigma) is None]
+    return any(
+        _differences(problem, raw[:, kind.columns]) is None
+        and _beside(problem, raw[:, kind.columns], shapes) is None
+        for kind in open_
+    )
+
+
 def _best(sizes: Mapping[str, float]) -> str | None:
     """The smallest; of two similar ones the first, which assumes less."""
     best = None

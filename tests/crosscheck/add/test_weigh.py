@@ -18,6 +18,7 @@ from crosscheck.terminal.addition import why_not
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms
+from seecr.errors import InputError
 from seecr.prediction.uncertainty import covariance_of, spread_of
 
 
@@ -111,8 +112,15 @@ def test_several_effects_are_added_together() -> None:
     assert found.pays and found.names == ("pulley_radius", "stiffness")
     for one, truth in zip(found.fitted, Terms(hidden), strict=True):
         assert abs(one.term.vector[0] - truth.vector[0]) < 4.0 * one.stderr[0]
+    named = add_effects(robot(), data, ["stiffness", near[0]])  # by name, and with its value
+    assert named.names == ("pulley_radius", "stiffness")
+    for term in found.terms:
+        assert named.terms[term.name].vector == pytest.approx(term.vector, rel=1e-3)
+    assert add_effects(robot(), data, found).terms.names == found.terms.names  # of a result
     with pytest.raises(CrosscheckError, match="expected at least one effect to add, got none"):
         add_effects(robot(), data, [])
+    with pytest.raises(InputError, match=r"no effect 'stifness'.*first: stiffness"):
+        add_effects(robot(), data, "stifness")
 
 
 @pytest.mark.slow

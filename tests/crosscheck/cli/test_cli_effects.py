@@ -35,6 +35,24 @@ def test_what_every_cable_has_is_told_as_one_per_cable() -> None:
     assert ", x y z per cable" in run("effects", "exit_point_error").stdout
 
 
+def test_plausible_sizes_are_told_without_a_robot_too() -> None:
+    """As a number, or as a formula of the robot, with how to get its number."""
+    assert (
+        "factor [no unit]: absent at 1, plausible size 0.3\n" in run("effects", "stiffness").stdout
+    )
+    said = run("effects", "pulley_radius").stdout
+    assert "radius [mm]: absent at 0, plausible size 2 % of the mean cable length\n" in said
+    assert "plausible sizes depend on the robot: --robot ROBOT.xml gives their numbers" in said
+    assert "depend" not in run("effects", "gravity_tilt").stdout
+    said = run("effects", "creep").stdout
+    assert "time [s]: modifies the others, starts at 100" in said
+    for name in catalogue():  # each built-in one has its formula
+        rows = json.loads(run("effects", name, "--json").stdout)["parameters"]
+        assert all(row["plausible_size_words"] != "depends on the robot" for row in rows)
+        assert all((row["plausible_size"] is None) == ("%" in row["plausible_size_words"]
+                   or " / " in row["plausible_size_words"]) for row in rows)  # fmt: skip
+
+
 def test_units_are_those_that_people_read() -> None:
     assert "sideways [mm/N]" in run("effects", "frame_compliance").stdout
 
@@ -53,6 +71,7 @@ def test_for_programs() -> None:
     assert list(named["made"]["sha256"]) == [COGIRO.name]
     one = json.loads(run("effects", "drum_gain", "--robot", COGIRO, "--json").stdout)
     assert len(one["parameters"]) == load_robot(COGIRO).n_cables
+    assert {row["plausible_size_words"] for row in one["parameters"]} == {"0.005"}
     assert not one["own"]
 
 

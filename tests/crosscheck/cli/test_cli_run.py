@@ -240,9 +240,9 @@ def test_list_names_cases_and_runs_nothing(tmp_path, monkeypatch):
         (("--robot", "no.xml"), "no.xml: no such file"),
         (("--mujoco-robot", "x.xml"), "--mujoco-robot needs --robot"),
         (("--thresholds", "no.toml"), "no.toml: no such file; expected thresholds"),
-        (("--jobs", "0"), "0 is not in the range"),
-        (("--jobs", "two"), "'two' is not a valid integer"),
-        (("--seed", "-1"), "-1 is not in the range"),
+        (("--jobs", "0"), "expected a whole number of at least 1, got '0'"),
+        (("--jobs", "two"), "expected a whole number of at least 1, got 'two'"),
+        (("--seed", "-1"), "expected a whole number of at least 0, got '-1'"),
         (("--sed", "1"), "No such option '--sed'"),
         (("extra",), "unexpected extra argument"),
     ],
@@ -282,12 +282,12 @@ def test_an_output_folder_that_cannot_be_written(tmp_path):
 
 @pytest.mark.slow
 def test_an_error_half_way_leaves_nothing(tmp_path, monkeypatch):
-    from crosscheck import suite
+    from crosscheck.suite import write
 
     def full(*arguments):
         raise OSError(28, "No space left on device", "results.json")
 
-    monkeypatch.setattr(suite, "write_worst_pose", full)
+    monkeypatch.setattr(write, "write_worst_pose", full)
     assert "results.json: No space left on device" in refused(*SMALL, "--out", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

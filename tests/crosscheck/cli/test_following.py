@@ -63,7 +63,9 @@ def test_the_catalogue_and_an_opened_twin_name_a_next_command():
     ],
 )
 def test_after_each_verdict(verdict, missing, model, kept, expected):
-    found = SimpleNamespace(verdict=DiagnosisVerdict(verdict), missing=("one",) * missing)
+    found = SimpleNamespace(
+        verdict=DiagnosisVerdict(verdict), missing=("one",) * missing, refitted=()
+    )
     paths = [None if name is None else Path(name) for name in (model, kept)]
     line = after_diagnosis(found, Given(Path("R"), [Path("D")], paths[0]), paths[1], Path("out"))
     assert expected in line

@@ -33,6 +33,26 @@ def test_shared_options() -> None:
     assert runner.invoke(shared, ["--out"]).exit_code == 2
 
 
+@pytest.mark.parametrize(
+    ("kind", "text", "words"),
+    [
+        (options.WholeNumber(min=6), "abc", "expected a whole number of at least 6, got 'abc'"),
+        (options.WholeNumber(min=6), "5", "expected a whole number of at least 6, got '5'"),
+        (options.Number(), "1,5", "expected a number, got '1,5'"),
+        (options.Number(0.0, 1.0, min_open=True), "0", "a number above 0 and at most 1, got '0'"),
+        (options.Number(max=2.0), "3", "expected a number of at most 2, got '3'"),
+    ],
+)
+def test_numbers_are_refused_with_what_is_expected(
+    kind: click.ParamType, text: str, words: str
+) -> None:
+    with pytest.raises(click.BadParameter) as refused:
+        kind.convert(text, None, None)
+    assert words in str(refused.value)
+    assert options.WholeNumber(min=6).convert("6", None, None) == 6
+    assert options.Number().convert("-1.5", None, None) == -1.5
+
+
 def test_every_limit_is_an_option_of_compare() -> None:
     names = {name for parameter in compare_command.params for name in parameter.opts}
     assert {option(name) for name in RULES} <= names

@@ -112,7 +112,7 @@ def test_one_row_or_rows_all_alike_are_compared(stiff: tuple[Path, Path], tmp_pa
     [
         ("--clock", "nan", "nan is not a finite number"),
         ("--rest-for", "inf", "inf is not a finite number"),
-        ("--rest-for", "-1", "-1.0 is not in the range x>0"),
+        ("--rest-for", "-1", "expected a number above 0, got '-1'"),
     ],
 )
 def test_times_of_an_import_are_numbers(option: str, value: str, said: str) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_data import measured, soft_cogiro
 
-from crosscheck.comparison.limits import RULES, Limits, Rule, check, option
+from crosscheck.comparison.limits import RULES, Limits, Rule, exceeded, option
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
 from crosscheck.errors import CrosscheckError
@@ -34,8 +34,8 @@ def test_a_limit_just_below_is_exceeded_and_one_just_above_holds(
     rule = RULES[name]
     sizes = found.errors_of(rule.kind.name)
     value = float(np.nanmax(sizes)) if rule.worst else found.rms[rule.kind.key]
-    assert value is not None and check(Limits(**{name: 1.001 * value}), found) == []
-    (item,) = check(Limits(**{name: 0.999 * value}), found)
+    assert value is not None and exceeded(Limits(**{name: 1.001 * value}), found) == []
+    (item,) = exceeded(Limits(**{name: 0.999 * value}), found)
     assert (item.name, item.value) == (name, value)
     assert item.words.startswith(rule.words)
     worst = int(np.nanargmax(sizes))
@@ -44,4 +44,4 @@ def test_a_limit_just_below_is_exceeded_and_one_just_above_holds(
 
 def test_a_limit_on_what_was_not_read_is_refused(found: Comparison) -> None:
     with pytest.raises(CrosscheckError, match=r"--max-tension-worst: .* has no tension readings"):
-        check(Limits(max_tension_worst=1.0), found)
+        exceeded(Limits(max_tension_worst=1.0), found)

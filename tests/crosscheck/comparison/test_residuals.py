@@ -11,7 +11,7 @@ from scipy import stats
 
 from crosscheck.comparison.associations import SIGNIFICANT, _labelled, _p
 from crosscheck.comparison.cable_space import cable_errors, independent_part
-from crosscheck.comparison.limits import Limits, check, load_limits, parse_limit, with_options
+from crosscheck.comparison.limits import Limits, exceeded, load_limits, parse_limit
 from crosscheck.comparison.quantities import EVERYWHERE
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.travel import STILL
@@ -135,6 +135,19 @@ def test_noise_goes_with_nothing(robot):
     assert min(firsts) > 1e-4
 
 
+def test_rounding_goes_with_nothing(robot, data):
+    """Readings that differ by rounding alone, with a constant offset of many times the noise."""
+    same = data.rows([0] * 12)
+    shift = np.linspace(3e-4, 3e-4 * (1 + 1e-15), 12)[:, None]
+    found = compare(robot, replace(same, position=same.position + shift))
+    assert found.problem.use.all() and not found.is_noise
+    assert [a.against for a in found.associations if a.significant] == [EVERYWHERE]
+    # the same rows with errors of two sizes
+    shift = np.where(np.arange(12) == 0, 4e-4, 3e-4)[:, None]
+    found = compare(robot, replace(same, position=same.position + shift))
+    assert "direction of travel" in [a.against for a in found.associations if a.significant]
+
+
 def test_a_longer_cable_shows_as_that_cable(robot):
     plain = compare(robot, measured(robot))
     offset = {"offset_3_m": 1e-3}
@@ -167,6 +180,7 @@ def test_tensions_are_compared(robot):
     assert found.rms["tension_rms_N"] > 0.05
     assert sum(c.unit == "N" for c in found.coordinates) == robot.n_cables
     assert found.errors_of("tension").max() > 0.1
+    assert f"tension_of_{robot.cable_names[0]}_N" in found.to_frame().column_names
 
 
 def test_noise_nobody_stated_is_estimated_and_said_so(robot, data):
@@ -241,7 +255,7 @@ def test_limits_without_a_right_unit_are_refused(name, text, words):
 def test_limits_from_a_file_and_the_command_line(tmp_path):
     file = tmp_path / "limits.toml"
     file.write_text('max_position = "0.5mm"\nmax-orientation = "0.2deg"\n')
-    limits = with_options(load_limits(file), {"max_position": "1mm", "max_tension": None})
+    limits = load_limits(file).but({"max_position": "1mm", "max_tension": None})
     assert limits == Limits(max_position=1e-3, max_orientation=np.radians(0.2))
 
 
@@ -266,21 +280,21 @@ def test_bad_limit_files(tmp_path, text, words):
 
 def test_a_limit_says_by_how_much_and_where(off):
     rms = off.rms["position_rms_m"]
-    (item,) = check(Limits(max_position=1e-4), off)
+    (item,) = exceeded(Limits(max_position=1e-4), off)
     assert item.value == rms and item.limit == 1e-4
     assert f"exceeds 0.1 mm by {1e3 * (rms - 1e-4):.4g} mm" in item.words
     sizes = off.errors_of("position")
     line = off.problem.data.line[int(np.argmax(sizes))]
     assert f"worst at line {line}, run " in item.words and "commanded (" in item.words
-    assert check(Limits(max_position=1.01 * rms), off) == []
-    assert check(Limits(max_position_worst=1.01 * sizes.max()), off) == []
-    (item,) = check(Limits(max_position_worst=0.99 * sizes.max()), off)
+    assert exceeded(Limits(max_position=1.01 * rms), off) == []
+    assert exceeded(Limits(max_position_worst=1.01 * sizes.max()), off) == []
+    (item,) = exceeded(Limits(max_position_worst=0.99 * sizes.max()), off)
     assert item.words.startswith("worst position error")
 
 
 def test_a_limit_on_what_was_not_measured_is_refused(off):
     with pytest.raises(CrosscheckError, match="has no tension readings"):
-        check(Limits(max_tension=1.0), off)
+        exceeded(Limits(max_tension=1.0), off)
 
 
 def test_a_pose_error_is_that_of_its_cables(robot, off):
@@ -320,6 +334,8 @@ def test_a_comparison_shows_itself(off):
     assert lines[1].startswith("position ") and lines[-1] == off.sentence
     rows = off.records()
     assert [row["line"] for row in rows] == off.problem.data.line.tolist()
+    read = [*(f"{axis}_m" for axis in "xyz"), *(f"rotation_about_{axis}_rad" for axis in "xyz")]
+    assert off.to_frame().column_names == ["line", "run", *read]  # nobody measured tensions
     assert [row["z_m"] for row in rows] == off.state.raw[:, 2].tolist()
     assert off.to_frame().num_rows == len(rows) and "<table>" in off._repr_html_()
 

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from made_data import measured, term
-from made_diagnoses import POINTS, SIGMA, diagnose_with, pulleys, robot
+from made_diagnoses import POINTS, SIGMA, diagnose_with, none, nothing, pulleys, readings, robot
 
-from crosscheck.diagnosis import found_covariance, found_effects
-from crosscheck.diagnosis.found import _widened
+from crosscheck.comparison.residuals import compare
+from crosscheck.diagnosis.found import _widened, found_covariance, found_effects
 from crosscheck.diagnosis.steps import shown_stages
 from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.model.write import save_model
+from seecr.prediction.experiment import predict
+from seecr.prediction.model import load_model
+from seecr.prediction.uncertainty import covariance_of
 
 
 def test_the_covariance_is_that_of_the_errors_as_listed() -> None:
@@ -60,8 +65,42 @@ def test_beside_many_effects_errors_of_the_model_are_not_widened_by_those_of_one
 
 
 def test_without_a_search_there_is_no_model() -> None:
-    nothing = replace(pulleys(), search=None)
-    assert found_effects(nothing) == () and found_covariance(nothing) is None
+    blind = replace(pulleys(), search=None)
+    assert found_effects(blind) == () and found_covariance(blind) is None
+
+
+def test_a_diagnosis_has_a_model_that_is_kept_compared_and_predicts(tmp_path: Path) -> None:
+    found, data = pulleys(), readings(radius_m=0.01)
+    assert found.model is not None and found.model is found.model
+    save_model(tmp_path / "m.toml", found.model)
+    kept = load_model(tmp_path / "m.toml", robot())
+    assert kept.document["effect"][0]["provenance"]["by"] == "crosscheck diagnose"
+    assert covariance_of(kept) == pytest.approx(covariance_of(found.model))
+    assert kept.stderr["pulley_radius"] == pytest.approx(found.missing[0].stderr, rel=1e-2)
+    assert compare(robot(), data, found.model).is_noise
+    poses = data.command_pose
+    assert predict(robot(), poses, found.model).pose == pytest.approx(
+        predict(robot(), poses, kept).pose
+    )
+
+
+def test_the_model_of_a_diagnosis_has_what_was_given_too(tmp_path: Path) -> None:
+    data, few = readings(radius_m=0.01), ["pulley_radius"]
+    given = [term(robot(), "stiffness", factor=1.0001)]
+    found = diagnose_with(robot(), data, given, only=few)
+    assert found.model is not None and found.model.names == ("stiffness", "pulley_radius")
+    save_model(tmp_path / "m.toml", found.model)
+    # with its own model nothing is missing, and that stays as it is, with its covariance
+    again = diagnose_with(robot(), data, tmp_path / "m.toml", only=few)
+    assert again.model is not None and again.refitted == () and not again.missing
+    save_model(tmp_path / "again.toml", again.model)
+    assert (tmp_path / "again.toml").read_text() == (tmp_path / "m.toml").read_text()
+
+
+def test_without_a_verdict_there_is_no_model_and_of_nothing_missing_the_plain_one() -> None:
+    plain = nothing().model
+    assert none().model is None and plain is not None and plain.names == ()
+    assert replace(nothing(), of=None).model is None
 
 
 def test_the_model_has_the_values_that_explain_most_by_themselves() -> None:

@@ -12,7 +12,6 @@ from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_measurements
-from crosscheck.measurements.stated import with_stated
 from crosscheck.model.write import provenance_of
 from seecr.description.robot import Robot
 from seecr.effects import Terms
@@ -61,7 +60,7 @@ def test_two_days_are_one_with_their_own_noise_clock_and_start(tmp_path: Path, r
     assert data.places([1, 2]) == "monday.csv 3, tuesday.csv 2"
     assert "tuesday.csv without length_m: these lengths are taken as exact." in data.notes
     assert "monday.csv without tension_N: that of tuesday.csv is used." in data.notes
-    quieter = with_stated(data, ["position=2mm"])
+    quieter = load_measurements([monday, tuesday], robot, sigma=Sigma(2e-3))
     assert quieter.sigma.position_m == 2e-3 and np.all(quieter.sigma_ratio[:, 0] == 1.0)
     assert np.any(quieter.sigma_ratio[:, 3] != 1.0)
 

@@ -180,6 +180,21 @@ def test_effects_put_in_from_python_are_written(robot, tmp_path):
     assert "stderr" not in path.read_text() and "weight" in str(model)
 
 
+def test_cells_that_are_fitted_again_keep_their_spaces_and_what_people_wrote(robot, tmp_path):
+    path = tmp_path / "model.toml"
+    path.write_text(
+        '[[effect]]\nname = "pulley_radius"\n[effect.parameters]\n'
+        "radius_m = { value = 0.01, known = { value = 0.01, stderr = 1e-3 } } # by caliper\n"
+    )
+    one = Fitted(term(robot, "pulley_radius", radius_m=0.0099), np.array([1e-4]), np.array([False]))
+    save_model(path, with_fit(load_model(path, robot), [one], [], SOURCE, ERRORS))
+    line = next(text for text in path.read_text().splitlines() if text.startswith("radius_m"))
+    assert line == (
+        "radius_m = { value = 0.0099, known = { value = 0.01, stderr = 1e-3 }, stderr = 0.0001, "
+        'unit = "m", at_bound = false } # by caliper'
+    )
+
+
 def test_effects_changed_or_taken_out_in_python_are_written_so(robot, saved):
     model = load_model(saved, robot)
     more = replace(model, terms=model.terms.with_term(term(robot, "pulley_radius", radius_m=0.02)))

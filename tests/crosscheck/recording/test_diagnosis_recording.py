@@ -204,7 +204,8 @@ def test_no_verdict_is_words_alone(tmp_path: Path) -> None:
     write_diagnosis_recording(made.none(), path)
     back = Readback(path)
     assert back.timelines == set()
-    assert "all commands are the same" in back.static("/text/verdict", "TextDocument:text")[0]
+    words = back.static("/text/verdict", "TextDocument:text")[0]
+    assert words.startswith("# No verdict\nAll commands are the same")
 
 
 @pytest.mark.parametrize("name", ["position_only", "tensions_only", "one_angle", "nothing"])

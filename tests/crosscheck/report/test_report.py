@@ -87,9 +87,11 @@ def test_each_verdict_has_its_page(name: str, verdict: str, heading: str) -> Non
     assert found.verdict == verdict
     seen = text_of(page(name))
     assert heading in seen
-    assert found.sentence in seen
-    for line in (*found.notes, *found.measure_next):
+    assert found.reason in seen and "No verdict: " not in seen
+    for line in (*found.notes, *found.measure_further):
         assert line in seen
+    for effect in found.missing:  # once
+        assert seen.count(effect.check) == 1 and effect.confirmation not in seen
     for row in found.candidates:
         assert f"{row.effect} " in seen
         assert str(row.why_not) in seen

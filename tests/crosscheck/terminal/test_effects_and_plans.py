@@ -96,7 +96,11 @@ def test_for_programs_limits_and_sizes_are_in_si() -> None:
     assert row["unit"] == "m" and row["plausible_size"] == RADIUS.scale[0]
     assert (row["absent"], row["lower"], row["shapes_the_others"]) == (0.0, 0.0, False)
     (row,) = effect_record(effect_named("pulley_radius"), None)["parameters"]
-    assert row == {"name": "radius", "unit": "m", "each": "one"}
+    words = "2 % of the mean cable length"
+    assert row == {
+        "name": "radius", "unit": "m", "each": "one", "absent": 0.0, "plausible_size": None,
+        "shapes_the_others": False, "plausible_size_words": words,
+    }  # fmt: skip
 
 
 def test_values_are_told_in_the_units_that_people_read() -> None:

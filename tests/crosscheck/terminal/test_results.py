@@ -14,7 +14,7 @@ from rich.console import Console
 
 from crosscheck.add import add_effect
 from crosscheck.calibration.result import calibrate
-from crosscheck.comparison.limits import Limits, check
+from crosscheck.comparison.limits import Limits, exceeded
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
@@ -79,9 +79,9 @@ def test_what_rounding_leaves_of_an_error_is_nothing() -> None:
 
 def test_a_limit_that_is_exceeded_is_said(found: Comparison) -> None:
     screen, out = console()
-    exceeded = check(Limits(max_position=1e-6), found)
-    print_comparison(found, exceeded, True, Path("here"), screen)
-    assert exceeded[0].words in out.getvalue() and "All limits hold" not in out.getvalue()
+    beyond = exceeded(Limits(max_position=1e-6), found)
+    print_comparison(found, beyond, True, Path("here"), screen)
+    assert beyond[0].words in out.getvalue() and "All limits hold" not in out.getvalue()
 
 
 def test_an_addition_tells_values_errors_and_what_was_written() -> None:

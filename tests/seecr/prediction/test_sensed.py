@@ -40,6 +40,7 @@ def test_a_platform_is_placed_where_its_tracker_reads_what_is_wanted() -> None:
     alone = tracked(robot, wanted, [target])
     up = wanted.pose[:, :3] + quat_rotate(wanted.pose[:, 3:], np.array([0.0, 0.0, 0.05]))
     np.testing.assert_allclose(alone[:, :3], up, atol=1e-12)
+    assert (tracked(robot, wanted.pose, [target]) == alone).all()  # poses alone will do
     at = placed(robot, wanted, [target, frame])
     np.testing.assert_allclose(tracked(robot, at, [target, frame]), wanted.pose, atol=1e-11)
     assert np.abs(at.pose - wanted.pose).max() > 0.04

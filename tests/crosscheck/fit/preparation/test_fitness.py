@@ -172,7 +172,7 @@ def test_from_the_command_line(tmp_path: Path) -> None:
     lines = data.read_text().splitlines()
     data.write_text("\n".join(lines[:5]) + "\n")
     done = run("diagnose", xml, data, "--out", tmp_path / "out", "--no-recording")
-    assert done.exit_code == 0 and "no_verdict: No verdict: only 4 poses" in done.stdout
+    assert done.exit_code == 0 and "no_verdict: Only 4 poses" in done.stdout
     assert "next: add poses spread over the workspace" in done.stdout
     done = run("compare", xml, data, "--out", tmp_path / "out", "--no-recording")
     assert "No verdict: only 4 poses measured" in done.stdout and "agree" not in done.stdout
@@ -183,6 +183,11 @@ def test_from_the_command_line(tmp_path: Path) -> None:
     assert "times the noise." in " ".join(done.stdout.split())
     words = refused("calibrate", xml, data, "--model", tmp_path / "m.toml")
     assert "only 4 poses measured" in words and not (tmp_path / "m.toml").exists()
+    # two rows: their errors are taken as noise, so that they are not so many times the noise
+    data.with_suffix(".toml").unlink()
+    data.write_text("\n".join(lines[:3]) + "\n")
+    done = run("compare", xml, data, "--out", tmp_path / "out", "--no-recording")
+    assert "are taken as noise" in done.stdout and "The errors are " not in done.stdout
 
 
 def test_readings_of_what_joints_lock_carry_no_verdict() -> None:
