@@ -224,7 +224,10 @@ class Diagnosis(Result):
 
     @property
     def terms(self) -> Terms:
-        """The missing effects with the values that are listed; :attr:`model` has all effects."""
+        """The missing effects with the values that are listed.
+
+        Only of ``effects_found`` do these make a model by themselves, as :attr:`model` always does.
+        """
         return Terms(found.term for found in self.missing)
 
     @property
