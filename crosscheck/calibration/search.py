@@ -104,7 +104,7 @@ def search_sets(
         said, classes = _with_replaceable(found, seen, by_sets, sizes, problem.robot, terms)
     else:
         classes = _about_listed(found, seen, by_sets, sizes, problem.robot, terms)
-        said = seen.with_sure_ones(classes)
+        said = seen.with_sure_ones(found, classes)
     # what outweighs something unknown is there, however much of its worth that could take
     outdone = _outdone(found, in_place) - set(() if said.imitated else said.sure)
     return SetSearch(

@@ -78,15 +78,18 @@ class Judgement:
             verdict = DiagnosisVerdict.MANY_EFFECTS
         return replace(self, sure=sure, verdict=verdict)
 
-    def with_sure_ones(self, classes: Classes) -> Judgement:
+    def with_sure_ones(self, found: ComparedSets, classes: Classes) -> Judgement:
         """The same, given probabilities about just the effects that are listed.
 
         That one of several effects is missing may be sure, as members of one class, and still be
-        open of each where two of them stand for the first.
+        open of each where two of them stand for the first. Then sets that explain as well lack it.
         """
-        sure = tuple(n for n in self.sure if classes.of(n) > SURE)
-        is_model = self.verdict is DiagnosisVerdict.EFFECTS_FOUND
-        if len(sure) == len(self.sure) or not is_model:
+        others = alternatives(found, classes)
+        if self.verdict is not DiagnosisVerdict.EFFECTS_FOUND or len(others) < 2:
+            return self
+        every = shared(others, classes)
+        sure = tuple(n for n in self.sure if n in every or classes.of(n) > SURE)
+        if len(sure) == len(self.sure):
             return self
         return replace(self, sure=sure, verdict=DiagnosisVerdict.MANY_EFFECTS)
 

@@ -307,12 +307,16 @@ def test_what_is_open_about_the_listed_effects_alone_is_not_found() -> None:
     """A force had 75 % there, as a tilt with softer cables explained the same."""
     both = Judgement(DiagnosisVerdict.EFFECTS_FOUND, ("a", "b"), 0.0)
     sure = Classes({"a": 0.99, "b": 0.96}, [("a",), ("b",)], [0.99, 0.96], {})
-    assert both.with_sure_ones(sure) is both
+    found = found_of({"": -900.0, "ab": 0.0, "acd": -0.5})
+    assert both.with_sure_ones(found, sure) is both
     open_one = replace(sure, probability=[0.99, 0.75], effect={"a": 0.99, "b": 0.75})
-    left = both.with_sure_ones(open_one)
+    left = both.with_sure_ones(found, open_one)
     assert left.verdict is DiagnosisVerdict.MANY_EFFECTS and left.sure == ("a",)
     many = replace(both, verdict=DiagnosisVerdict.MANY_EFFECTS)
-    assert many.with_sure_ones(open_one) is many
+    assert many.with_sure_ones(found, open_one) is many
+    # where no other set explains as well, only its name is open
+    alone = found_of({"": -900.0, "ab": 0.0, "acd": -9.0})
+    assert both.with_sure_ones(alone, open_one) is both
 
 
 def test_a_swap_within_a_class_is_no_alternative() -> None:
