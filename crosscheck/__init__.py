@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from crosscheck.diagnosis.result import Diagnosis, MissingEffect
     from crosscheck.diagnosis.verdict import diagnose
     from crosscheck.errors import CrosscheckError, UnsolvedError
+    from crosscheck.fit.noise.tolerance import Tolerance
     from crosscheck.fit.reasons import DiagnosisVerdict
-    from crosscheck.fit.tolerance import Tolerance
     from crosscheck.importing.case import Imported, import_case
     from crosscheck.importing.choices import ImportChoices
     from crosscheck.measurements.data import Measurements, Sigma
@@ -64,7 +64,7 @@ _WHERE = {
     "Run": "suite.run",
     "Sigma": "measurements.data",
     "Thresholds": "suite.thresholds",
-    "Tolerance": "fit.tolerance",
+    "Tolerance": "fit.noise.tolerance",
     "Twin": "twin.make",
     "UnsolvedError": "errors",
     "add_effect": "add",

@@ -2,7 +2,7 @@
 
     python scripts/score_chances.py --twins 100 --json twins.jsonl     one to four effects
     python scripts/score_chances.py --nulls 30 --json nulls.jsonl      none, of each kind of noise
-    python scripts/score_chances.py --summary twins.jsonl nulls.jsonl  the tables and the picture
+    python scripts/score_chances.py --summary twins.jsonl nulls.jsonl --picture reliability.svg
 
 MuJoCo is the truth. Effects are drawn with sizes log-uniform from 0.3 to 10 times the size that
 is visible: that at which an effect alone, beside nothing, lowers chi2 by 25. The noise is white,
@@ -28,8 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.diagnosis.verdict import diagnose
-from crosscheck.fit.problem import Problem
-from crosscheck.fit.state import derivatives, evaluate
+from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.least_squares.state import derivatives, evaluate
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.twin.hidden import choose, times
 from crosscheck.twin.lab import random_of, sweeps
@@ -180,17 +180,27 @@ def judged(seed: int, count: int, noise: str) -> dict[str, Any]:
     }
 
 
-def table(rows: list[dict[str, Any]]) -> list[str]:
-    """Reliability of the statements, Brier score, names and verdicts."""
+def statements(rows: list[dict[str, Any]]) -> tuple[Array, Array]:
+    """Stated probabilities (k,) of classes, and whether each is true, 1 or 0."""
     said = [
         (p, any(h in members for h in row["hidden"]))
         for row in rows
         for members, p in row["classes"]
     ]
-    p, true = np.array([s[0] for s in said]), np.array([s[1] for s in said], dtype=float)
+    return np.array([s[0] for s in said]), np.array([s[1] for s in said], dtype=float)
+
+
+def within(p: Array, low: float, high: float) -> NDArray[np.bool_]:
+    """(k,) whether probabilities are in a bin; the last one has both its ends."""
+    return np.asarray((p >= low) & ((p < high) | (high == 1.0)))
+
+
+def table(rows: list[dict[str, Any]]) -> list[str]:
+    """Reliability of the statements, Brier score, names and verdicts."""
+    p, true = statements(rows)
     out = ["| said | statements | mean said | true |", "|---|---|---|---|"]
     for low, high in pairwise(BINS):
-        some = (p >= low) & ((p < high) | (high == 1.0))
+        some = within(p, low, high)
         if some.any():
             mean, part = p[some].mean(), true[some].mean()
             out.append(f"| {low:.2f} to {high:.2f} | {some.sum()} | {mean:.3f} | {part:.3f} |")
@@ -217,6 +227,35 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
     return out
 
 
+def draw(rows: list[dict[str, Any]], path: Path) -> None:
+    """How often statements are true against how often they say so, with intervals of 95 %."""
+    import matplotlib
+
+    matplotlib.use("svg")
+    import matplotlib.pyplot as plt
+    from scipy import stats
+
+    p, true = statements(rows)
+    figure, axes = plt.subplots(figsize=(5.2, 4.6), layout="constrained")
+    axes.plot([0, 100], [0, 100], color="0.6", linestyle=":", label="as often as stated")
+    for low, high in pairwise(BINS):
+        some = within(p, low, high)
+        if not some.any():
+            continue
+        hits = int(true[some].sum())
+        edges = stats.binomtest(hits, int(some.sum())).proportion_ci(method="wilson")
+        x, y = 100 * p[some].mean(), 100 * true[some].mean()
+        axes.plot([x, x], [100 * edges.low, 100 * edges.high], color="#0072B2", linewidth=1.5)
+        axes.plot(x, y, "o", color="#0072B2")
+        right = x < 50
+        axes.annotate(f"{some.sum()}", (x, y), (8 if right else -8, -4), fontsize=9,
+                      textcoords="offset points", ha="left" if right else "right")  # fmt: skip
+    axes.set(xlabel="stated probability [%]", ylabel="true [% of these statements]",
+             xlim=(-3, 103), ylim=(-3, 103), aspect="equal")  # fmt: skip
+    axes.legend(loc="upper left")
+    figure.savefig(path)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--twins", type=int, default=0, help="of one to four effects")
@@ -224,6 +263,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="seed of the first")
     parser.add_argument("--json", type=Path, help="append a line for each twin there")
     parser.add_argument("--summary", type=Path, nargs="*", default=[], help="files to sum up")
+    parser.add_argument("--picture", type=Path, help="of how often statements are true")
     chosen = parser.parse_args()
     names = list(NOISES)
     seeds = range(chosen.first, chosen.first + chosen.twins)
@@ -241,6 +281,8 @@ def main() -> None:
             with chosen.json.open("a") as out:
                 out.write(json.dumps(rows[-1]) + "\n")
     print("\n".join(table(rows)))
+    if chosen.picture:
+        draw(rows, chosen.picture)
 
 
 if __name__ == "__main__":

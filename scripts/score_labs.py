@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.calibration.all_effects import Calibration, fit_all_effects
+from crosscheck.calibration.joint_fit.all_effects import Calibration, fit_all_effects
 from crosscheck.calibration.search import SetSearch, search_sets
-from crosscheck.fit.prepare import prepare
-from crosscheck.fit.problem import Problem, kinds_read, rms_by_kind
-from crosscheck.fit.state import State, evaluate
+from crosscheck.fit.least_squares.problem import Problem, kinds_read, rms_by_kind
+from crosscheck.fit.least_squares.state import State, evaluate
+from crosscheck.fit.preparation.prepare import prepare
 from crosscheck.measurements.read import load_measurements
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot

@@ -28,9 +28,9 @@ from score_chances import NOISES, beside, read, sigma_of
 
 from crosscheck.calibration.result import calibrate
 from crosscheck.diagnosis.verdict import diagnose
-from crosscheck.fit.problem import Problem, rms_by_kind
+from crosscheck.fit.least_squares.problem import Problem, rms_by_kind
+from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.fit.reasons import DiagnosisVerdict
-from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.twin.hidden import choose
 from crosscheck.twin.lab import random_of, sweeps

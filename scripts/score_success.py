@@ -16,7 +16,7 @@ import json
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from score_chances import ROBOTS, read, sigma_of
@@ -31,6 +31,9 @@ from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 TIMES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
 # These move only what is not read here.
@@ -100,6 +103,11 @@ def is_named(row: dict[str, Any]) -> bool:
     return any(row["effect"] in names for names in row["named"])
 
 
+def is_false(row: dict[str, Any]) -> bool:
+    """Whether something is listed that is not there, nor what cannot be told from it."""
+    return any(row["effect"] not in names for names in row["named"])
+
+
 def table(rows: list[dict[str, Any]]) -> list[str]:
     """Part named by size and effect, false names, coverage."""
     sized = [row for row in rows if row["multiple"]]
@@ -140,28 +148,61 @@ def clustered(inside: list[tuple[bool, str]]) -> tuple[float, float]:
 
 
 def draw(rows: list[dict[str, Any]], path: Path) -> None:
-    """Part named against size, all effects together."""
+    """Part named against size: of all effects together, and of each; false names beside both."""
     import matplotlib
 
     matplotlib.use("svg")
     import matplotlib.pyplot as plt
-    from scipy import stats
 
     sized = [row for row in rows if row["multiple"]]
-    figure, axes = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
-    for multiple in TIMES:
-        hits = [is_named(r) for r in sized if r["multiple"] == multiple]
-        low, high = stats.binomtest(sum(hits), len(hits)).proportion_ci(method="wilson")
-        axes.plot([multiple] * 2, [100 * low, 100 * high], color="#0072B2", linewidth=1.5)
-        axes.plot(multiple, 100 * np.mean(hits), "o", color="#0072B2")
-    axes.axhline(90.0, color="0.5", linestyle=":", linewidth=1.0)
-    axes.set(
-        xscale="log", ylim=(0, 103), xlabel="size, in units of the smallest that plan says shows"
+    effects = sorted({row["effect"] for row in sized})
+    figure, (above, below) = plt.subplots(
+        2, 1, figsize=(7.0, 9.6), layout="constrained", height_ratios=[3.0, 7.0]
     )
-    axes.set_xticks(TIMES, [f"{m:g}" for m in TIMES])
-    axes.minorticks_off()
-    axes.set_ylabel("named, % of twins")
+    _draw_all(above, sized)
+    _draw_each(below, sized, effects)
     figure.savefig(path)
+
+
+def _draw_all(axes: Axes, rows: list[dict[str, Any]]) -> None:
+    """Parts of the twins with the right name, and with a false one, over the columns below."""
+    from scipy import stats
+
+    series = (
+        ("named", is_named, "#0072B2", "o", -0.06),
+        ("a false name", is_false, "#D55E00", "s", 0.06),
+    )
+    for label, counts, colour, marker, aside in series:
+        for k, multiple in enumerate(TIMES):
+            hits = [counts(r) for r in rows if r["multiple"] == multiple]
+            low, high = stats.binomtest(sum(hits), len(hits)).proportion_ci(method="wilson")
+            axes.plot([k + aside] * 2, [100 * low, 100 * high], color=colour, linewidth=1.5)
+            axes.plot(k + aside, 100 * np.mean(hits), marker, color=colour,
+                      label=label if not k else None)  # fmt: skip
+    axes.axhline(90.0, color="0.5", linestyle=":", linewidth=1.0)
+    axes.set(ylim=(-3, 103), xlim=(-0.5, len(TIMES) - 0.5), ylabel="% of twins (bars: 95 %)")
+    axes.set_xticks(range(len(TIMES)), [f"{m:g}" for m in TIMES])
+    axes.legend(loc="center right")
+
+
+def _draw_each(axes: Axes, rows: list[dict[str, Any]], effects: list[str]) -> None:
+    """Named of each effect by size, a cell each; a mark where a name was false."""
+    part = np.full((len(effects), len(TIMES)), np.nan)
+    for i, name in enumerate(effects):
+        for k, multiple in enumerate(TIMES):
+            some = [r for r in rows if r["effect"] == name and r["multiple"] == multiple]
+            if not some:
+                continue
+            hits, false = sum(map(is_named, some)), sum(map(is_false, some))
+            part[i, k] = hits / len(some)
+            text = f"{hits}/{len(some)}" + (f"  ({false} false)" if false else "")
+            dark = part[i, k] > 0.6
+            axes.text(k, i, text, ha="center", va="center", fontsize=8,
+                      color="white" if dark else "black")  # fmt: skip
+    axes.imshow(part, cmap="Blues", vmin=0.0, vmax=1.2, aspect="auto")
+    axes.set_yticks(range(len(effects)), effects, fontsize=9)
+    axes.set_xticks(range(len(TIMES)), [f"{m:g}" for m in TIMES])
+    axes.set_xlabel("size, in units of the smallest that plan says shows (5 to 7 times the noise)")
 
 
 def main() -> None:

@@ -182,7 +182,7 @@ def test_what_is_neither_is_seen() -> None:
     assert not is_allowed("crosscheck.given", "considered")
     assert not is_allowed("seecr.workspace.maps", "with_history")
     assert not is_allowed("seecr.files", "read_toml")
-    assert not is_allowed("crosscheck.fit.state", "evaluate")
+    assert not is_allowed("crosscheck.fit.least_squares.state", "evaluate")
     assert not is_allowed("seecr.report.words", "_known")
 
 

@@ -11,14 +11,14 @@ import numpy as np
 from crosscheck.add.result import Addition
 from crosscheck.add.weigh import base_of, weigh, whiteness_of
 from crosscheck.errors import CrosscheckError, UnsolvedError
-from crosscheck.fit.candidates import Trials, candidates_for, try_candidate
-from crosscheck.fit.gauss_newton import Fit, fit
-from crosscheck.fit.known import firmer
-from crosscheck.fit.outliers import outlying_rows
-from crosscheck.fit.prepare import Progress, prepare
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.effects.candidates import Trials, candidates_for, try_candidate
+from crosscheck.fit.effects.gauss_newton import Fit, fit
+from crosscheck.fit.least_squares.known import firmer
+from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.least_squares.state import State
+from crosscheck.fit.noise.outliers import outlying_rows
+from crosscheck.fit.preparation.prepare import Progress, prepare
 from crosscheck.fit.reasons import Why
-from crosscheck.fit.state import State
 from crosscheck.given import GivenModel, GivenRobot, basis_of, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
 from seecr.arguments import silent

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from crosscheck.comparison.coloured import Coloured
-from crosscheck.fit.evidence import FALSE_ALARM
-from crosscheck.fit.noise import Whiteness
-from crosscheck.fit.problem import Rms
+from crosscheck.fit.effects.evidence import FALSE_ALARM
+from crosscheck.fit.least_squares.problem import Rms
+from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
 from crosscheck.model.fitted import Fitted
 from crosscheck.units import with_error
+from seecr.counted import counted
 from seecr.effects import Terms
 from seecr.prediction.model import Model
 from seecr.result import Record, Result
@@ -27,7 +28,7 @@ class Addition(Result):
         names: names of the effects that are new, or fitted again.
         fitted: all effects of the new model with their errors.
         before: rms errors of the model as it stood. after: those of the new model.
-        held_out_before, held_out: the same on held-out runs.
+        held_out_before, held_out: on held-out runs, without the named effects and with them.
         fall: mean fall of chi2 on a held-out block, and its standard error.
         p: p-value of the fall of chi2 on all data.
         predicts: whether the effects improve the prediction of held-out runs, and not by chance.
@@ -87,10 +88,12 @@ class Addition(Result):
             return f"{self.name} is not determined by these data: any value fits them equally well"
         if self.from_nothing == 0.0:
             return f"{self.name} comes out at its null values"
-        together = ", all values together" if len(errors) > 1 else ""
+        if len(errors) == 1:
+            return f"{self.name} is {self.from_nothing:.2g} standard errors from null"
+        several = counted(len(errors), "value")
         return (
-            f"{self.name} differs from null by no more than its standard errors "
-            f"({self.from_nothing:.2g} of them{together})"
+            f"{self.name} is no further from null than noise alone may bring {several} "
+            f"({self.from_nothing:.2g} standard errors, all together)"
         )
 
     @property
@@ -108,7 +111,7 @@ class Addition(Result):
         worth = "improves the prediction" if self.predicts else "does not improve the prediction"
         left = rms_words(self.held_out_before), rms_words(self.held_out)
         out = [
-            f"{self.name} {worth} of held-out runs: {left[0]} before, {left[1]} with it",
+            f"{self.name} {worth} of held-out runs: {left[0]} without, {left[1]} with it",
             f"on all rows: {rms_words(self.before)} before, {rms_words(self.after)} with it",
         ]
         if self.is_nothing:  # it may predict better all the same

@@ -10,16 +10,17 @@ from numpy.typing import NDArray
 from crosscheck.add.result import Addition
 from crosscheck.comparison.coloured import coloured_noise
 from crosscheck.errors import UnsolvedError
-from crosscheck.fit.candidates import null_fit, seen_directions
-from crosscheck.fit.evidence import FALSE_ALARM, p_value
-from crosscheck.fit.gauss_newton import Fit, fit
-from crosscheck.fit.held_out import HeldOut, hold_out, improves, pays, unfitted
-from crosscheck.fit.known import firmer
-from crosscheck.fit.noise import Whiteness, whiteness
-from crosscheck.fit.nothing import distance_from_nothing, is_nothing
-from crosscheck.fit.problem import Problem, Rms, rms_by_kind
-from crosscheck.fit.state import evaluate
-from crosscheck.fit.systematic import moved_by_others
+from crosscheck.fit.effects.candidates import null_fit, seen_directions
+from crosscheck.fit.effects.contradictions import contradictions
+from crosscheck.fit.effects.evidence import FALSE_ALARM, p_value
+from crosscheck.fit.effects.gauss_newton import Fit, fit
+from crosscheck.fit.effects.held_out import HeldOut, hold_out, improves, pays, unfitted
+from crosscheck.fit.effects.nothing import distance_from_nothing, is_nothing
+from crosscheck.fit.effects.systematic import moved_by_others
+from crosscheck.fit.least_squares.known import firmer
+from crosscheck.fit.least_squares.problem import Problem, Rms, rms_by_kind
+from crosscheck.fit.least_squares.state import evaluate
+from crosscheck.fit.noise.whiteness import Whiteness, whiteness
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import provenance_of, renewed, with_fit
 from seecr.counted import counted, some
@@ -32,8 +33,6 @@ from seecr.prediction.model import Model
 _IMPLAUSIBLE = 5.0
 # Parameters with a larger correlation than this can hardly be determined separately.
 _CORRELATED = 0.95
-# So many of its standard errors, a value measured independently is contradicted by the data.
-_CONTRADICTED = 3.0
 _MOST_NAMED = 4
 # Held-out runs are not predicted better than they are fitted, except by chance. If their chi2 is
 # below this part of the fit's, the fit has ended in a local minimum.
@@ -50,7 +49,7 @@ def weigh(
         problem: the data. terms: effects before. names: of the new ones. factor: of the noise.
         best: the fit with all of them. notes: about the data. basis: the model to write into.
         firmness: by how much independently measured values were made firmer for this fit
-            (:func:`crosscheck.fit.known.firmer`).
+            (:func:`crosscheck.fit.least_squares.known.firmer`).
 
     Raises:
         UnsolvedError: the fit did not converge, or ended in a local minimum.
@@ -139,10 +138,12 @@ def _hollow(best: Fit, held: HeldOut) -> bool:
 
 
 def _refuse_unsettled(problem: Problem, names: Sequence[str], best: Fit, held: HeldOut) -> None:
-    if best.settled and not _hollow(best, held):
+    if best.valid and best.settled and not _hollow(best, held):
         return
     why = "ended in a local minimum: held-out runs are predicted better than they are fitted"
-    if not best.settled:
+    if not best.valid:
+        why = f"failed, as {best.status.value}"
+    elif not best.settled:
         why = f"did not converge in {counted(best.iterations, 'step')}"
     raise UnsolvedError(
         f"{problem.data.path}: the fit of {' + '.join(names)} {why}; nothing was added: find what "
@@ -178,13 +179,7 @@ def _warnings(
 def _warnings_of(robot: Robot, f: Fitted) -> Iterator[str]:
     """Warnings about one effect's values."""
     name, names = f.term.name, np.array(f.term.layout.names)
-    off = np.abs(f.term.vector - f.term.knowledge.value) / f.term.knowledge.stderr
-    against = f.term.knowledge.measured & (off > _CONTRADICTED)
-    if against.any():
-        yield (
-            f"{name}: {_are(names[against])} {off[against].max():.3g} standard errors from "
-            "what was measured independently: check that measurement, and the values that are fixed"
-        )
+    yield from contradictions([f.term])
     unseen, stopped = ~np.isfinite(f.stderr), np.asarray(f.at_bound, bool)
     if stopped.any():
         yield f"{name}: {some(names[stopped])} stopped at a bound"

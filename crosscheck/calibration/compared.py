@@ -7,22 +7,22 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from crosscheck.calibration.all_effects import Calibration, fit_all_effects
-from crosscheck.calibration.catalogue import Catalogue
-from crosscheck.calibration.colour import Colour
-from crosscheck.calibration.equals import EQUAL
-from crosscheck.calibration.joining import layouts
-from crosscheck.calibration.joint import JointFit, cost
-from crosscheck.calibration.judgement import SURPRISE
-from crosscheck.calibration.not_noise import is_not_noise
-from crosscheck.calibration.own_noise import by_own_noise
-from crosscheck.calibration.priors import widths_of
-from crosscheck.calibration.refits import ROUNDS, Found, compare_sets
-from crosscheck.calibration.sets import Names
-from crosscheck.calibration.stages import Progress, poor
-from crosscheck.calibration.unknown import UnknownOdds, unknown_beside
-from crosscheck.fit.problem import KINDS, Problem, kinds_read
-from crosscheck.fit.state import evaluate
+from crosscheck.calibration.joint_fit.all_effects import Calibration, fit_all_effects
+from crosscheck.calibration.joint_fit.joining import layouts
+from crosscheck.calibration.joint_fit.joint import JointFit, cost
+from crosscheck.calibration.joint_fit.stages import Progress, poor
+from crosscheck.calibration.judgement.verdict import SURPRISE
+from crosscheck.calibration.linear_evidence.priors import widths_of
+from crosscheck.calibration.noise.colour import Colour
+from crosscheck.calibration.sets.catalogue import Catalogue
+from crosscheck.calibration.sets.equals import EQUAL
+from crosscheck.calibration.sets.linear_search import Names
+from crosscheck.calibration.sets.own_noise import by_own_noise
+from crosscheck.calibration.sets.refits import ROUNDS, ComparedSets, compare_sets
+from crosscheck.calibration.unknown.beside import UnknownOdds, unknown_beside
+from crosscheck.calibration.unknown.not_noise import is_not_noise
+from crosscheck.fit.least_squares.problem import KINDS, Problem, kinds_read
+from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.measurements.data import Sigma
 from seecr.effects import Term, Terms
 from seecr.pose import Array
@@ -34,7 +34,7 @@ _LOUDER = 1.25
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
+class FitAndSets:
     """The fit of all effects, and the sets that were compared about it.
 
     Attributes:
@@ -48,7 +48,7 @@ class Compared:
     whole: Calibration
     catalogue: Catalogue
     unknown: UnknownOdds
-    found: Found
+    found: ComparedSets
     not_noise: bool = False
     without: Mapping[Names, float] = field(default_factory=dict)
 
@@ -78,7 +78,7 @@ class Compared:
 
 def fit_and_compare(
     problem: Problem, stated: Sigma, terms: Terms, progress: Progress, given: Sequence[Terms]
-) -> Compared:
+) -> FitAndSets:
     """Fit all effects, then compare sets of them.
 
     If something unknown is there beside all effects, but some of them alone explain more, the fit
@@ -88,7 +88,7 @@ def fit_and_compare(
     Args: as in :func:`crosscheck.calibration.search.search_sets`.
     """
 
-    def of(first: Terms | None) -> Compared:
+    def of(first: Terms | None) -> FitAndSets:
         def report(text: str, part: float) -> None:
             progress(text, 0.5 * part)
 
@@ -113,13 +113,13 @@ def _stated(problem: Problem, stated: Sigma) -> list[str]:
 
 def _compared(
     whole: Calibration, stated: Sigma, terms: Terms, progress: Progress, given: Sequence[Terms]
-) -> Compared:
+) -> FitAndSets:
     """Sets compared about a fit of all effects; the others as in :func:`fit_and_compare`."""
     setting, tried = whole.setting, 0
     problem, kinds = setting.problem, _stated(setting.problem, stated)
     catalogue, plain = _catalogue(problem, terms, whole), evaluate(problem, terms, setting.factor)
 
-    def sets(unknown: bool, *more: Terms, joint: JointFit = whole.joint) -> Found:
+    def sets(unknown: bool, *more: Terms, joint: JointFit = whole.joint) -> ComparedSets:
         most, rounds = (_REFITTED_UNKNOWN, 1) if unknown else (_REFITTED, ROUNDS)
 
         def report(text: str) -> None:
@@ -145,7 +145,7 @@ def _compared(
         # what few effects explain, all of them could: their fit ended in a local minimum
         found = sets(False, found.best.joint.terms)
         not_noise = is_structure(found.best.joint)
-    as_found = Compared(whole, catalogue, unknown, found, not_noise)
+    as_found = FitAndSets(whole, catalogue, unknown, found, not_noise)
     if not_noise or smooth:
         return as_found
     own = by_own_noise(setting, found, may_be)

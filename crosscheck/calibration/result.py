@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from crosscheck.calibration.all_effects import Calibration, JointErrors, fit_all_effects
+from crosscheck.calibration.joint_fit.absent import absent_effects
+from crosscheck.calibration.joint_fit.all_effects import Calibration, JointErrors, fit_all_effects
 from crosscheck.errors import CrosscheckError, UnsolvedError
-from crosscheck.fit.prepare import Progress, prepare
-from crosscheck.fit.thinned import thinned
+from crosscheck.fit.effects.contradictions import contradictions
+from crosscheck.fit.preparation.prepare import Progress, prepare
+from crosscheck.fit.preparation.thinned import thinned
+from crosscheck.fit.reasons import Reason, Why
 from crosscheck.fit.words import fitted_records, rms_words
 from crosscheck.given import GivenModel, GivenRobot, basis_of, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
@@ -46,6 +49,7 @@ class Calibrated(Result, JointErrors):
         outlier_places: the same as they are told, after the name of the file if there are several.
         settled: whether the fit converged; if not, its values are not to be used.
         notes: notes about the data.
+        absent: effects of the catalogue that are not in the model, and why.
         model: the robot's model with all of this; :func:`crosscheck.save_model` keeps it.
     """
 
@@ -55,6 +59,7 @@ class Calibrated(Result, JointErrors):
     outlier_places: tuple[str, ...]
     settled: bool
     notes: tuple[str, ...]
+    absent: Mapping[str, Reason]
     model: Model
 
     @property
@@ -87,6 +92,14 @@ class Calibrated(Result, JointErrors):
             out.append(f"outliers, given little weight and not included in these errors: {lines}")
         return out
 
+    def absent_lines(self) -> list[str]:
+        """Lines about effects that are not in the model, those that the user excluded left out."""
+        words: dict[str, list[str]] = {}
+        for name, why in self.absent.items():
+            if why.why is not Why.EXCLUDED:
+                words.setdefault(why.words, []).append(name)
+        return [f"not fitted: {', '.join(names)} ({why})" for why, names in words.items()]
+
     def lines(self) -> list[str]:
         """Errors before and after, the noise, and how many values there are."""
         out = [
@@ -94,6 +107,7 @@ class Calibrated(Result, JointErrors):
             f"{rms_words(self.before)} before, {rms_words(self.after)} after, "
             f"{rms_words(self.held_out)} on held-out runs",
             *self.noise_lines(),
+            *self.absent_lines(),
         ]
         return [*out, *(f"note: {note}" for note in self.notes)]
 
@@ -113,6 +127,7 @@ class Calibrated(Result, JointErrors):
             "parameters": self.labels,
             "covariance": self.covariance.tolist(),
             "notes": list(self.notes),
+            "not_fitted": {name: why.words for name, why in self.absent.items()},
         }
 
 
@@ -152,7 +167,7 @@ def calibrate(
     with threadpool_limits(limits=1, user_api="blas"):
         found = fit_all_effects(ready.problem, ready.terms, progress)
         others = thin.note_on_others(found.terms, ready.problem.sigma)
-    notes = (*said, *ready.all_notes, *others)
+    notes = (*said, *contradictions(found.terms), *ready.all_notes, *others)
     return _result(found, terms, notes, basis_of(model, robot))
 
 
@@ -174,6 +189,7 @@ def _result(found: Calibration, before: Terms, notes: tuple[str, ...], basis: Mo
         outlier_places=tuple(data.place(row) for row in far),
         settled=found.joint.settled,
         notes=notes,
+        absent=absent_effects(found, kept),
         model=renewed(calibrated(basis, fitted, covariance, source, errors), robot, data),
     )
 

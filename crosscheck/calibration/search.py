@@ -5,32 +5,32 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from crosscheck.calibration.all_effects import PLAIN, Calibration, covariance
-from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.compared import all_stated, fit_and_compare
-from crosscheck.calibration.detectable import detectable_size
-from crosscheck.calibration.equals import EQUAL, parameters_counted
-from crosscheck.calibration.exact import FEW, Refit
-from crosscheck.calibration.imitated import Imitated, field_beside, field_in_place
-from crosscheck.calibration.joint import Setting
-from crosscheck.calibration.judgement import NOTHING, Judgement, judge
-from crosscheck.calibration.linearised import free_of
-from crosscheck.calibration.probability import (
+from crosscheck.calibration.joint_fit.all_effects import PLAIN, Calibration, covariance
+from crosscheck.calibration.joint_fit.joint import Setting
+from crosscheck.calibration.joint_fit.linearised import free_of
+from crosscheck.calibration.joint_fit.stages import Progress
+from crosscheck.calibration.judgement.probability import (
     Classes,
     alike_beyond,
     all_scores,
     probabilities,
 )
-from crosscheck.calibration.refits import Found
-from crosscheck.calibration.replaceable import Replaced
-from crosscheck.calibration.sets import Names
-from crosscheck.calibration.stages import Progress
-from crosscheck.calibration.sure_together import sure_together
-from crosscheck.calibration.unknown import unknown_beside
-from crosscheck.calibration.varying import Varying
-from crosscheck.fit.nothing import distance_from_nothing, is_nothing
-from crosscheck.fit.possible import can_be, hardly_happens
-from crosscheck.fit.problem import Problem, Rms
+from crosscheck.calibration.judgement.replaceable import Replaced
+from crosscheck.calibration.judgement.sure_together import sure_together
+from crosscheck.calibration.judgement.verdict import NOTHING, Judgement, judge
+from crosscheck.calibration.sets.catalogue import Catalogue
+from crosscheck.calibration.sets.equals import EQUAL, parameters_counted
+from crosscheck.calibration.sets.exact import FEW, Refit
+from crosscheck.calibration.sets.linear_search import Names
+from crosscheck.calibration.sets.refits import ComparedSets
+from crosscheck.calibration.unknown.beside import unknown_beside
+from crosscheck.calibration.unknown.detectable import detectable_size
+from crosscheck.calibration.unknown.imitated import Imitated, field_beside, field_in_place
+from crosscheck.calibration.unknown.varying import Varying
+from crosscheck.fit.effects.nothing import distance_from_nothing, is_nothing
+from crosscheck.fit.effects.possible import can_be, hardly_happens
+from crosscheck.fit.least_squares.problem import Problem, Rms
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.measurements.data import Sigma
 from seecr.description.robot import Robot
@@ -60,7 +60,7 @@ class SetSearch:
     """
 
     calibration: Calibration
-    found: Found
+    found: ComparedSets
     catalogue: Catalogue
     classes: Classes
     field_odds: float
@@ -81,7 +81,7 @@ def search_sets(
     """Fit all effects at once, then compare sets of effects.
 
     Args:
-        problem: readings, from :func:`crosscheck.fit.prepare.prepare`.
+        problem: readings, from :func:`crosscheck.fit.preparation.prepare.prepare`.
         stated: the noise that the user stated, without estimates.
         terms: effects of the model as it stands; they are in every set.
         progress: called with what is being done and the fraction that is done.
@@ -98,8 +98,8 @@ def search_sets(
     classes = _classes(found, best.names, sizes)
     beside = unknown_beside(setting, best.joint, all_stated(problem, stated)).odds
     said = judge(
-        found, classes, odds, every.surprise, every.not_noise, _doubted(found), beside, in_place,
-        without, lambda: field_beside(setting, best.joint, best.widths, found.scores),
+        found, classes, odds, every.surprise, every.not_noise, _implausible(found), beside,
+        in_place, without, lambda: field_beside(setting, best.joint, best.widths, found.scores),
     )  # fmt: skip
     said = said.without(nothing_by_themselves(setting, found, said))
     if said.verdict is DiagnosisVerdict.MANY_EFFECTS and said.sure:
@@ -137,7 +137,7 @@ def search_sets(
     return SetSearch(whole, found, catalogue, classes, odds, shown, said, in_place, varies, outdone)
 
 
-def _outdone(found: Found, in_place: Imitated) -> Names:
+def _outdone(found: ComparedSets, in_place: Imitated) -> Names:
     """Members of the best set of which something unknown leaves hardly anything.
 
     Readings that lag look much like backlash; where they follow an unknown law that no field has
@@ -149,14 +149,17 @@ def _outdone(found: Found, in_place: Imitated) -> Names:
 
 
 def _classes(
-    found: Found, own: Names, sizes: Mapping[str, int], further: Mapping[Names, float] = NOTHING
+    found: ComparedSets,
+    own: Names,
+    sizes: Mapping[str, int],
+    further: Mapping[Names, float] = NOTHING,
 ) -> Classes:
     """Probabilities, and what is equivalent to members of a set.
 
     Args:
         found: the compared sets. own: the set.
         sizes: of all effects, the number of parameters by
-            :func:`crosscheck.calibration.equals.parameters_counted`.
+            :func:`crosscheck.calibration.sets.equals.parameters_counted`.
         further: scores of further sets that were fitted.
     """
     scores = {**all_scores(found), **further}
@@ -169,7 +172,7 @@ def _classes(
 
 
 def with_equivalents(
-    found: Found, listed: Names, classes: Classes, robot: Robot, stood: Terms
+    found: ComparedSets, listed: Names, classes: Classes, robot: Robot, stood: Terms
 ) -> dict[Names, float]:
     """Scores of the listed set with a member replaced by an equivalent, fitted exactly."""
     out = dict[Names, float]()
@@ -183,7 +186,7 @@ def with_equivalents(
     return out
 
 
-def nothing_by_themselves(setting: Setting, found: Found, said: Judgement) -> Names:
+def nothing_by_themselves(setting: Setting, found: ComparedSets, said: Judgement) -> Names:
     """Sure effects whose values are within one standard error of nothing, the nearest first.
 
     That one of a class is there may be probable because all of its members help a little, each in
@@ -213,7 +216,7 @@ def _near_nothing(setting: Setting, fit: Refit, some: Iterable[str]) -> dict[str
     return {name: both[0] for name, both in far.items() if is_nothing(*both)}
 
 
-def _doubted(found: Found) -> Names:
+def _implausible(found: ComparedSets) -> Names:
     """Members of the best set that are implausibly large."""
     own = (term for term in found.best.joint.terms if term.name not in found.always)
     return frozenset(term.name for term in own if hardly_happens(term))

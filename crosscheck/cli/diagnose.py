@@ -125,13 +125,19 @@ def command(
 
 def _keep(found: Diagnosis, path: Path) -> str:
     """Write the model that was found, if there was a verdict; what was done."""
-    from crosscheck import save_model
+    from crosscheck import DiagnosisVerdict, save_model
 
     if found.model is None:
         return f"{path} was not written: there is no verdict"
     save_model(path, found.model)
     if found.missing:
-        return f"Written to {path}: {', '.join(one.effect for one in found.missing)}"
+        text = f"Written to {path}: {', '.join(one.effect for one in found.missing)}"
+        if found.verdict is not DiagnosisVerdict.MANY_EFFECTS:
+            return text
+        return (
+            f"{text}, with the values that explain most by themselves, not those above, which are "
+            "nearer to the truth beside the other missing effects"
+        )
     if found.refitted:
         names = ", ".join(found.refitted)
         return f"Written to {path}: {names}, refitted to these data; nothing added"

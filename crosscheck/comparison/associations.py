@@ -26,8 +26,8 @@ from crosscheck.comparison.quantities import (
     of_rows,
 )
 from crosscheck.comparison.travel import Travel, travel
-from crosscheck.fit.noise import as_table
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.noise.whiteness import as_table
 from seecr.counted import between
 from seecr.pose import Array
 from seecr.prediction.experiment import Prediction

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.fit.problem import ORIENTATION, POSITION, Problem
+from crosscheck.fit.least_squares.problem import ORIENTATION, POSITION, Problem
 from seecr.pose import Array, quat_rotate
 from seecr.prediction.experiment import Prediction
 

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.calibration.colour import WHITE, chain_of
-from crosscheck.calibration.joint import JointFit, Setting
-from crosscheck.calibration.not_noise import is_not_noise
-from crosscheck.calibration.restricted import estimate
-from crosscheck.calibration.robust import outliers, row_weights
-from crosscheck.calibration.unknown import unknown_beside
-from crosscheck.fit.problem import Problem, kinds_stated
-from crosscheck.fit.state import State
+from crosscheck.calibration.joint_fit.joint import JointFit, Setting
+from crosscheck.calibration.noise.colour import WHITE, chain_of
+from crosscheck.calibration.noise.restricted import estimate
+from crosscheck.calibration.noise.robust import outliers, row_weights
+from crosscheck.calibration.unknown.beside import unknown_beside
+from crosscheck.calibration.unknown.not_noise import is_not_noise
+from crosscheck.fit.least_squares.problem import Problem, kinds_stated
+from crosscheck.fit.least_squares.state import State
 from seecr.counted import counted
 from seecr.effects import Terms
 from seecr.pose import Array

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from crosscheck.comparison.cable_space import cable_lengths
 from crosscheck.comparison.periodogram import periodogram
 from crosscheck.comparison.travel import AXES, STILL, Travel
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.least_squares.problem import Problem
 from seecr.pose import Array, rotvec_from_quat
 from seecr.prediction.experiment import Prediction
 

@@ -12,11 +12,12 @@ from crosscheck.comparison.quantities import channels
 from crosscheck.comparison.result import Comparison, Coordinate, Group, UnsolvedRow, WorstRow
 from crosscheck.comparison.tracking import tracking
 from crosscheck.comparison.travel import Travel, regions_of, travel
-from crosscheck.fit.noise import as_table, whiteness
-from crosscheck.fit.outliers import outlying_rows
-from crosscheck.fit.prepare import noise_floor, prepare
-from crosscheck.fit.problem import Problem, rms_by_kind
-from crosscheck.fit.state import State, evaluate
+from crosscheck.fit.effects.contradictions import contradictions
+from crosscheck.fit.least_squares.problem import Problem, rms_by_kind
+from crosscheck.fit.least_squares.state import State, evaluate
+from crosscheck.fit.noise.outliers import outlying_rows
+from crosscheck.fit.noise.whiteness import as_table, whiteness
+from crosscheck.fit.preparation.prepare import noise_floor, prepare
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
 from crosscheck.measurements.data import Names
 from crosscheck.measurements.read import GivenData, measurements_of
@@ -41,7 +42,8 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
     ready = prepare(robot, data, terms)
     problem = ready.problem
     # nothing is cross-validated here, so that the note about its blocks is left out
-    notes = [*said, *ready.notes, *([str(ready.refusal)] if ready.refusal else [])]
+    notes = [*said, *contradictions(terms), *ready.notes]
+    notes += [str(ready.refusal)] if ready.refusal else []
     terms = ready.terms
     plain = problem.experiment.predict(terms.effects)
     factor = problem.noise(plain)

@@ -16,11 +16,18 @@ from crosscheck.comparison.coloured import Coloured
 from crosscheck.comparison.quantities import QuantityKind, channels
 from crosscheck.comparison.tracking import Tracking
 from crosscheck.comparison.travel import Travel
-from crosscheck.fit.noise import Whiteness
-from crosscheck.fit.problem import BY_NAME, KINDS, Problem, Rms, kinds_read, kinds_stated
+from crosscheck.fit.least_squares.problem import (
+    BY_NAME,
+    KINDS,
+    Problem,
+    Rms,
+    kinds_read,
+    kinds_stated,
+)
+from crosscheck.fit.least_squares.state import State
+from crosscheck.fit.noise.unstated import errors_are_noise
+from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.fit.reasons import Refusal
-from crosscheck.fit.state import State
-from crosscheck.fit.unstated import errors_are_noise
 from crosscheck.units import short
 from seecr.counted import counted
 from seecr.effects import Terms

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.fit.problem import BY_NAME, Kind, Problem
-from crosscheck.fit.state import State
+from crosscheck.fit.least_squares.problem import BY_NAME, Kind, Problem
+from crosscheck.fit.least_squares.state import State
 from crosscheck.measurements.data import Measurements
 from crosscheck.units import in_unit, short
 from seecr.description.joints import locked

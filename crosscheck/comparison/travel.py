@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.measurements.data import Names
 from seecr.pose import Array, pose_difference
 from seecr.prediction.experiment import Prediction

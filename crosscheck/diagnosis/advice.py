@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from crosscheck.calibration.sets import Names
-from crosscheck.calibration.varying import Varying
+from crosscheck.calibration.sets.linear_search import Names
+from crosscheck.calibration.unknown.varying import Varying
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.diagnosis.result import MissingEffect

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from crosscheck.calibration.all_effects import JointErrors
-from crosscheck.calibration.imitated import Imitated
+from crosscheck.calibration.joint_fit.all_effects import JointErrors
 from crosscheck.calibration.search import SetSearch
-from crosscheck.calibration.varying import Varying
-from crosscheck.fit.problem import Rms
+from crosscheck.calibration.unknown.imitated import Imitated
+from crosscheck.calibration.unknown.varying import Varying
+from crosscheck.fit.least_squares.problem import Rms
 from crosscheck.fit.words import rms_words
 
 PROBABLE = 0.5

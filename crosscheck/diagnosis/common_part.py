@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.calibration.equals import EQUAL
+from crosscheck.calibration.sets.equals import EQUAL
 from crosscheck.diagnosis.rivals import TOLD_APART
 from crosscheck.diagnosis.search import Search
-from crosscheck.fit.gauss_newton import PRIOR_SIZES, Fit
-from crosscheck.fit.imitation import basis, imitated, left_over
-from crosscheck.fit.possible import can_be, is_plausible
-from crosscheck.fit.starts import amplitude_columns
+from crosscheck.fit.effects.gauss_newton import PRIOR_SIZES, Fit
+from crosscheck.fit.effects.possible import can_be, is_plausible
+from crosscheck.fit.effects.starts import amplitude_columns
+from crosscheck.fit.least_squares.imitation import basis, imitated, left_over
 from crosscheck.fit.words import measured, shown
 from crosscheck.units import parameter_name
 from seecr.effects import Term

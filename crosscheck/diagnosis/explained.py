@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from crosscheck.calibration.alternatives import alternatives, shared
-from crosscheck.calibration.equals import EQUAL
-from crosscheck.calibration.exact import Refit
-from crosscheck.calibration.judgement import Judgement
-from crosscheck.calibration.robust import outliers
+from crosscheck.calibration.judgement.alternatives import alternatives, shared
+from crosscheck.calibration.judgement.verdict import Judgement
+from crosscheck.calibration.noise.robust import outliers
 from crosscheck.calibration.search import SetSearch
-from crosscheck.calibration.sets import Names
+from crosscheck.calibration.sets.equals import EQUAL
+from crosscheck.calibration.sets.exact import Refit
+from crosscheck.calibration.sets.linear_search import Names
 from crosscheck.diagnosis.advice import check_of
 from crosscheck.diagnosis.chances import PROBABLE, Chances, chances_of
 from crosscheck.diagnosis.common_part import common_part
@@ -36,10 +36,11 @@ from crosscheck.diagnosis.words import (
     size_notes,
     words_of,
 )
-from crosscheck.fit.candidates import Candidate
-from crosscheck.fit.problem import rms_by_kind
+from crosscheck.fit.effects.candidates import Candidate
+from crosscheck.fit.least_squares.problem import rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.words import rms_words
+from seecr.counted import counted
 
 # A note mentions noise with a larger autocorrelation than this.
 _ALIKE = 0.3
@@ -65,7 +66,7 @@ def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
     missing = [_missing(sought, search, chances, name) for name in search.found]
     return diagnosis_of(
         verdict,
-        _sentence(sought.judgement, missing, search.tried, chances, some),
+        _sentence(sought, missing, search.tried, chances, some),
         missing,
         search,
         before=sought.calibration.before,
@@ -153,16 +154,17 @@ def _noise_notes(sought: SetSearch) -> list[str]:
 
 def _size_notes(sought: SetSearch) -> list[str]:
     terms = sought.found.best.joint.terms
-    return size_notes(terms[name] for name in sorted(sought.judgement.doubted))
+    return size_notes(terms[name] for name in sorted(sought.judgement.implausible))
 
 
 def _sentence(
-    said: Judgement,
+    sought: SetSearch,
     missing: Sequence[MissingEffect],
     tried: int,
     chances: Chances,
     alternatives: Sequence[Names] = (),
 ) -> str:
+    said = sought.judgement
     if said.verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         return agreement_words(tried, hints_of(chances, ()))
     if said.imitated is not None:
@@ -181,7 +183,7 @@ def _sentence(
     assert together is not None
     all_of_them = (
         f"On held-out runs it is {rms_words(together.before)} as the model stands and "
-        f"{rms_words(together.held_out)} with all {tried} effects together."
+        f"{rms_words(together.held_out)} with all effects that can be fitted together."
     )
     sure = ", ".join(m.effect for m in missing)
     if len(alternatives) > 1:
@@ -197,8 +199,9 @@ def _sentence(
             "No few effects explain the error with certainty; most probably it is "
             f"{some}. {all_of_them}"
         )
+    every = counted(len(sought.calibration.terms.names), "effect")
     return (
-        f"No few effects explain the error, but all {tried} together do: they reduce it from "
+        f"No few effects explain the error, but {every} together do: they reduce it from "
         f"{rms_words(together.before)} to {rms_words(together.held_out)} on held-out runs. "
         + (f"Certain among them: {sure}." if sure else "None of them is certain by itself.")
     )

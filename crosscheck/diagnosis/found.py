@@ -6,7 +6,8 @@ import numpy as np
 
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.steps import shown_stages
-from crosscheck.fit.gauss_newton import Fit
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.effects.systematic import moved_by_others
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.model.fitted import Fitted
 from seecr.pose import Array
@@ -20,26 +21,31 @@ def found_effects(found: Diagnosis) -> tuple[Fitted, ...]:
 
     Empty if there is no verdict. Where more is missing than is listed, the values are those with
     which the listed effects explain most by themselves, and not those listed, which are nearer to
-    the truth beside the rest and make no model without it.
+    the truth beside the rest and make no model without it. Their standard errors then include by
+    how much another missing effect may shift them, as those of ``crosscheck add`` do.
     """
     if found.search is None:
         return ()
-    best, wider = shown_stages(found)[1].step.fit, _widened(found)
-    listed = [_by_itself(one, best) for one in found.missing]
+    step = shown_stages(found)[1].step
+    best, stderr = step.fit, _widened(found) * step.fit.stderr
+    if found.verdict is DiagnosisVerdict.MANY_EFFECTS and not step.whiteness.is_noise:
+        # a fit of its own knows nothing of what else is missing
+        moved = moved_by_others(found.search.problem, best)
+        stderr = np.hypot(step.whiteness.inflation * stderr, moved)
+    listed = [_by_itself(one, best, stderr) for one in found.missing]
     names = {one.term.name for one in listed}
     own = [(term, best.terms.part(term.name)) for term in best.terms if term.name not in names]
-    had = [Fitted(term, wider * best.stderr[part], best.at_bound[part]) for term, part in own]
+    had = [Fitted(term, stderr[part], best.at_bound[part]) for term, part in own]
     return (*had, *listed)
 
 
-def _by_itself(listed: MissingEffect, best: Fit) -> Fitted:
-    """A listed effect with its values in the fit of just the listed effects."""
+def _by_itself(listed: MissingEffect, best: Fit, stderr: Array) -> Fitted:
+    """A listed effect with its values and errors (p,) in the fit of just the listed effects."""
     if listed.effect not in best.terms:
         return Fitted(listed.term, listed.stderr, listed.at_bound)
     part = best.terms.part(listed.effect)
-    # a fit of its own knows nothing of what else is missing
-    stderr = np.maximum(best.stderr[part], listed.stderr)
-    return Fitted(best.terms[listed.effect], stderr, best.at_bound[part])
+    error = np.maximum(stderr[part], listed.stderr)
+    return Fitted(best.terms[listed.effect], error, best.at_bound[part])
 
 
 def refitted(found: Diagnosis, own: Model) -> tuple[str, ...]:

@@ -9,9 +9,9 @@ import numpy as np
 from crosscheck.diagnosis.advice import measure_next
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.search import Search
-from crosscheck.fit.problem import Problem, Rms, rms_by_kind
+from crosscheck.fit.least_squares.problem import Problem, Rms, rms_by_kind
+from crosscheck.fit.noise.tolerance import Tolerance, doubt_of, remainder_of
 from crosscheck.fit.reasons import DiagnosisVerdict
-from crosscheck.fit.tolerance import Tolerance, doubt_of, remainder_of
 
 
 def weighed(found: Diagnosis, problem: Problem, tolerance: Tolerance) -> Diagnosis:

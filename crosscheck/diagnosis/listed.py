@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
-from crosscheck.calibration.equals import SMALL
-from crosscheck.calibration.sets import Names
+from crosscheck.calibration.sets.equals import SMALL
+from crosscheck.calibration.sets.linear_search import Names
 from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.advice import check_of, measure_next
 from crosscheck.diagnosis.chances import Chances
@@ -16,10 +16,10 @@ from crosscheck.diagnosis.rivals import Rival, rivals_of
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.small import share_of
 from crosscheck.diagnosis.words import doubts_about
-from crosscheck.fit.candidates import Candidate
-from crosscheck.fit.problem import Rms, rms_by_kind
+from crosscheck.fit.effects.candidates import Candidate
+from crosscheck.fit.least_squares.problem import Rms, rms_by_kind
+from crosscheck.fit.noise.unstated import overestimated
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
-from crosscheck.fit.unstated import overestimated
 
 
 def diagnosis_of(

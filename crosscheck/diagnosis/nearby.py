@@ -10,24 +10,24 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from crosscheck.calibration.catalogue import Catalogue, catalogue_columns, gram_with
-from crosscheck.calibration.challenge import excluding
-from crosscheck.calibration.colour import WHITE, chain_of
-from crosscheck.calibration.detectable import detectable_size
-from crosscheck.calibration.equals import EQUAL, parameters_counted
-from crosscheck.calibration.imitated import Imitated, field_in_place
-from crosscheck.calibration.joining import at_null, layouts, promising_beside
-from crosscheck.calibration.joint import JointFit, Setting, settle
-from crosscheck.calibration.priors import FLAT, widths_of
-from crosscheck.calibration.probability import alike_beyond, of_classes, with_hints
-from crosscheck.calibration.sets import Names, Scores, explore
-from crosscheck.calibration.shapes import prices_about
+from crosscheck.calibration.joint_fit.joining import at_null, layouts, promising_beside
+from crosscheck.calibration.joint_fit.joint import JointFit, Setting, settle
+from crosscheck.calibration.judgement.probability import alike_beyond, of_classes, with_hints
+from crosscheck.calibration.linear_evidence.priors import FLAT, widths_of
+from crosscheck.calibration.noise.colour import WHITE, chain_of
+from crosscheck.calibration.sets.catalogue import Catalogue, catalogue_columns, gram_with
+from crosscheck.calibration.sets.challenge import excluding
+from crosscheck.calibration.sets.equals import EQUAL, parameters_counted
+from crosscheck.calibration.sets.linear_search import Names, Scores, explore
+from crosscheck.calibration.sets.shapes import prices_about
+from crosscheck.calibration.unknown.detectable import detectable_size
+from crosscheck.calibration.unknown.imitated import Imitated, field_in_place
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.search import Search
-from crosscheck.fit.problem import Rms
+from crosscheck.fit.effects.registration import NAME as TRACKER
+from crosscheck.fit.least_squares.problem import Rms
+from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.fit.reasons import Why
-from crosscheck.fit.registration import NAME as TRACKER
-from crosscheck.fit.state import evaluate
 from seecr.effects import Term, Terms
 from seecr.pose import Array
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from crosscheck.calibration.equals import SMALL
-from crosscheck.fit.candidates import Candidate, Trials, fit_candidate, screen
-from crosscheck.fit.evidence import FALSE_ALARM, Evidence
-from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.noise import Whiteness
-from crosscheck.fit.prepare import Progress
+from crosscheck.calibration.sets.equals import SMALL
+from crosscheck.fit.effects.candidates import Candidate, Trials, fit_candidate, screen
+from crosscheck.fit.effects.evidence import FALSE_ALARM, Evidence
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.noise.whiteness import Whiteness
+from crosscheck.fit.preparation.prepare import Progress
 from crosscheck.fit.reasons import Reason, Why
 
 # Least gain in ln evidence for one more effect (odds of 20:1).

@@ -6,11 +6,11 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from crosscheck.diagnosis.node import LEAST_GAIN, Names, Node, hopeless, node_of
-from crosscheck.fit.candidates import Candidate, Trials
-from crosscheck.fit.evidence import Evidence
-from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.held_out import HeldOut, hold_out, pays, unfitted
-from crosscheck.fit.noise import Whiteness
+from crosscheck.fit.effects.candidates import Candidate, Trials
+from crosscheck.fit.effects.evidence import Evidence
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.effects.held_out import HeldOut, hold_out, pays, unfitted
+from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.fit.reasons import Reason, Why
 from seecr.effects import Terms
 

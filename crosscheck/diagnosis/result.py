@@ -14,10 +14,10 @@ from crosscheck.diagnosis.chances import NOT_WEIGHED, Chances
 from crosscheck.diagnosis.common_part import CommonPart
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
-from crosscheck.fit.noise import Whiteness
-from crosscheck.fit.problem import Rms
+from crosscheck.fit.least_squares.problem import Rms
+from crosscheck.fit.noise.tolerance import LeftOver
+from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Refusal
-from crosscheck.fit.tolerance import LeftOver
 from crosscheck.fit.words import rms_words, value_lines, value_records
 from crosscheck.planning.sight import Sight
 from seecr.effects import Term, Terms

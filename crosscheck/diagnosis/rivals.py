@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.calibration.equals import EQUAL, are_equals
+from crosscheck.calibration.sets.equals import EQUAL, are_equals
 from crosscheck.diagnosis.node import hopeless
 from crosscheck.diagnosis.search import Search
-from crosscheck.fit.candidates import Candidate, try_candidate
-from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.imitation import basis, beside, imitated
+from crosscheck.fit.effects.candidates import Candidate, try_candidate
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.least_squares.imitation import basis, beside, imitated
 from seecr.effects import catalogue
 from seecr.effects.base import Layout
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.calibration.equals import SMALL
+from crosscheck.calibration.sets.equals import SMALL
 from crosscheck.diagnosis.node import (
     LEAST_GAIN,
     LEAST_PART,
@@ -30,10 +30,10 @@ from crosscheck.diagnosis.node import (
     node_of,
 )
 from crosscheck.diagnosis.order import Step, fitted_to_the_end, in_order, without_needless
-from crosscheck.fit.candidates import Trials
-from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.prepare import Progress
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.effects.candidates import Trials
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.preparation.prepare import Progress
 from seecr.effects import catalogue
 from seecr.pose import Array
 

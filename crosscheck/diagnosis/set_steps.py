@@ -6,24 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from crosscheck.calibration.all_effects import covariance
-from crosscheck.calibration.exact import Refit
-from crosscheck.calibration.gram import Gram
-from crosscheck.calibration.joining import amplitudes
-from crosscheck.calibration.joint import JointFit, Setting
-from crosscheck.calibration.leave_out import leave_out
-from crosscheck.calibration.linearised import free_of, linearised
-from crosscheck.calibration.refits import Found
+from crosscheck.calibration.joint_fit.all_effects import covariance
+from crosscheck.calibration.joint_fit.joining import amplitudes
+from crosscheck.calibration.joint_fit.joint import JointFit, Setting
+from crosscheck.calibration.joint_fit.leave_out import leave_out
+from crosscheck.calibration.joint_fit.linearised import free_of, linearised
+from crosscheck.calibration.linear_evidence.gram import Gram
 from crosscheck.calibration.search import SetSearch
-from crosscheck.calibration.sets import Names
+from crosscheck.calibration.sets.exact import Refit
+from crosscheck.calibration.sets.linear_search import Names
+from crosscheck.calibration.sets.refits import ComparedSets
 from crosscheck.diagnosis.node import Node
 from crosscheck.diagnosis.order import Step
 from crosscheck.diagnosis.search import Search
-from crosscheck.fit.candidates import Candidate, Trials, candidates_for
-from crosscheck.fit.evidence import Evidence, p_value
-from crosscheck.fit.gauss_newton import Fit, FitStatus
-from crosscheck.fit.held_out import HeldOut
-from crosscheck.fit.noise import whiteness
+from crosscheck.fit.effects.candidates import Candidate, Trials, candidates_for
+from crosscheck.fit.effects.evidence import Evidence, p_value
+from crosscheck.fit.effects.gauss_newton import Fit, FitStatus
+from crosscheck.fit.effects.held_out import HeldOut
+from crosscheck.fit.noise.whiteness import whiteness
 from crosscheck.fit.reasons import Reason, Why
 from seecr.effects import Term
 from seecr.pose import Array
@@ -55,7 +55,7 @@ def steps_of_set(sought: SetSearch, names: Names) -> Search:
     return Search(Trials(problem, factor), tuple(steps), {})
 
 
-def _score(found: Found, names: Names) -> float:
+def _score(found: ComparedSets, names: Names) -> float:
     return found.refits[names].score if names in found.refits else found.scores.score(names)
 
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from crosscheck.calibration.judgement import SURE
+from crosscheck.calibration.judgement.verdict import SURE
 from crosscheck.diagnosis.chances import Chances
-from crosscheck.diagnosis.exchange import exchanged, replaced
+from crosscheck.diagnosis.exchanged_effects import exchanged, replaced
 from crosscheck.diagnosis.listed import diagnosis_of, missing_of, not_listed
 from crosscheck.diagnosis.nearby import chances_near
 from crosscheck.diagnosis.result import Diagnosis, NotListed
@@ -22,8 +22,8 @@ from crosscheck.diagnosis.words import (
     noise_left,
     words_of,
 )
-from crosscheck.fit.prepare import noise_floor
-from crosscheck.fit.problem import rms_by_kind
+from crosscheck.fit.least_squares.problem import rms_by_kind
+from crosscheck.fit.preparation.prepare import noise_floor
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 
 

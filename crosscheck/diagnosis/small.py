@@ -14,11 +14,11 @@ import numpy as np
 from crosscheck.diagnosis.node import LEAST_GAIN, node_of
 from crosscheck.diagnosis.order import Step, step_of
 from crosscheck.diagnosis.search import MOST_EFFECTS, Search
-from crosscheck.fit.candidates import Candidate, try_candidate
-from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.held_out import significantly_improves
-from crosscheck.fit.possible import is_plausible
-from crosscheck.fit.smooth import beyond_smooth
+from crosscheck.fit.effects.candidates import Candidate, try_candidate
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.effects.held_out import significantly_improves
+from crosscheck.fit.effects.possible import is_plausible
+from crosscheck.fit.noise.smooth import beyond_smooth
 
 # What is there takes no kind of reading farther off on held-out runs than so many times.
 _FARTHER = 1.1

@@ -9,10 +9,10 @@ import numpy as np
 
 from crosscheck.diagnosis.order import Step
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.fit.held_out import blocks_of
-from crosscheck.fit.prepare import noise_floor
-from crosscheck.fit.problem import KINDS, Kind, Problem, rms_by_kind
-from crosscheck.fit.state import State
+from crosscheck.fit.effects.held_out import blocks_of
+from crosscheck.fit.least_squares.problem import KINDS, Kind, Problem, rms_by_kind
+from crosscheck.fit.least_squares.state import State
+from crosscheck.fit.preparation.prepare import noise_floor
 from seecr.pose import Array
 
 # The longest arrow, as a part of the widest side of the region, and the percentile of errors that

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from crosscheck.diagnosis.search import Search, search
-from crosscheck.fit.candidates import Trials, null_fit
-from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.known import free_derivatives
-from crosscheck.fit.noise import whiteness
-from crosscheck.fit.outliers import outlying_rows
-from crosscheck.fit.prepare import Progress
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.effects.candidates import Trials, null_fit
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.least_squares.known import free_derivatives
+from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.noise.outliers import outlying_rows
+from crosscheck.fit.noise.whiteness import whiteness
+from crosscheck.fit.preparation.prepare import Progress
 from seecr.pose import Array
 
 # The model's values are refitted before the search if that lowers chi2 by this much.

@@ -12,10 +12,10 @@ from itertools import takewhile
 
 import numpy as np
 
-from crosscheck.calibration.equals import SMALL
-from crosscheck.calibration.judgement import SURE
+from crosscheck.calibration.judgement.verdict import SURE
 from crosscheck.calibration.search import SetSearch
-from crosscheck.calibration.sets import Names
+from crosscheck.calibration.sets.equals import SMALL
+from crosscheck.calibration.sets.linear_search import Names
 from crosscheck.comparison.associations import Association, associations
 from crosscheck.diagnosis.chances import Chances, chances_of
 from crosscheck.diagnosis.listed import diagnosis_of, missing_of, not_listed
@@ -23,11 +23,11 @@ from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.small import share_of, small_effects_alone, spoils
 from crosscheck.diagnosis.words import and_what_is_left, none_of, words_of
-from crosscheck.fit.possible import is_plausible
-from crosscheck.fit.prepare import noise_floor
-from crosscheck.fit.problem import KINDS, Rms, rms_by_kind
+from crosscheck.fit.effects.possible import is_plausible
+from crosscheck.fit.least_squares.problem import KINDS, Rms, rms_by_kind
+from crosscheck.fit.noise.smooth import beyond_smooth
+from crosscheck.fit.preparation.prepare import noise_floor
 from crosscheck.fit.reasons import DiagnosisVerdict
-from crosscheck.fit.smooth import beyond_smooth
 
 # Least part of the unexplained chi2 that a small effect must have removed to be listed; among small
 # effects only, the part for the first one and that of the rest for each later one.
@@ -84,7 +84,7 @@ def beside_imitated(found: Search, sought: SetSearch) -> SetSearch:
     said, chances = sought.judgement, chances_of(sought)
     if said.imitated is None or said.sure:
         return sought
-    own = sought.found.best.names - said.imitated.replaced - said.doubted
+    own = sought.found.best.names - said.imitated.replaced - said.implausible
     missing, _search = _warranted(found, chances, sought.outdone)
     sure = tuple(m.effect for m in missing if m.effect in own and m.probability > SURE)
     return replace(sought, judgement=replace(said, sure=sure))

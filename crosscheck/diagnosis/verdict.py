@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from crosscheck.calibration.judgement import SURE, too_large
+from crosscheck.calibration.judgement.verdict import SURE, too_large
 from crosscheck.calibration.search import search_sets
 from crosscheck.diagnosis.chances import PROBABLE
-from crosscheck.diagnosis.doubtful import doubtful_values
+from crosscheck.diagnosis.contradicted import contradicted_values
 from crosscheck.diagnosis.explained import explained
+from crosscheck.diagnosis.found import found_effects
 from crosscheck.diagnosis.importance import weighed
 from crosscheck.diagnosis.kept import Diagnosed
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
@@ -20,14 +21,15 @@ from crosscheck.diagnosis.settled import settled
 from crosscheck.diagnosis.stepwise import by_steps
 from crosscheck.diagnosis.unexplained import beside_imitated, unexplained
 from crosscheck.diagnosis.words import size_notes
-from crosscheck.fit.candidates import candidates_for, null_fit
-from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.possible import hardly_happens
-from crosscheck.fit.prepare import Prepared, Progress, noise_floor, prepare
-from crosscheck.fit.problem import Problem, Rms, kinds_read, kinds_stated, rms_by_kind
+from crosscheck.fit.effects.candidates import candidates_for, null_fit
+from crosscheck.fit.effects.contradictions import contradictions
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.effects.possible import hardly_happens
+from crosscheck.fit.least_squares.problem import Problem, Rms, kinds_read, kinds_stated, rms_by_kind
+from crosscheck.fit.noise.tolerance import HALF_THE_NOISE, Tolerance
+from crosscheck.fit.preparation.prepare import Prepared, Progress, noise_floor, prepare
+from crosscheck.fit.preparation.thinned import thinned
 from crosscheck.fit.reasons import DiagnosisVerdict, Refusal, Unfit, Why
-from crosscheck.fit.thinned import thinned
-from crosscheck.fit.tolerance import HALF_THE_NOISE, Tolerance
 from crosscheck.fit.words import rms_words
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, opened, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
@@ -95,8 +97,9 @@ def diagnose(
             without = no_verdict(ready.problem, base, found.notes, rows)
             return replace(without, sight=found.sight, of=of)
         others = thin.note_on_others(found.search.last.fit.terms, found.search.problem.sigma)
-        doubts = doubtful_values(found)
-        return replace(found, notes=(*doubts, *found.notes, *others))
+        against = contradictions(one.term for one in found_effects(found))
+        doubts = contradicted_values(found)
+        return replace(found, notes=(*against, *doubts, *found.notes, *others))
 
 
 def _may_be_noise(found: Diagnosis, problem: Problem) -> bool:

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from crosscheck.diagnosis.chances import PROBABLE, Chances
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
-from crosscheck.fit.possible import largest_size
-from crosscheck.fit.reasons import probability_words
+from crosscheck.fit.effects.possible import largest_size
+from crosscheck.fit.reasons import DiagnosisVerdict, probability_words
 from seecr.counted import counted
 from seecr.effects import Term
 
@@ -168,6 +168,19 @@ WITHIN = (
     "something remains that is none of them and may act like this one."
 )
 """What is said about probabilities if structure remains."""
+
+OTHERS_WITHIN = (
+    "Probabilities of effects that are not listed assume that the catalogue alone explains the "
+    "data. Here something unknown does, which these effects may imitate, or be imitated with."
+)
+"""The same where what is listed has been weighed against something unknown."""
+
+
+def within_words(found: Diagnosis) -> str:
+    """What probabilities assume of the catalogue beside something unknown; "" elsewhere."""
+    if found.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT or found.chances is None:
+        return ""
+    return WITHIN if found.within_catalogue else OTHERS_WITHIN
 
 
 def percent(share: float) -> str:

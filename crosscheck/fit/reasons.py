@@ -32,6 +32,7 @@ class Why(Enum):
     NEEDS_TENSIONS = "needs measured tensions"
     NOT_MOVED = "these commands do not vary the quantity that it depends on"
     UNSEEN = "not visible in these data: its plausible size moves no reading"
+    GAINS_NOTHING = "explains nothing beside the others"
     IMPOSSIBLE = "would need values that no robot can have"
     UNSOLVED = "could not be fitted: some rows could not be solved with it"
     CHANCE = "not significant (p = {p:.2g})"
@@ -44,12 +45,8 @@ class Why(Enum):
     ALIKE = "indistinguishable from {by}, which is listed"
     IN_COMMON = "may be what all cables have in common of {by}, which is listed"
     NOT_NEEDED_BESIDE = "not needed once {by} {are} in the model (probability {chance})"
-    CARRIES_LITTLE = (
-        "probable ({chance}) but not certain: it explains little once {by} {are} in the model"
-    )
-    DOES_LITTLE = (
-        "probable ({chance}) but not certain: it does little beside the others that are probable"
-    )
+    CARRIES_LITTLE = "probable ({chance}), but it explains little once {by} {are} in the model"
+    DOES_LITTLE = "probable ({chance}), but it does little beside the others that are probable"
     NOT_SURE = "probable ({chance}) but not certain"
     REPLACEABLE = "probable ({chance}) but not certain: others together explain as much without it"
     IMPROBABLE = "explains too little (probability {chance})"

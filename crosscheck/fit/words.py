@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.problem import KINDS, Rms
+from crosscheck.fit.least_squares.problem import KINDS, Rms
 from crosscheck.model.fitted import Fitted
 from crosscheck.units import in_unit, parameter_name, short, with_error
 from seecr.effects.base import Layout

@@ -215,7 +215,7 @@ def _with_covariance(table: Any, fitted: Sequence[Fitted], covariance: Array) ->
 def _floats(row: Iterable[float]) -> str:
     """Numbers that TOML reads as floats, none as an integer."""
     cells = (f"{one:.{_VALUE}g}" for one in row)
-    return ", ".join(cell if {".", "e"} & set(cell) else f"{cell}.0" for cell in cells)
+    return ", ".join(cell if {".", "e", "n"} & set(cell) else f"{cell}.0" for cell in cells)
 
 
 def _lines(items: Sequence[str]) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.prepare import Progress
+from crosscheck.fit.preparation.prepare import Progress
 from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.planning.adding import NO_LIMITS, Limits

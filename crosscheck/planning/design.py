@@ -6,8 +6,8 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from crosscheck.fit.imitation import imitated
-from crosscheck.fit.prepare import Progress
+from crosscheck.fit.least_squares.imitation import imitated
+from crosscheck.fit.preparation.prepare import Progress
 from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import GivenCommands, commands_of

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from crosscheck.fit.candidates import null_fit
+from crosscheck.fit.effects.candidates import null_fit
 from crosscheck.measurements.data import Measurements
 from crosscheck.planning.adding import NO_LIMITS, Adding, Extension, Limits, like
 from crosscheck.planning.places import more_poses

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.measurements.data import Measurements
 from crosscheck.planning.adding import NO_LIMITS, Adding, Extension, Limits, like
 from crosscheck.planning.planned import Planned, near_slack

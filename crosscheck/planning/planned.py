@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.candidates import null_fit
-from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.effects.candidates import null_fit
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.compiled.columns import REST, STRAIN, TENSION
 from seecr.description.robot import Robot

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.fit.prepare import Progress
-from crosscheck.fit.state import derivatives
+from crosscheck.fit.least_squares.state import derivatives
+from crosscheck.fit.preparation.prepare import Progress
 from crosscheck.measurements.data import Measurements
 from crosscheck.planning.adding import Adding, Extension
 from crosscheck.planning.greedy import Wanted, chosen_poses

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.reasons import Reason, Why
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.result import Visible
@@ -66,7 +66,8 @@ class Sight:
             )
         pairs = [f"{name} from {' or '.join(others[:3])}" for name, others in self.alike.items()]
         if pairs:
-            out.append(f"The data could not distinguish {some(pairs, _MOST, '; ')}.")
+            alike = some(pairs, _MOST, "; ")
+            out.append(f"At a plausible size the data could not distinguish {alike}.")
         return out
 
     def as_json(self) -> dict[str, Any]:

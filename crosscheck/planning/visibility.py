@@ -16,12 +16,12 @@ from functools import cached_property, lru_cache
 import numpy as np
 from scipy import optimize, special
 
-from crosscheck.fit import imitation
-from crosscheck.fit.candidates import candidates_for
-from crosscheck.fit.imitation import basis, beside
-from crosscheck.fit.known import free_derivatives
+from crosscheck.fit.effects.candidates import candidates_for
+from crosscheck.fit.effects.starts import amplitude_columns
+from crosscheck.fit.least_squares import imitation
+from crosscheck.fit.least_squares.imitation import basis, beside
+from crosscheck.fit.least_squares.known import free_derivatives
 from crosscheck.fit.reasons import Reason, Why
-from crosscheck.fit.starts import amplitude_columns
 from crosscheck.planning.planned import Planned
 from seecr.effects.base import Layout
 from seecr.pose import Array

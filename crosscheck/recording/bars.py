@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, floor_of
-from crosscheck.fit.problem import Kind, kinds_read
+from crosscheck.fit.least_squares.problem import Kind, kinds_read
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.units import short
 from seecr.recording import colours, layout

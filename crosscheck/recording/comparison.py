@@ -10,7 +10,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from crosscheck.comparison.quantities import channels
-from crosscheck.fit.problem import Kind
+from crosscheck.fit.least_squares.problem import Kind
 from crosscheck.recording import misfit, words
 from crosscheck.recording.diagnosis_words import plain
 from crosscheck.recording.misfit import MEASURED, Misfit

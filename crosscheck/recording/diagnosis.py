@@ -15,7 +15,7 @@ import rerun.blueprint as rrb
 
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, stages_of
-from crosscheck.fit.problem import Kind
+from crosscheck.fit.least_squares.problem import Kind
 from crosscheck.recording import bars, misfit
 from crosscheck.recording.diagnosis_words import model_words, pose_words, verdict_words
 from crosscheck.recording.misfit import MEASURED, Misfit

@@ -7,7 +7,7 @@ import numpy as np
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.steps import Stage, floor_of
 from crosscheck.diagnosis.words import removed
-from crosscheck.fit.problem import rms_by_kind
+from crosscheck.fit.least_squares.problem import rms_by_kind
 from crosscheck.recording import misfit, words
 from crosscheck.recording.misfit import Misfit
 from crosscheck.units import in_unit, parameter_name, short, with_error

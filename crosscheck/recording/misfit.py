@@ -10,8 +10,8 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from crosscheck.diagnosis.steps import drawn, magnification, views_of
-from crosscheck.fit.problem import POSITION, Kind, Problem, kinds_read
-from crosscheck.fit.state import State
+from crosscheck.fit.least_squares.problem import POSITION, Kind, Problem, kinds_read
+from crosscheck.fit.least_squares.state import State
 from crosscheck.recording.axes import bounds, draw_axes
 from seecr.compiled.columns import REST
 from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat

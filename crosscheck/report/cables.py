@@ -20,7 +20,7 @@ from crosscheck.comparison.cable_space import cable_errors, cable_lengths
 from crosscheck.comparison.quantities import channels
 from crosscheck.comparison.travel import travel
 from crosscheck.diagnosis.steps import Drawn
-from crosscheck.fit.problem import KINDS, TENSION, Problem
+from crosscheck.fit.least_squares.problem import KINDS, TENSION, Problem
 from crosscheck.report.drawing import (
     AFTER,
     BEFORE,

@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from crosscheck.comparison.result import Comparison, Group
 from crosscheck.diagnosis.steps import Standing
-from crosscheck.fit.problem import KINDS, Rms
+from crosscheck.fit.least_squares.problem import KINDS, Rms
 from crosscheck.report.cables import draw_wall, walls_of
 from crosscheck.report.drawing import BEFORE, CALM
 from crosscheck.report.page import facts, title_of

@@ -9,10 +9,10 @@ from matplotlib.patches import Rectangle
 
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.search import Search
-from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.imitation import basis, beside, imitated
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.effects.starts import amplitude_columns
+from crosscheck.fit.least_squares.imitation import basis, beside, imitated
 from crosscheck.fit.reasons import Why
-from crosscheck.fit.starts import amplitude_columns
 from crosscheck.report.drawing import BEFORE, INK, WIDTH, blank, image, styled
 from seecr.effects.base import Layout
 from seecr.pose import Array

@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import noise_is_other, shown_stages, stages_of
-from crosscheck.diagnosis.words import WITHIN, probability_name
+from crosscheck.diagnosis.words import probability_name, within_words
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.words import rms_words
 from crosscheck.report.cables import draw_wall, walls_of
@@ -70,7 +70,7 @@ def diagnosis_context(found: Diagnosis) -> dict[str, object]:
         "measure_next": list(found.measure_further),
         "findings": [finding_card(found, finding) for finding in found.missing],
         "probability": probability_name(found),
-        "within": WITHIN if found.within_catalogue else "",
+        "within": within_words(found),
         "candidates": candidate_rows(found),
         "untried": untried(found),
         "after": AFTER,

@@ -6,7 +6,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from crosscheck.fit.problem import Problem, kinds_read
+from crosscheck.fit.least_squares.problem import Problem, kinds_read
 from crosscheck.report.glossary import with_glossary
 from crosscheck.units import short
 from seecr import __version__

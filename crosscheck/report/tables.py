@@ -12,9 +12,9 @@ from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.order import Step
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import stages_of
-from crosscheck.fit.candidates import Candidate
-from crosscheck.fit.evidence import FALSE_ALARM, p_value
-from crosscheck.fit.noise import POOR_FIT, STRUCTURED
+from crosscheck.fit.effects.candidates import Candidate
+from crosscheck.fit.effects.evidence import FALSE_ALARM, p_value
+from crosscheck.fit.noise.whiteness import POOR_FIT, STRUCTURED
 from crosscheck.fit.reasons import DiagnosisVerdict, probability_words
 from crosscheck.report.findings import PLAUSIBLE
 from crosscheck.units import chance, in_unit, parameter_name, short

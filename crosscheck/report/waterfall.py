@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, by_block, floor_of, noise_is_other, stages_of
-from crosscheck.fit.problem import Kind, kinds_read, rms_by_kind
+from crosscheck.fit.least_squares.problem import Kind, kinds_read, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.report.drawing import (
     AFTER,

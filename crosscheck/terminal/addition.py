@@ -59,7 +59,7 @@ def _table(found: Addition) -> Table:
     rows = (
         ("before", found.before, ""),
         (f"with {found.name}", found.after, "bold"),
-        ("before, on held-out runs", found.held_out_before, "dim"),
+        (f"without {found.name}, on held-out runs", found.held_out_before, "dim"),
         (f"with {found.name}, on held-out runs", found.held_out, ""),
     )
     return rms_table(rows)

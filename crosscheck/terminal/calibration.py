@@ -41,6 +41,8 @@ def print_calibration(
         say(console, _UNSURE)
     for line in found.noise_lines():
         say(console, line)
+    for line in found.absent_lines():
+        say(console, line, "dim")
     if not found.settled:
         say(console, "The fit did not converge: do not use its values.", "bold yellow")
     elif not found.pays:

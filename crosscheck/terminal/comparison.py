@@ -13,7 +13,7 @@ from rich.text import Text
 from crosscheck.comparison.limits import Exceeded
 from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.comparison.result import Comparison, Group
-from crosscheck.fit.problem import KINDS, Kind, Rms
+from crosscheck.fit.least_squares.problem import KINDS, Kind, Rms
 from crosscheck.terminal.lines import cell, console_for, four_digits, heading, say, table_of
 from crosscheck.units import in_unit
 from seecr.counted import counted

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.diagnosis.result import MissingEffect
-from crosscheck.diagnosis.words import WITHIN, equals_of, probability_name
+from crosscheck.diagnosis.result import MissingEffect, NotListed
+from crosscheck.diagnosis.words import equals_of, probability_name, within_words
 from crosscheck.fit.reasons import DiagnosisVerdict, Why, probability_words
 from crosscheck.terminal.lines import console_for, print_parameters, rms_table, say
+from seecr.counted import counted
 
 if TYPE_CHECKING:
     from crosscheck.diagnosis.result import Diagnosis
@@ -42,8 +44,8 @@ def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None)
             say(console, f"note: {found.chances.words}", "dim")
         for finding in found.missing:
             _print_finding(console, finding, probability_name(found))
-        if found.missing and found.within_catalogue:
-            say(console, f"note: {WITHIN}", "dim")
+        if within := within_words(found):
+            say(console, f"note: {within}", "dim")
         _print_candidates(console, found)
         for line in equals_of(found):
             say(console, line, "dim")
@@ -78,3 +80,13 @@ def _print_candidates(console: Console, found: Diagnosis) -> None:
     rows = [row for row in found.candidates if row.why_not.why is not Why.EXCLUDED]
     for row in rows[:_MOST_CANDIDATES]:
         say(console, f"not {row.effect}: {row.why_not}", "dim")
+    if len(rows) > _MOST_CANDIDATES:
+        say(console, _others(found, rows[_MOST_CANDIDATES:]), "dim")
+
+
+def _others(found: Diagnosis, rows: Sequence[NotListed]) -> str:
+    """How probable the effects are at most that are not printed, and where they are."""
+    chances = {} if found.chances is None else found.chances.effect
+    likely = [chances[row.effect] for row in rows if row.effect in chances]
+    most = f" (probability {probability_words(max(likely))} or less)" if likely else ""
+    return f"nor {counted(len(rows), 'other')}{most}: see candidates in diagnosis.json"

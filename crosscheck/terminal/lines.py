@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from crosscheck.fit.problem import KINDS, Kind, Rms
+from crosscheck.fit.least_squares.problem import KINDS, Kind, Rms
 from crosscheck.fit.words import value_lines
 from crosscheck.units import without_rounding
 from seecr.effects.base import Layout

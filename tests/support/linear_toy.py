@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.fit.candidates import Candidate, Trials
-from crosscheck.fit.gauss_newton import PRIOR_SIZES, Fit, FitStatus
-from crosscheck.fit.imitation import beside
-from crosscheck.fit.problem import Problem
-from crosscheck.fit.starts import Starts
-from crosscheck.fit.state import State
+from crosscheck.fit.effects.candidates import Candidate, Trials
+from crosscheck.fit.effects.gauss_newton import PRIOR_SIZES, Fit, FitStatus
+from crosscheck.fit.effects.starts import Starts
+from crosscheck.fit.least_squares.imitation import beside
+from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.least_squares.state import State
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path

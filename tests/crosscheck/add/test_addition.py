@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from made_data import SIGMA, measured, term
 
-from crosscheck.add import add_effect, weigh
+from crosscheck.add import add_effect, add_effects, weigh
 from crosscheck.add.result import Addition
-from crosscheck.fit.noise import Whiteness
+from crosscheck.errors import UnsolvedError
+from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.model.fitted import Fitted
 from seecr.description.mjcf import load_robot
 from seecr.effects import Term
@@ -46,9 +47,27 @@ def test_what_predicts_better_pays_unless_it_is_nothing(predicts: bool, is_nothi
     assert found.pays == (predicts and not is_nothing)
     worth = "improves" if predicts else "does not improve"
     assert found.lines()[0].startswith(f"stiffness + creep {worth} the prediction of held-out runs")
-    nothing = "stiffness + creep differs from null by no more than its standard errors (9 of them)"
+    nothing = "stiffness + creep is 9 standard errors from null"
     assert (f"{nothing}: it is not worth adding" in found.lines()) == is_nothing
     assert found.why_not.startswith(nothing if is_nothing else "what stiffness + creep explains")
+
+
+def test_several_values_are_nothing_where_noise_alone_may_bring_them() -> None:
+    """Of 1.5 standard errors of eight values it said "no more than its standard errors"."""
+    found = addition(names=("drum_gain",), is_nothing=True, from_nothing=1.54,
+                     fitted=(fitted("drum_gain", gain_1=1e-4),))  # fmt: skip
+    assert found.why_not == (
+        "drum_gain is no further from null than noise alone may bring 8 values "
+        "(1.5 standard errors, all together)"
+    )
+
+
+def test_a_fit_that_cannot_be_solved_adds_nothing() -> None:
+    """Its chi2 is infinite, and the model written from it could not be read again."""
+    data = measured(ROBOT, [term(ROBOT, "stiffness", factor=1.3)])
+    huge = term(ROBOT, "external_wrench", force_z_N=1e9)
+    with pytest.raises(UnsolvedError, match="external_wrench failed, as some rows could not be"):
+        add_effects(ROBOT, data, [huge])
 
 
 def test_the_added_effect_is_found_by_its_name_and_the_model_has_all() -> None:

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
-from crosscheck.calibration.all_effects import Calibration, fit_all_effects
-from crosscheck.calibration.joint import cost
-from crosscheck.calibration.leave_out import surprise_of, values_without
-from crosscheck.calibration.linearised import Linear
+from crosscheck.calibration.joint_fit.all_effects import Calibration, fit_all_effects
+from crosscheck.calibration.joint_fit.joint import cost
+from crosscheck.calibration.joint_fit.leave_out import surprise_of, values_without
+from crosscheck.calibration.joint_fit.linearised import Linear
 from crosscheck.calibration.result import calibrate
-from crosscheck.fit.held_out import blocks_of
-from crosscheck.fit.prepare import prepare
-from crosscheck.fit.problem import Problem, rms_by_kind
-from crosscheck.fit.registration import registered
-from crosscheck.fit.state import evaluate
+from crosscheck.fit.effects.held_out import blocks_of
+from crosscheck.fit.effects.registration import registered
+from crosscheck.fit.least_squares.problem import Problem, rms_by_kind
+from crosscheck.fit.least_squares.state import evaluate
+from crosscheck.fit.preparation.prepare import prepare
 from crosscheck.given import considered
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.together import together

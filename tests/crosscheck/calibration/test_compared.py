@@ -10,13 +10,13 @@ import pytest
 from made_data import SIGMA, measured, soft_cogiro, term
 
 from crosscheck.calibration import compared as module
-from crosscheck.calibration.all_effects import Calibration, fit_all_effects
-from crosscheck.calibration.colour import Colour
 from crosscheck.calibration.compared import fit_and_compare
-from crosscheck.calibration.joint import scaled_derivatives
-from crosscheck.calibration.unknown import unknown_beside
-from crosscheck.fit.prepare import prepare
-from crosscheck.fit.state import evaluate
+from crosscheck.calibration.joint_fit.all_effects import Calibration, fit_all_effects
+from crosscheck.calibration.joint_fit.joint import scaled_derivatives
+from crosscheck.calibration.noise.colour import Colour
+from crosscheck.calibration.unknown.beside import unknown_beside
+from crosscheck.fit.least_squares.state import evaluate
+from crosscheck.fit.preparation.prepare import prepare
 from crosscheck.given import considered
 from seecr.effects import Terms
 

@@ -11,18 +11,20 @@ import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
-from crosscheck.calibration import compared, exact, refits, stages
-from crosscheck.calibration.catalogue import Catalogue
-from crosscheck.calibration.colour import WHITE, chain_of
-from crosscheck.calibration.joining import layouts
-from crosscheck.calibration.joint import JointFit, Setting, settle
-from crosscheck.calibration.priors import widths_of
+from crosscheck.calibration import compared
+from crosscheck.calibration.joint_fit import stages
+from crosscheck.calibration.joint_fit.joining import layouts
+from crosscheck.calibration.joint_fit.joint import JointFit, Setting, settle
+from crosscheck.calibration.joint_fit.stages import from_given
+from crosscheck.calibration.linear_evidence.priors import widths_of
+from crosscheck.calibration.noise.colour import WHITE, chain_of
 from crosscheck.calibration.search import search_sets
-from crosscheck.calibration.sets import Names, Scores
-from crosscheck.calibration.stages import from_given
-from crosscheck.fit.prepare import prepare
-from crosscheck.fit.problem import Problem
-from crosscheck.fit.state import State, evaluate
+from crosscheck.calibration.sets import exact, refits
+from crosscheck.calibration.sets.catalogue import Catalogue
+from crosscheck.calibration.sets.linear_search import Names, Scores
+from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.least_squares.state import State, evaluate
+from crosscheck.fit.preparation.prepare import prepare
 from crosscheck.given import considered
 from seecr.description.mjcf import load_robot
 from seecr.effects import Term, Terms

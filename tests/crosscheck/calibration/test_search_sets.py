@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
-from crosscheck.calibration import compared, refits, search
-from crosscheck.calibration.joint import JointFit, Setting
-from crosscheck.calibration.judgement import Judgement, judge
+from crosscheck.calibration import compared, search
+from crosscheck.calibration.joint_fit.joint import JointFit, Setting
+from crosscheck.calibration.judgement.verdict import Judgement, judge
 from crosscheck.calibration.search import SetSearch, nothing_by_themselves, search_sets
-from crosscheck.calibration.unknown import UnknownOdds
+from crosscheck.calibration.sets import refits
+from crosscheck.calibration.unknown.beside import UnknownOdds
 from crosscheck.diagnosis.explained import MORE, explained
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.fit.prepare import prepare
+from crosscheck.fit.preparation.prepare import prepare
 from crosscheck.fit.reasons import DiagnosisVerdict, Why
 from crosscheck.given import considered
 from seecr.description.mjcf import load_robot
@@ -81,7 +82,7 @@ def test_structure_beside_all_effects_is_nothing_unknown_if_few_effects_leave_no
         asked.append(len(joint.terms.names))
         return len(joint.terms.names) == len(FEW)
 
-    def compare_sets(*args: Any) -> refits.Found:
+    def compare_sets(*args: Any) -> refits.ComparedSets:
         refitted.append(args[5])
         return refits.compare_sets(*args)
 

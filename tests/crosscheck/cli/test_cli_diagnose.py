@@ -14,7 +14,7 @@ from made_data import case, refused, run, term
 
 from crosscheck.diagnosis import verdict as verdict_module
 from crosscheck.diagnosis.verdict import diagnose
-from crosscheck.fit.gauss_newton import FitStatus
+from crosscheck.fit.effects.gauss_newton import FitStatus
 from crosscheck.fit.reasons import DiagnosisVerdict, Unfit
 from crosscheck.measurements.read import load_measurements
 from crosscheck.measurements.write import write_measurements

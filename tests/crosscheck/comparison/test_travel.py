@@ -11,7 +11,7 @@ from made_data import measured, soft_cogiro
 from crosscheck.comparison.cable_space import cable_errors, cable_lengths, independent_part
 from crosscheck.comparison.quantities import QuantityKind, in_time, of_cables, of_rows
 from crosscheck.comparison.travel import STILL, regions_of, travel
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.least_squares.problem import Problem
 from seecr.effects import Terms
 from seecr.prediction.experiment import Prediction
 

@@ -10,7 +10,7 @@ import pytest
 from linear_toy import toy
 from made_data import soft_cogiro, term
 
-from crosscheck.calibration.varying import Varying
+from crosscheck.calibration.unknown.varying import Varying
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.quantities import EVERYWHERE, QuantityKind
 from crosscheck.diagnosis import advice as what_next

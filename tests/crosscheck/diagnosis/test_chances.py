@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 from made_data import COGIRO, measured, term
 
-from crosscheck.calibration.all_effects import JointErrors
-from crosscheck.calibration.gram import ColumnGroup, gram_of
-from crosscheck.calibration.probability import probabilities
-from crosscheck.calibration.sets import Scores, explore
-from crosscheck.calibration.varying import Varying
+from crosscheck.calibration.joint_fit.all_effects import JointErrors
+from crosscheck.calibration.judgement.probability import probabilities
+from crosscheck.calibration.linear_evidence.gram import ColumnGroup, gram_of
+from crosscheck.calibration.sets.linear_search import Scores, explore
+from crosscheck.calibration.unknown.varying import Varying
 from crosscheck.diagnosis import nearby
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.nearby import _better_without, _impossible, _refitted, chances_near
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.stepwise import by_steps
-from crosscheck.fit.candidates import null_fit
-from crosscheck.fit.prepare import prepare
-from crosscheck.fit.problem import Rms
+from crosscheck.fit.effects.candidates import null_fit
+from crosscheck.fit.least_squares.problem import Rms
+from crosscheck.fit.preparation.prepare import prepare
 from crosscheck.fit.reasons import Reason, Why, probability_words
 from crosscheck.given import considered
 from seecr.description.mjcf import load_robot

@@ -10,7 +10,7 @@ import pytest
 import crosscheck
 import seecr
 from crosscheck.diagnosis.verdict import _may_be_noise
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.reasons import DiagnosisVerdict, Unfit
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.prediction.experiment import Experiment

@@ -12,6 +12,7 @@ from made_diagnoses import POINTS, SIGMA, diagnose_with, none, nothing, pulleys,
 
 from crosscheck.comparison.residuals import compare
 from crosscheck.diagnosis.found import _widened, found_covariance, found_effects
+from crosscheck.diagnosis.steps import shown_stages
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.model.write import save_model
 from seecr.prediction.experiment import predict
@@ -113,3 +114,22 @@ def test_the_model_has_the_values_that_explain_most_by_themselves() -> None:
     ))  # fmt: skip
     assert kept.term.vector == pytest.approx(listed.term.vector)
     assert kept.stderr == pytest.approx(5.0 * listed.stderr)
+
+
+@pytest.mark.parametrize("p", [0.5, 0.0])
+def test_beside_many_effects_values_are_as_uncertain_as_what_is_missing_may_shift_them(
+    p: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An exit point was written into a model 26 of its standard errors from the truth."""
+    found = replace(pulleys(), verdict=DiagnosisVerdict.MANY_EFFECTS)
+    first, last = shown_stages(found)
+    white = replace(last.step.whiteness, p=p, scale=2.0, lag_errors=0.0, neighbour_errors=0.0)
+    node = replace(last.step.node, whiteness=white)
+    stages = (first, replace(last, step=replace(last.step, node=node)))
+    monkeypatch.setattr("crosscheck.diagnosis.found.shown_stages", lambda _found: stages)
+    moved = np.full(len(last.step.fit.terms), 1e-3)
+    monkeypatch.setattr("crosscheck.diagnosis.found.moved_by_others", lambda _problem, _fit: moved)
+    own, listed = last.step.fit.stderr[0], found.missing[0].stderr[0]
+    (kept,) = found_effects(found)
+    # where what is listed leaves noise, nothing else shifts it
+    assert kept.stderr[0] == pytest.approx(max(own, listed) if p else np.hypot(2.0 * own, 1e-3))

@@ -7,6 +7,7 @@ by what it predicts on another trajectory. All eighteen: ``make sweep``.
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,12 @@ import pytest
 
 from crosscheck import calibrate, diagnose
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.fit.problem import Problem, rms_by_kind
+from crosscheck.fit.least_squares.problem import Problem, rms_by_kind
+from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.fit.reasons import DiagnosisVerdict
-from crosscheck.fit.state import evaluate
 from crosscheck.measurements.read import load_measurements
 from seecr.description.mjcf import load_robot
-from seecr.effects import Terms
+from seecr.effects import Terms, catalogue
 
 # Nothing missing in heavy tails; one effect beside outliers, positions alone; a memory through
 # slackness; three at once in heavy tails; a frame that yields; few rows. Four at once, in B08, and
@@ -48,6 +49,9 @@ def test_lab(case: str, shared_data: Path) -> None:
         assert found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
     elif hidden == {"sink"}:
         assert found.verdict is DiagnosisVerdict.MANY_EFFECTS
+        fitted = re.search(r"(\d+) effects together do", found.sentence)
+        # those without inputs or use are not among them: "all 25" were 20
+        assert fitted is not None and 10 < int(fitted[1]) < len(catalogue()) - 2
     elif unknown:
         assert found.verdict in (DiagnosisVerdict.UNKNOWN_EFFECT, DiagnosisVerdict.MANY_EFFECTS)
         assert {effect.effect for effect in found.missing} <= hidden

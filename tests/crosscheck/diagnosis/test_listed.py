@@ -9,17 +9,17 @@ from typing import Any
 import pytest
 from made_diagnoses import pulleys, unknown
 
-from crosscheck.calibration.equals import SMALL
-from crosscheck.calibration.varying import Varying
+from crosscheck.calibration.sets.equals import SMALL
+from crosscheck.calibration.unknown.varying import Varying
 from crosscheck.diagnosis import unexplained as module
 from crosscheck.diagnosis.importance import weighed
 from crosscheck.diagnosis.listed import _with_equals, left_out, missing_of, not_listed
 from crosscheck.diagnosis.result import Diagnosis, NotListed
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.unexplained import where_of
-from crosscheck.fit.problem import rms_by_kind
+from crosscheck.fit.least_squares.problem import rms_by_kind
+from crosscheck.fit.noise.tolerance import Tolerance
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
-from crosscheck.fit.tolerance import Tolerance
 from seecr.effects import catalogue
 
 pytestmark = pytest.mark.slow

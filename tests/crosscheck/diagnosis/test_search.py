@@ -13,12 +13,12 @@ from crosscheck.diagnosis.order import fitted_to_the_end, in_order, without_need
 from crosscheck.diagnosis.rivals import rivals_of
 from crosscheck.diagnosis.search import Search, search
 from crosscheck.diagnosis.small import share_of, small_effects_alone
-from crosscheck.fit.evidence import FALSE_ALARM
-from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.possible import is_plausible
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.effects.evidence import FALSE_ALARM
+from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.effects.possible import is_plausible
+from crosscheck.fit.effects.starts import Starts
+from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.reasons import Why
-from crosscheck.fit.starts import Starts
 from seecr.effects.base import Layout
 from seecr.pose import Array
 

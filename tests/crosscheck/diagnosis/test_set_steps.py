@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crosscheck.calibration.gram import ColumnGroup, gram_of
+from crosscheck.calibration.linear_evidence.gram import ColumnGroup, gram_of
 from crosscheck.diagnosis import set_steps
 from seecr.effects import Term, layout_of
 

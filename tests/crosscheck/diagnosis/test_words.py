@@ -7,9 +7,9 @@ from typing import cast
 
 import pytest
 
-from crosscheck.calibration.imitated import Imitated
-from crosscheck.calibration.judgement import Judgement
-from crosscheck.calibration.varying import Varying
+from crosscheck.calibration.judgement.verdict import Judgement
+from crosscheck.calibration.unknown.imitated import Imitated
+from crosscheck.calibration.unknown.varying import Varying
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.explained import _sentence
 from crosscheck.diagnosis.result import MissingEffect

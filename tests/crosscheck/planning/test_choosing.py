@@ -11,8 +11,8 @@ from three_cables import THREE
 
 import crosscheck
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.candidates import null_fit
-from crosscheck.fit.prepare import prepare
+from crosscheck.fit.effects.candidates import null_fit
+from crosscheck.fit.preparation.prepare import prepare
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_commands
 from crosscheck.measurements.write import write_measurements

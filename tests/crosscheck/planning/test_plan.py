@@ -10,8 +10,8 @@ import pytest
 from made_data import SIGMA, measured, soft_cogiro, term
 from scipy import stats
 
-from crosscheck.fit.candidates import Trials, null_fit, try_candidate
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.effects.candidates import Trials, null_fit, try_candidate
+from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.together import together
 from crosscheck.planning.adding import Adding

@@ -82,6 +82,14 @@ def test_what_is_needed_is_not_told_where_the_signal_is_as_large_now() -> None:
     assert signal_words(Gain("a", "b", 36.0, 90.0, 15.0)) == "36 now, 90 then"
 
 
+def test_what_cannot_be_told_apart_is_so_at_plausible_sizes() -> None:
+    """Of two effects that it then told apart a diagnosis began with "could not distinguish"."""
+    like = replace(CLEAR, confused=(("creep", 3.0),))
+    assert Sight((like,), {}).lines()[-1] == (
+        f"At a plausible size the data could not distinguish {CLEAR.name} from creep."
+    )
+
+
 def test_what_has_more_parameters_than_rows_is_not_called_invisible() -> None:
     """It was listed by the same diagnosis: sets weigh it with plausible sizes."""
     large = Reason(Why.TOO_MANY_PARAMETERS, parameters=36, rows=28)

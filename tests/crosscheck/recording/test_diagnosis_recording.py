@@ -16,7 +16,7 @@ from crosscheck.comparison.residuals import Comparison, compare
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, stages_of
 from crosscheck.diagnosis.words import removed
-from crosscheck.fit.problem import KINDS, POSITION
+from crosscheck.fit.least_squares.problem import KINDS, POSITION
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.recording import bars
 from crosscheck.recording.comparison import write_comparison_recording

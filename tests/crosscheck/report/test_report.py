@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 from written_pages import figures_of, text_of
 
-from crosscheck.calibration.imitated import Imitated
+from crosscheck.calibration.unknown.imitated import Imitated
 from crosscheck.diagnosis.result import Diagnosis, NotListed
 from crosscheck.diagnosis.steps import (
     by_block,
@@ -29,10 +29,10 @@ from crosscheck.diagnosis.steps import (
     stages_of,
     views_of,
 )
-from crosscheck.diagnosis.words import WITHIN, removed
-from crosscheck.fit.candidates import Candidate
-from crosscheck.fit.imitation import imitated
-from crosscheck.fit.problem import KINDS
+from crosscheck.diagnosis.words import OTHERS_WITHIN, WITHIN, removed
+from crosscheck.fit.effects.candidates import Candidate
+from crosscheck.fit.least_squares.imitation import imitated
+from crosscheck.fit.least_squares.problem import KINDS
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.report import where, write_page
 from crosscheck.report.cables import Wall, draw_wall, length_changes, walls_of
@@ -184,7 +184,10 @@ def test_beside_something_unknown_probabilities_are_within_the_catalogue() -> No
     assert found.chances is not None
     weighed = replace(found.chances, imitated=Imitated(9.0, frozenset({"length_scale"})))
     unknown = replace(found, verdict=DiagnosisVerdict.UNKNOWN_EFFECT, chances=weighed)
-    assert "within the catalogue" not in text_of(render(unknown)).lower()
+    shown = text_of(render(unknown))
+    assert "within the catalogue" not in shown.lower()
+    # those of the others are not: an effect that was there had "< 1 %", beside what imitated it
+    assert OTHERS_WITHIN in shown
 
 
 def test_text_from_users_stays_text() -> None:

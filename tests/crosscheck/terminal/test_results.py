@@ -108,8 +108,8 @@ def test_an_addition_tells_values_errors_and_what_was_written() -> None:
             "winch_side_length",
             "winch_side_length comes out at its null values: it is not worth adding; --force",
         ),
-        ("platform_mass", r"standard errors \(0\.0\d+ of them\): it is not worth adding"),
-        ("drum_gain", r"errors \(0\.0\d+ of them, all values together\): it is not worth"),
+        ("platform_mass", r"platform_mass is 0\.0\d+ standard errors from null: it is not worth"),
+        ("drum_gain", r"may bring 2 values \(0\.0\d+ standard errors, all together\): it"),
     ],
 )
 def test_what_is_nothing_says_in_which_way(effect: str, words: str) -> None:
@@ -132,6 +132,40 @@ def test_a_calibration_tells_of_every_effect_how_sure_it_is(sure: bool) -> None:
     assert len(sizes) == len(found.fitted) and "-" not in sizes.values()
     assert any(float(size) > 3.0 for size in sizes.values()) == sure
     assert ("No single effect differs from null by 3 standard errors" in out.getvalue()) != sure
+
+
+def test_a_calibration_says_what_it_did_not_fit_and_why() -> None:
+    """Of 27 effects 17 were in a model of "all that the data see"; of ten nothing was said."""
+    robot = load_robot("planar_two_cable")
+    data = measured(robot, [term(robot, "stiffness", factor=1.3)], points=6)
+    found = calibrate(robot, data, only=["stiffness", "exit_friction", "tension_scale"])
+    screen, out = console()
+    print_calibration(found, Path("m.toml"), True, screen)
+    said = {name: why.why for name, why in found.absent.items() if why.why is not Why.EXCLUDED}
+    assert said == {"exit_friction": Why.GAINS_NOTHING, "tension_scale": Why.NEEDS_TENSIONS}
+    lines = [line for line in out.getvalue().splitlines() if line.startswith("not fitted: ")]
+    assert lines == [
+        "not fitted: exit_friction (explains nothing beside the others)",
+        "not fitted: tension_scale (needs measured tensions)",
+    ]
+    assert found.as_json()["not_fitted"].keys() == found.absent.keys()
+    assert set(found.terms.names).isdisjoint(found.absent)
+
+
+def test_a_diagnosis_says_how_probable_what_it_does_not_print_is_at_most() -> None:
+    whole = made.pulleys()
+    assert whole.chances is not None
+    asked = [row for row in whole.candidates if row.why_not.why is not Why.EXCLUDED]
+    effect = dict.fromkeys(whole.chances.effect, 0.02) | {asked[-1].effect: 0.31}
+    for rows, text in (
+        (whole.candidates, f"nor {len(asked) - 6} others (probability 31 % or less): see "),
+        (asked[:6], ""),
+    ):
+        screen, out = console()
+        chances = replace(whole.chances, effect=effect)
+        print_diagnosis(replace(whole, candidates=rows, chances=chances), Path("here"), screen)
+        lines = [line for line in out.getvalue().splitlines() if line.startswith("nor ")]
+        assert lines == ([f"{text}candidates in diagnosis.json"] if text else [])
 
 
 def test_a_diagnosis_begins_with_what_shows_and_then_its_verdict() -> None:

@@ -1,0 +1,1 @@
+"""Fits all effects that the data can see at once."""

@@ -1,0 +1,1 @@
+"""How probable each effect is, and what may be said of it."""

@@ -1,0 +1,1 @@
+"""The noise of a joint fit: its size, its autocorrelation along runs, and rows that are far off."""

@@ -1,0 +1,1 @@
+"""Searches the sets of effects for those that explain the data best."""

@@ -1,0 +1,1 @@
+"""What may be at work that is not in the catalogue."""

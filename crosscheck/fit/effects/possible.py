@@ -1,0 +1,43 @@
+"""Sizes that no robot can have, or hardly any. A fit may pass through them, a result may not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.fit.effects.registration import NAME as TRACKER
+from seecr.description.robot import Robot
+from seecr.effects import Term, Terms
+
+# If structure remains, an effect of more plausible sizes than this is not believed.
+PLAUSIBLE = 20.0
+# Nowhere is an effect of more plausible sizes than this believed: five standard deviations of the
+# widest prior. (The cables of one real robot were truly 20 plausible sizes longer than stated.)
+_EVER = 50.0
+_TARGET = "tracker_target"
+
+
+def can_be(robot: Robot, terms: Terms, stood: Terms) -> bool:
+    """Whether a robot can have these values (no negative mass, no wheel larger than its cable).
+
+    Args:
+        robot: the robot. terms: the fitted model.
+        stood: the model before the fit. Effects that are impossible in it are the user's own
+            and are not rejected.
+    """
+    own = {term.name for term in stood if not term.is_possible(robot)}
+    return all(term.name in own or term.is_possible(robot) for term in terms)
+
+
+def is_plausible(term: Term) -> bool:
+    """Whether an effect has a believable size where others may imitate it."""
+    return largest_size(term) < PLAUSIBLE
+
+
+def hardly_happens(term: Term) -> bool:
+    """Whether an effect is larger than any is; a tracker and its target may be anywhere."""
+    return term.name not in (TRACKER, _TARGET) and largest_size(term) > _EVER
+
+
+def largest_size(term: Term) -> float:
+    """The largest absolute value of an effect's parameters in plausible sizes, without shapes."""
+    return float(np.max(np.abs(term.sizes[~term.layout.shape]), initial=0.0))

@@ -1,0 +1,1 @@
+"""Measurements as a least-squares problem: residuals, derivatives, and their linear algebra."""

@@ -1,0 +1,164 @@
+"""A model at given values: its predictions for a problem, their residuals and derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from crosscheck.fit.least_squares.length_errors import with_length_errors
+from crosscheck.fit.least_squares.problem import Problem, in_units_of
+from seecr.effects import Terms
+from seecr.pose import Array
+from seecr.prediction.experiment import Experiment, Prediction
+from seecr.prediction.parted import rates
+
+# A row is far off if the mean square of its whitened residuals exceeds _FAR_OFF. It may then rest
+# in another equilibrium, but only if no more than _FEW_ROWS of all rows are far off.
+_FAR_OFF, _FEW_ROWS = 25.0, 0.25
+
+
+@dataclass(eq=False)
+class State:
+    """A model at given values, compared with the data of a problem.
+
+    Attributes:
+        terms: the effects with their values.
+        prediction: prediction of all rows; if commanded lengths are noisy, at their most likely
+            errors.
+        raw: (n, 6 + m) residuals at the commanded lengths, in SI units; NaN where nothing was read.
+        table: (n, 6 + m) whitened residuals.
+        white: (N,) whitened residuals that count.
+        factor: (n, 6 + m, 6 + m) Cholesky factors of the noise.
+        chi2: sum of squares of ``white``; inf if a counted row was not solved.
+        log_det: log determinant of the counted rows' noise over that of the readings alone.
+        experiment: the commands with the most likely length errors.
+    """
+
+    terms: Terms
+    prediction: Prediction
+    raw: Array
+    table: Array
+    white: Array
+    factor: Array
+    chi2: float
+    log_det: float
+    experiment: Experiment
+
+    @property
+    def valid(self) -> bool:
+        """Whether every counted row was solved."""
+        return bool(np.isfinite(self.chi2))
+
+    def of(self, terms: Terms) -> State:
+        """The same state, as that of other terms (usually some more, at their null values)."""
+        return replace(self, terms=terms)
+
+
+def evaluate(problem: Problem, terms: Terms, factor: Array, near: State | None = None) -> State:
+    """Predict with the terms, and compare with the readings.
+
+    If commanded lengths are noisy, their most likely errors are found row by row (Gauss-Newton on
+    errors in variables), and the noise is propagated from there: a cable that is slack at the
+    commanded length may have been taut at the true one.
+
+    Args:
+        problem: readings and noise.
+        terms: effects with values.
+        factor: :meth:`Problem.noise`; only used if commanded lengths are exact.
+        near: a state to start from.
+    """
+    effects = terms.effects
+    experiment = problem.experiment if near is None else near.experiment
+    start = None if near is None else near.prediction
+    if not problem.sigma.length_m:
+        prediction = experiment.predict(effects, start)
+        raw = problem.residuals(prediction.readings)
+        state = _compared(problem, terms, prediction, raw, factor, experiment)
+        return _on_measured_branch(problem, state)
+    at = with_length_errors(problem, effects, experiment.length_errors, start)
+    experiment, lines = experiment.with_length_errors(at.lines.errors), at.lines
+    raw = lines.at_commands()
+    state = _compared(problem, terms, at.prediction, raw, lines.factor, experiment)
+    return _as_likely(problem, state, at.cost(problem))
+
+
+def _on_measured_branch(problem: Problem, state: State) -> State:
+    """If a few rows are far off, move them to the equilibrium nearest to the measured pose.
+
+    With slack cables a platform can have several stable equilibria. The reading tells in which of
+    them the robot came to rest; the model only has to contain it. Models with history or users'
+    cable laws, platforms on joints and data without quaternions are left as they are.
+    """
+    data, at = problem.data, state.prediction
+    if data.quat_wxyz is None or at.has_history or at.setup.laws or problem.robot.joints:
+        return state
+    size = np.nansum(state.table**2, axis=1) / np.maximum(problem.measured.sum(axis=1), 1)
+    whole = np.isfinite(data.position).all(axis=1) & np.isfinite(data.quat_wxyz).all(axis=1)
+    rows = np.flatnonzero(problem.use & whole & ((size > _FAR_OFF) | ~at.solved))
+    if len(rows) == 0 or len(rows) > _FEW_ROWS * problem.use.sum():
+        return state
+    poses = np.concatenate([data.position, data.quat_wxyz], axis=1)[rows]
+    effects = state.terms.effects
+    other = state.experiment.from_other_starts(effects, at, rows, poses)
+    there = _compared(
+        problem, state.terms, other, problem.residuals(other.readings), state.factor,
+        state.experiment,
+    )  # fmt: skip
+    better = np.nansum(there.table**2, axis=1) < 0.5 * np.nansum(state.table**2, axis=1)
+    better = (better | ~at.solved) & other.solved
+    keep = rows[better[rows]]
+    if len(keep) == 0:
+        return state
+    moved = state.experiment.from_other_starts(effects, at, keep, other.pose[keep])
+    return _compared(
+        problem, state.terms, moved, problem.residuals(moved.readings), state.factor,
+        state.experiment,
+    )  # fmt: skip
+
+
+def _compared(
+    problem: Problem,
+    terms: Terms,
+    prediction: Prediction,
+    raw: Array,
+    factor: Array,
+    experiment: Experiment,
+) -> State:
+    filled = np.where(problem.measured & np.isfinite(raw), raw, 0.0)
+    table = in_units_of(factor, filled[..., None], bool(problem.sigma.length_m))[..., 0]
+    white = table[problem.counted]
+    valid = bool(np.all(prediction.solved[problem.use])) and bool(np.all(np.isfinite(white)))
+    chi2 = float(white @ white) if valid else np.inf
+    diagonal = np.log(np.diagonal(factor, axis1=1, axis2=2)) - np.log(problem.reading_sigma)
+    log_det = 2.0 * float(diagonal[problem.counted].sum()) if problem.sigma.length_m else 0.0
+    return State(
+        terms, prediction, raw, np.where(problem.measured, table, np.nan), white, factor,
+        chi2, log_det, experiment,
+    )  # fmt: skip
+
+
+def _as_likely(problem: Problem, state: State, cost: Array) -> State:
+    """The state with residuals scaled up to the true cost of each row's most likely errors.
+
+    If a cable goes slack, the linearised residuals promise a lower chi2 than any length errors
+    reach, and a fit would run to where they promise most.
+    """
+    promised = np.nansum(state.table**2, axis=1)
+    more = np.where(np.isfinite(cost) & (promised > 0.0), cost / np.maximum(promised, 1e-300), 1.0)
+    table = state.table * np.sqrt(np.maximum(more, 1.0))[:, None]
+    white = table[problem.counted]
+    chi2 = float(white @ white) if state.valid else np.inf
+    return replace(state, table=table, white=white, chi2=chi2)
+
+
+def derivatives(
+    problem: Problem,
+    state: State,
+    columns: Sequence[int] = (),
+    frozen: bool = False,
+) -> Array:
+    """(N, p) whitened derivatives of the prediction by the terms' parameters."""
+    change = rates(state.experiment, state.terms, state.prediction, columns, frozen)
+    return problem.whiten(state.factor, problem.as_read(change, state.prediction.readings))

@@ -1,0 +1,1 @@
+"""Prepares measurements for a fit: which rows count, and what is fitted before anything else."""

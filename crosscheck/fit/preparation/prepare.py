@@ -1,0 +1,140 @@
+"""Prepares measurements: leaves out rows without equilibrium, fills in noise, finds outliers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from crosscheck.fit.effects.held_out import blocks_note
+from crosscheck.fit.least_squares.problem import Problem, Rms, rms_by_kind
+from crosscheck.fit.least_squares.state import State
+from crosscheck.fit.noise.unstated import estimate_sigma, oversized
+from crosscheck.fit.preparation.fitness import refusal_of
+from crosscheck.fit.preparation.freed import freed
+from crosscheck.fit.preparation.parts import groups_of, laid_out
+from crosscheck.fit.reasons import Refusal, Unfit
+from crosscheck.fit.suspect_data.another_robot import another_robot_doubts
+from crosscheck.fit.suspect_data.exchanged_columns import exchange_doubts
+from crosscheck.fit.suspect_data.tension_unit import tension_doubts
+from crosscheck.measurements.data import Measurements
+from seecr.description.robot import Robot
+from seecr.effects import Terms, catalogue
+from seecr.equilibrium.strained import strained
+from seecr.prediction.experiment import Prediction
+
+Progress = Callable[[str, float], None]
+"""Called with what is being done and the fraction that is done, 0 to 1."""
+
+# What a pose consists of, in words.
+_PARTS = ("x", "y", "z", *(f"rotation about {axis}" for axis in "xyz"))
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Measurements ready for a fit.
+
+    Attributes:
+        problem: the data without the rows that have no equilibrium, and with all noise filled in.
+        terms: effects of the model, with those that the data leave free.
+        notes: what was assumed, estimated or left out.
+        blocks_note: which blocks cross-validation leaves out, if they are not whole runs; else "".
+        refusal: why nothing can be said about these data; None if something can.
+        fitted: how many values were fitted in advance because the data leave them free.
+    """
+
+    problem: Problem
+    terms: Terms
+    notes: tuple[str, ...]
+    blocks_note: str
+    refusal: Refusal | None
+    fitted: int = 0
+
+    @property
+    def all_notes(self) -> tuple[str, ...]:
+        """The notes with that about cross-validation, for commands that use it."""
+        return (*self.notes, self.blocks_note) if self.blocks_note else self.notes
+
+
+def prepare(
+    robot: Robot, data: Measurements, terms: Terms, considered: frozenset[str] | None = None
+) -> Prepared:
+    """Leave out rows that have no equilibrium, estimate unstated noise, and fit what is free.
+
+    Args:
+        robot, data: what was measured.
+        terms: effects of the model as it stands.
+        considered: names of the effects that may be missing; by default the whole catalogue.
+    """
+    considered = frozenset(catalogue()) if considered is None else considered
+    every = np.ones(data.n_rows, dtype=bool)
+    problem = Problem(robot, data, data.sigma, every, considered=considered)
+    if not problem.measured.any():
+        return Prepared(
+            problem, terms, (*robot.notes, *data.notes), "", Refusal(Unfit.NO_READINGS, data.n_rows)
+        )
+    laid = laid_out(data, terms)
+    plain = problem.experiment.predict(laid.terms.effects)
+    problem = _solved_rows(problem, plain)
+    problem, estimates = estimate_sigma(problem, plain)
+    found = freed(problem, laid)
+    terms, said = found.terms, (*laid.notes, *found.notes)
+    if found.free.any():
+        plain = problem.experiment.predict(terms.effects)
+        if estimates:  # the first residuals also contained the error of the frame
+            known = replace(problem, sigma=data.sigma)
+            problem, estimates = estimate_sigma(known, plain)
+    odd = [
+        *another_robot_doubts(problem, plain.readings),
+        *tension_doubts(problem, plain),
+        *exchange_doubts(problem, plain),
+        *oversized(problem, plain),
+    ]
+    notes = (
+        *robot.notes,
+        *strained(robot),
+        *data.notes,
+        *_filled_in(problem),
+        *odd,
+        *problem.left_out,
+        *estimates,
+        *said,
+    )
+    problem = problem.with_groups(groups_of(data, terms))
+    refusal = refusal_of(problem, plain.pose[:, :3], data.sigma)
+    return Prepared(problem, terms, notes, blocks_note(problem), refusal, int(found.free.sum()))
+
+
+def _filled_in(problem: Problem) -> list[str]:
+    """A note about parts of the pose that nothing read."""
+    names = [name for name, is_filled in zip(_PARTS, problem.filled_in, strict=True) if is_filled]
+    if not names:
+        return []
+    return [
+        f"{', '.join(names)}: not counted as readings, because the joints allow no such motion and "
+        "the file has the same number in every row"
+    ]
+
+
+def _solved_rows(problem: Problem, plain: Prediction) -> Problem:
+    """The problem without the rows that have no equilibrium."""
+    for rows, words in (
+        (plain.singular, "the platform is free to move there"),
+        (~plain.solved & ~plain.singular, "no equilibrium was found there"),
+    ):
+        if np.any(rows & problem.use):
+            lines = problem.data.lines_of(rows & problem.use)
+            problem = problem.without(rows, f"{lines} left out: {words}")
+    return problem
+
+
+def noise_floor(problem: Problem, state: State | None = None) -> Rms:
+    """The rms errors of a perfect model, by kind: noise of the readings alone.
+
+    With a state, the noise of the commanded lengths is included, as whitening at that state has it.
+    """
+    raw = np.broadcast_to(problem.reading_sigma, problem.measured.shape).copy()
+    if state is not None:
+        raw = np.sqrt(np.einsum("nij,nij->ni", state.factor, state.factor))
+    return rms_by_kind(problem, raw)

@@ -1,0 +1,55 @@
+"""What may be there in place of a listed effect reaches the diagnosis, by steps or by sets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import made_diagnoses
+import pytest
+
+from crosscheck.calibration.unknown.imitated import NOT_ASKED, Imitated
+from crosscheck.calibration.unknown.varying import Varying
+from crosscheck.diagnosis.chances import Chances, chances_of
+from crosscheck.diagnosis.listed import diagnosis_of
+from crosscheck.diagnosis.nearby import _with_equals
+from crosscheck.fit.reasons import DiagnosisVerdict
+
+DOUBT = Imitated(4.0, frozenset({"pulley_radius"}), (Varying.POSITION,))
+
+
+def by_sets(in_place: Imitated) -> Chances:
+    classes = SimpleNamespace(members=(), probability=(), effect={}, further={})
+    sought: Any = SimpleNamespace(
+        classes=classes, in_place=in_place, field_odds=None, shown=None, varies=(),
+        calibration=SimpleNamespace(together=None), judgement=SimpleNamespace(imitated=None),
+    )  # fmt: skip
+    return chances_of(sought)
+
+
+def by_steps(in_place: Imitated) -> Chances:
+    scores = {frozenset[str](): 0.0, frozenset({"pulley_radius"}): 50.0}
+    return _with_equals(scores, ["pulley_radius"], {"pulley_radius": []}, [], None, in_place)
+
+
+@pytest.mark.parametrize("way", [by_sets, by_steps])
+def test_a_doubt_is_kept_and_nothing_else_is(way: Any) -> None:
+    assert way(DOUBT).doubt is DOUBT
+    assert way(NOT_ASKED).doubt is None and way(replace(DOUBT, odds=1.0)).doubt is None
+
+
+@pytest.mark.slow
+def test_a_diagnosis_notes_it_unless_something_unknown_is_there_anyway() -> None:
+    found = made_diagnoses.pulleys()
+    assert found.chances is not None and found.search is not None
+    for verdict, told in (
+        (DiagnosisVerdict.EFFECTS_FOUND, True),
+        (DiagnosisVerdict.UNKNOWN_EFFECT, False),
+    ):
+        again = diagnosis_of(
+            verdict, "", found.missing, found.search, before=found.before, floor=found.floor,
+            candidates=(), notes=("first",), chances=replace(found.chances, doubt=DOUBT),
+        )  # fmt: skip
+        said = [note for note in again.notes if "something else in place of pulley_radius" in note]
+        assert again.notes[0] == "first" and bool(said) is told

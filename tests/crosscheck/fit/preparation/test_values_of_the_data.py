@@ -1,0 +1,149 @@
+"""What the data leave free is fitted first: a scale of the tracker, by least squares in a line."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from made_data import COGIRO, SIGMA, measured, term
+
+from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.preparation.freed import Freed, freed
+from crosscheck.fit.preparation.parts import LaidOut
+from crosscheck.measurements.data import Measurements
+from seecr.description.mjcf import load_robot
+from seecr.effects import ApartLayout, Term, Terms, apart, effect_named, layout_of
+from seecr.pose import Array
+
+ROBOT = load_robot(COGIRO)
+SCALE = layout_of(effect_named("tracker_scale"), ROBOT)
+FRAME = {"shift_x_m": 1.5, "shift_z_m": -0.4, "rotation_x_rad": 0.3, "rotation_z_rad": 2.0}
+
+
+@lru_cache
+def data_of(factor: float = 1.004) -> Measurements:
+    return measured(ROBOT, [term(ROBOT, "tracker_scale", factor=factor)], points=2)
+
+
+def problem_of(data: Measurements) -> Problem:
+    return Problem(ROBOT, data, SIGMA, np.ones(data.n_rows, dtype=bool))
+
+
+def found_in(data: Measurements, *terms: Term, fresh: tuple[tuple[str, str], ...] = ()) -> Freed:
+    return freed(problem_of(data), LaidOut(Terms(terms), fresh, ()))
+
+
+def positions(data: Measurements) -> Array:
+    """(n, 3) as the plain robot has them."""
+    return problem_of(data).experiment.predict(()).readings.position
+
+
+def slope(told: Array, read: Array) -> float:
+    """Of the line through the origin with the least squares."""
+    return float(np.sum(told * read) / np.sum(told**2))
+
+
+def test_nothing_is_fitted_if_nothing_is_free() -> None:
+    held = term(ROBOT, "tracker_scale", factor=1.002)
+    found = found_in(data_of(), held)
+    assert found.terms["tracker_scale"].vector.tolist() == [1.002]
+    assert found.free.tolist() == [False] and found.notes == ()
+
+
+def test_without_readings_nothing_is_fitted() -> None:
+    data = replace(data_of(), free=("tracker_scale",))
+    nothing = Problem(ROBOT, data, SIGMA, np.zeros(data.n_rows, dtype=bool))
+    found = freed(nothing, LaidOut(Terms(), (), ()))
+    assert found.terms.names == () and found.free.tolist() == []
+
+
+def test_a_free_effect_that_the_model_lacks_is_fitted_by_least_squares() -> None:
+    data = replace(data_of(), free=("tracker_scale",))
+    found = found_in(data, term(ROBOT, "pulley_radius"))
+    assert found.terms.names == ("pulley_radius", "tracker_scale")
+    assert found.free.tolist() == [False, True]
+    assert found.terms["pulley_radius"].vector.tolist() == [0.0]
+    told = positions(data)
+    expected, error = slope(told, data.position), SIGMA.position_m / np.linalg.norm(told)
+    assert expected == pytest.approx(1.004, abs=5.0 * error)
+    assert found.terms["tracker_scale"].vector == pytest.approx(expected, abs=0.01 * error)
+
+
+def test_a_free_effect_of_the_model_is_fitted_from_where_it_stands_and_a_fixed_one_stays() -> None:
+    data = replace(data_of(), free=("tracker_scale",))
+    expected = slope(positions(data), data.position)
+    start = term(ROBOT, "tracker_scale", factor=0.99)
+    found = found_in(data, start)
+    assert found.terms["tracker_scale"].vector == pytest.approx(expected, abs=1e-7)
+    fixed = found_in(data, start.fixed())
+    assert fixed.terms["tracker_scale"].vector.tolist() == [0.99]
+    assert fixed.free.tolist() == [False]
+    assert fixed.notes == (
+        "tracker_scale is free, as stated in the TOML beside measured.csv, and was fitted to these "
+        "data first: factor 0.99 (fixed)",
+    )
+
+
+def test_what_the_model_leaves_widens_the_error_and_noise_does_not_narrow_it() -> None:
+    """Errors are told: they grow with the rms of the residuals, but never shrink with it."""
+    data = replace(data_of(), free=("tracker_scale",))
+    told = positions(data)
+    exact = replace(data, position=1.004 * told)
+    off = np.zeros_like(told)
+    off[:, 0] = np.where(np.arange(len(told)) % 2, 1e-2, -1e-2)
+    off -= slope(told, off) * told  # so that it changes no slope
+    plain = SIGMA.position_m / np.linalg.norm(told)
+
+    def error(data: Measurements) -> float:
+        (note,) = found_in(data).notes
+        return float(note.rpartition("± ")[2])
+
+    quats = problem_of(data).experiment.predict(()).readings.quat_wxyz
+    exact = replace(exact, quat_wxyz=quats)
+    assert error(exact) == pytest.approx(plain, rel=0.05)  # two digits are told
+    rms = np.sqrt(np.sum(off**2) / SIGMA.position_m**2 / (6.0 * len(told)))
+    assert rms > 10.0
+    far = replace(exact, position=exact.position + off)
+    assert error(far) == pytest.approx(plain * rms, rel=0.05)
+
+
+def test_only_runs_that_the_model_has_not_seen_are_fitted() -> None:
+    data = data_of()
+    half = data.n_rows // 2
+    data = replace(data, run=np.repeat(["seen", "new"], [half, data.n_rows - half]))
+    seen, new = (str(data.parts["run"][k]) for k in (0, -1))
+    layout = apart(SCALE, "run", (seen, new), SCALE.null)
+    model = Terms([Term(layout, np.array([1.0, 1.0]))])
+    found = freed(problem_of(data), LaidOut(model, (("tracker_scale", new),), ()))
+    assert found.free.tolist() == [False, True]
+    expected = slope(positions(data)[half:], data.position[half:])
+    assert found.terms["tracker_scale"].vector == pytest.approx([1.0, expected], abs=1e-7)
+    (note,) = found.notes
+    assert note.startswith("tracker_scale was fitted to these data first: ")
+    assert "seen" not in note
+
+
+def test_of_several_files_each_that_says_so_has_its_own() -> None:
+    data = replace(
+        data_of(), free=("tracker_scale",), free_in={"tracker_scale": (1, 2)},
+        files=("a.csv", "b.csv", "c.csv"), origins=("x/a.csv", "x/b.csv", "x/c.csv"),
+        file=np.arange(data_of().n_rows) % 3,
+    )  # fmt: skip
+    problem = problem_of(data).with_groups(np.asarray(data.file))
+    found = freed(problem, LaidOut(Terms(), (), ()))
+    layout = found.terms["tracker_scale"].layout
+    assert isinstance(layout, ApartLayout) and layout.parts == ("x/b.csv", "x/c.csv")
+    told = positions(data)
+    each = [slope(told[data.file == k], data.position[data.file == k]) for k in (1, 2)]
+    assert found.terms["tracker_scale"].vector == pytest.approx(each, abs=1e-7)
+
+
+def test_a_frame_that_is_far_away_is_registered_first() -> None:
+    """Gauss-Newton alone would not come there: it is turned by more than a right angle."""
+    frame = term(ROBOT, "tracker_frame", **FRAME)
+    data = replace(measured(ROBOT, [frame], points=2), free=("tracker_frame",))
+    found = found_in(data)
+    assert found.free.tolist() == [True] * 6
+    assert found.terms["tracker_frame"].vector == pytest.approx(frame.vector, abs=2e-3)
