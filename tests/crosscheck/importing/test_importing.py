@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import made_recordings as made_of
 import numpy as np
@@ -312,6 +313,18 @@ def test_a_swing_that_dies_out_is_no_rest():
     dwells = find_dwells(Stream(None, t, np.arange(len(t)), position), np.zeros(0))
     assert len(dwells) == 1 and 2.5 < dwells.begin_s[0] < 7.0
     assert np.abs(dwells.position).max() < 1e-4
+
+
+@pytest.mark.parametrize("begin", [0.0, 1234.5, 1.7e9])
+def test_rounded_times_do_not_make_an_interval_longer(begin: float) -> None:
+    """Differences of 0.1 s were a little more or less, and with it five of them than 0.5 s."""
+    t = begin + np.round(np.arange(0.0, 30.0, 0.1), 6)
+    place = np.stack([np.repeat(np.arange(10.0), 30), 0 * t, 0 * t], axis=1)
+    place[[29, 59, 89]] += 0.5
+    dwells = find_dwells(Stream(None, t, np.arange(len(t)), place), np.zeros(0))
+    assert len(dwells) == 10
+    with pytest.raises(InputFileError, match=r"got one every 0.11 s; log faster, give --rest-for"):
+        find_dwells(Stream(Path("log"), 1.1 * t, np.arange(len(t)), place), np.zeros(0))
 
 
 @pytest.mark.parametrize("rate", [10, 100])
