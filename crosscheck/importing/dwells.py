@@ -103,7 +103,7 @@ def find_dwells(
         _speed(stream, stream.position, half), arm * _turning(stream, half)
     )  # fmt: skip
     limit = rest_speed or _limit(stream, speed, half, step)
-    bounds = _pieces(stream.t_s, speed < limit, breaks)
+    bounds = _pieces(stream.t_s, speed <= limit, breaks)
     least = rest_for - _ROUNDED * step
     long = [(a, b) for a, b in bounds if stream.t_s[b - 1] - stream.t_s[a] >= least]
     good = [(a, b) for a, b in long if seen[a:b].sum() >= LEAST]
@@ -170,10 +170,14 @@ def _turning(stream: Stream, half: int) -> Array:
 
 def _limit(stream: Stream, speed: Array, half: int, step: float) -> float:
     """[m/s] Slower is at rest: the speed that noise simulates, or a part of the usual one."""
+    feigned = sample_noise(stream) * np.sqrt(2.0 / half) / ((half + 1) * step)
+    return float(max(_NOISE * feigned, _PART * np.nanpercentile(speed, 95), _SAME / _WINDOW))
+
+
+def sample_noise(stream: Stream) -> float:
+    """[m] Usual distance of single samples from their mean, by second differences of positions."""
     bend = stream.position[2:] - 2.0 * stream.position[1:-1] + stream.position[:-2]
-    noise = float(np.nanmedian(np.linalg.norm(bend, axis=1))) / np.sqrt(6.0)
-    feigned = noise * np.sqrt(2.0 / half) / ((half + 1) * step)
-    return float(max(_NOISE * feigned, _PART * np.nanpercentile(speed, 95)))
+    return float(np.nanmedian(np.linalg.norm(bend, axis=1))) / float(np.sqrt(6.0))
 
 
 def _pieces(t_s: Array, still: NDArray[np.bool_], breaks: Array) -> list[tuple[int, int]]:
