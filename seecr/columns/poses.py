@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.columns.angles import refuse_degrees
 from seecr.columns.known import ANGLES, POSITION, QUATERNION, Columns
 from seecr.description.joints import pose_of_values
 from seecr.pose import NORM_TOLERANCE, Array, quat_from_rxyz, rxyz_from_quat
@@ -152,6 +153,9 @@ def _group(
         parts: the coordinates' names.
         free: (3,) which of them the robot can change. reference: (3,) the reference pose's.
         blank_is_nan: whether cells may be empty.
+
+    Raises:
+        InputFileError: a missing column, or radians that must be degrees.
     """
     prefix, word, unit = of
     absent = [k for k, part in enumerate(parts) if f"{prefix}_{part}" not in columns.known]
@@ -164,6 +168,8 @@ def _group(
         columns.notes.append(
             f"No {names}: the robot cannot move there, the reference pose's value is used."
         )
+    if parts == ANGLES:
+        refuse_degrees(columns, prefix, parts)
     values = np.tile(np.asarray(reference, float), (columns.n_rows, 1))
     for k, part in enumerate(parts):
         if k not in absent:
@@ -216,7 +222,12 @@ def _check_norm(columns: Columns, prefix: str, quat: Array, norm: Array) -> None
 
 
 def measured_orientation(columns: Columns) -> tuple[Array | None, Array]:
-    """Quaternions (n, 4) or None, and angles (n, 3) [rad] of incomplete orientations."""
+    """Quaternions (n, 4) or None, and angles (n, 3) [rad] of incomplete orientations.
+
+    Raises:
+        InputFileError: an incomplete quaternion, or radians that must be degrees.
+    """
+    refuse_degrees(columns, "meas", ANGLES)
     angles = columns.readings("meas", ANGLES)
     if columns.present("meas", QUATERNION):
         quat = _quaternions(columns, "meas", blank_is_nan=True)

@@ -285,11 +285,12 @@ REFUSED = {
     "heavier than all cables bear": (
         [LOADED, "a,0,0,0,0,1e9"],
         r"line 2, column payload_kg: expected a load that the cables of this robot can carry, at "
-        r"most [\d.e+]+ kg, got 1e\+09 kg$",
+        r"most [\d.e+]+ kg, got 1e\+09 kg; is it in g\? Name the column payload_g$",
     ),
     "a force of giganewtons": (
         [f"{POSE},force_z_kN", "a,0,0,0,0,-1e6"],
-        r"line 2, column force_z_kN: expected a load .* at most [\d.e+]+ N, got -1e\+09 N$",
+        r"line 2, column force_z_kN: expected a load .* at most [\d.e+]+ N, got "
+        r"-1e\+09 N; is it in N\? Name",
     ),
     "moment in newtons": (
         [f"{POSE},moment_x_N", "a,0,0,0,0,1"],
