@@ -25,15 +25,23 @@ def command_lengths(columns: Columns, robot: Robot) -> Array | None:
     missing = [f"length_{i}_m" for i in range(1, m + 1) if i not in given]
     if missing:
         raise columns.half_there("length", missing, f"all {m} cables of the robot")
-    return np.stack([_length(columns, f"length_{i}") for i in given], axis=1)
+    rest = robot.rest_lengths.tolist()
+    return np.stack([_length(columns, f"length_{i}", rest[i - 1]) for i in given], axis=1)
 
 
-def _length(columns: Columns, quantity: str) -> Array:
-    length = columns.numbers(quantity)
+def _length(columns: Columns, quantity: str, rest: float) -> Array:
+    """One column (n,) [m] of lengths; ``rest`` [m] is the rest length at the reference pose."""
+    length, unit = columns.numbers(quantity), columns.known[quantity].unit
+    one = unit.to_si(1.0)
+    toml = columns.table.path.with_suffix(".toml").name
     columns.refuse(
         length <= 0,
         quantity,
-        lambda row: f"expected a length above zero, got {length[row]:g} m",
+        lambda row: (
+            f"expected a length above zero, got {length[row] / one:.6g} {unit.suffix}: it is all "
+            "of the cable from its exit point on; to changes since the reference pose add its rest "
+            f'length there, {rest / one:.6g} {unit.suffix}, and put lengths = "told" into {toml}'
+        ),
     )
     return length
 

@@ -188,7 +188,8 @@ def test_a_name_is_guessed_by_its_spelling_alone(write: Write, robot: Robot):
         "several conventions: here a rotation is meas_rx_deg meas_ry_deg meas_rz_deg with "
         "R = Rx(rx) Ry(ry) Rz(rz), or the quaternion meas_qw meas_qx meas_qy meas_qz." in notes
     )
-    assert "Not used: tension_A_N, operator." in notes
+    assert "Column tension_A_N is not used: the robot's cables are 1 (cable1), " in notes
+    assert "Not used: operator." in notes
     with pytest.raises(InputFileError, match=r"no measurement; .*R = Rx\(rx\) Ry\(ry\) Rz\(rz\)"):
         load_measurements(write(f"{CMD},meas_yaw_deg", "0,0,0,1"), robot)
 
