@@ -356,7 +356,10 @@ def test_a_bound_and_a_blind_parameter_are_flagged() -> None:
     finding = replace(found.missing[0], at_bound=np.array([True]), stderr=np.array([np.inf]))
     (row,) = finding_card(found, finding).parameters
     assert row.flags == "at its bound, not determined by these data"
-    assert row.stderr == "undetermined"
+    assert row.stderr == "undetermined" and float(row.value) != 0.0  # its bound
+    blind = replace(found.missing[0], stderr=np.array([np.inf]))
+    (row,) = finding_card(found, blind).parameters
+    assert row.flags == "not determined by these data" and row.value == ""
     assert "at its bound" not in text_of(page("pulleys"))
 
 

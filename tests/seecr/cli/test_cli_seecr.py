@@ -262,10 +262,15 @@ def test_export_tells_of_the_model_and_of_an_earlier_file_also_as_json(tmp_path:
     said = json.loads(run("export", "demobot_cogiro", out, "--model", model, "--json").stdout)
     assert said["exit_status"] == 0 and len(said["files"]) == 2
     assert said["notes"] == [f"{model} does not say which robot it was made for"]
+    alone = tmp_path / "out-mujoco.xml"
+    assert alone.exists()
     later = json.loads(run("export", "demobot_cogiro", out, "--json").stdout)
-    note = "out-mujoco.xml is of an earlier export: now no such file is needed"
+    note = "out-mujoco.xml of an earlier export removed: now no such file is needed"
     assert later["files"] == [str(out)] and later["notes"] == [note]
-    assert note in run("export", "demobot_cogiro", out).stdout.splitlines()
+    assert not alone.exists()
+    alone.write_text("<mujoco><!-- for MuJoCo alone, by hand --></mujoco>")
+    note = "out-mujoco.xml is of no export: it stays, though no such file is needed now"
+    assert note in run("export", "demobot_cogiro", out).stdout.splitlines() and alone.exists()
 
 
 def test_negative_numbers_are_coordinates() -> None:
