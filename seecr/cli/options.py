@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from seecr.cli.following import STDIN
 from seecr.cli.group import ARGUMENTS
 
 if TYPE_CHECKING:
@@ -24,7 +25,15 @@ SECONDS_BETWEEN_LINES = 15.0
 """How often work that takes long tells where it is, without a terminal."""
 
 
-FILE = click.Path(path_type=Path)
+class _File(click.Path):
+    """A path; ``-`` is standard input, as everywhere."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The path of what is given."""
+        return super().convert(STDIN if value == "-" else value, param, ctx)
+
+
+FILE = _File(path_type=Path)
 """A file that the command itself opens, so that the error is its own."""
 
 
