@@ -46,16 +46,21 @@ def value_lines(
         layout.names, layout.units, values, stderr, at_bound, strict=True
     ):
         stop = " (at its bound)" if bound else ""
-        yield f"{parameter_name(name, unit)} = {measured(value, error, unit)}{stop}"
+        # what is at its bound is known to be there, without an error
+        known = shown(value, unit) if bound and np.isinf(error) else measured(value, error, unit)
+        yield f"{parameter_name(name, unit)} = {known}{stop}"
 
 
 def measured(value: float, error: float, unit: str) -> str:
-    """A value with its standard error, to the digits that are known: 8.369 ± 0.013 mm."""
+    """A value with its standard error, to the digits that are known: 8.369 ± 0.013 mm.
+
+    None of it is known without a finite error: the value is where the fit happened to begin.
+    """
+    if not np.isfinite(error):
+        return "not determined by these data"
     factor, word = in_unit(unit)
     number, spread = with_error(factor * value, factor * error)
     known = 0.0 if number == "0" else value
-    if not np.isfinite(error):
-        return f"{shown(known, unit)} (not determined by these data)"
     if error == 0.0:
         return f"{shown(known, unit)} (fixed)"
     return f"{number} ± {spread} {word}".strip()

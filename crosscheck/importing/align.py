@@ -18,11 +18,14 @@ from crosscheck.fit.effects.registration import turn_of_points
 from crosscheck.measurements.dwells import mean_rotation
 from seecr.counted import counted
 from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate, rotvec_from_quat
+from seecr.units import millimetres
 
 LEFT, MOST = 0.2, 0.8
 """Largest residual relative to the spread of the commands, and the part of dwells within it."""
 # Positions that spread so many times as far as the commands, or as little, are in another unit.
 _UNITS = 8.0
+# Readings that another frame brings so many times as near to the commands are in that one.
+_NEARER = 3.0
 # The same of named points, each of which must be within it.
 _LEFT_OF_POINTS = 0.05
 # Commands with smaller rotations about their mean do not show where the target is.
@@ -69,6 +72,36 @@ def as_they_are(target: Array | None) -> Frames:
     """A tracker that already reads in the base frame."""
     shift = np.zeros(3) if target is None else target
     return Frames(_NONE, np.zeros(3), _NONE, shift, "frames used as they are", ())
+
+
+def off_commands(frames: Frames, position: Array, quat: Array | None, told: Array) -> list[str]:
+    """How far readings in a frame that is used as it is are from the commands.
+
+    With a warning where another frame, such as a turned one, would bring them much closer.
+    """
+    place, turned = frames.poses(position, quat)
+    away = float(np.median(np.linalg.norm(place - told[:, :3], axis=1)))
+    off = millimetres(away, 3)
+    if turned is not None:
+        inside = quat_multiply(quat_conjugate(told[:, 3:]), turned)
+        angle = np.median(np.linalg.norm(rotvec_from_quat(inside), axis=1))
+        off += f" and {np.degrees(angle):.3g} deg"
+    notes = [f"the readings are {off} (median) from the commands"]
+    spread = size_of_cloud(told[:, :3])
+    try:
+        other = to_commands(position, quat, told, None)
+    except CrosscheckError:  # which another frame does not explain
+        return notes
+    left = np.linalg.norm(other.poses(position, quat)[0] - told[:, :3], axis=1)
+    nearer = float(np.median(left))
+    if away > LEFT * spread and away > _NEARER * nearer:
+        turn = np.degrees(np.linalg.norm(rotvec_from_quat(other.turn)))
+        notes.append(
+            f"turned by {turn:.3g} deg and moved by {np.linalg.norm(other.shift):.3g} m they would "
+            f"be {1e3 * nearer:.3g} mm from them: is the tracker's frame that of the robot? "
+            "Without --aligned it is aligned"
+        )
+    return notes
 
 
 def by_points(names: Sequence[str], there: Array, here: Array) -> Frames:

@@ -15,6 +15,7 @@ from crosscheck.importing.align import (
     Frames,
     as_they_are,
     by_points,
+    off_commands,
     place_of_target,
     to_commands,
     with_target,
@@ -170,7 +171,8 @@ def import_case(
     measured = replace(
         measured, sigma=sigma, free=frames.free, stands=np.ones(measured.n_rows, dtype=bool)
     )
-    notes = (*said, *strays, frames.how, _noise(measured))
+    off = off_commands(frames, *_rests(robot, takes)) if choices.aligned else []
+    notes = (*said, *strays, frames.how, *off, _noise(measured))
     found = Imported(robot, measured, frames, tuple(takes), notes)
     if source is not None:
         write_case(found, source, Path(str(out)))
@@ -200,7 +202,8 @@ def write_case(found: Imported, robot_path: Path, out: Path, made: Made | None =
         write_text(folder / NAME, json_text({**said, **found.as_json()}) + "\n")
 
 
-def _frames(robot: Robot, takes: Sequence[Take], choices: ImportChoices) -> Frames:
+def _rests(robot: Robot, takes: Sequence[Take]) -> tuple[Array, Array | None, Array]:
+    """Tracked positions (n, 3) and quaternions (n, 4), if any, and commanded poses (n, 7)."""
     position = np.concatenate([take.dwells.position[take.used] for take in takes])
     quats = [take.dwells.quat_wxyz for take in takes]
     turned = [q[take.used] for q, take in zip(quats, takes, strict=True) if q is not None]
@@ -208,6 +211,11 @@ def _frames(robot: Robot, takes: Sequence[Take], choices: ImportChoices) -> Fram
     told = np.concatenate(
         [commanded(robot, t.held.log.rows(t.held.row[t.number >= 0])) for t in takes]
     )
+    return position, quat, told
+
+
+def _frames(robot: Robot, takes: Sequence[Take], choices: ImportChoices) -> Frames:
+    position, quat, told = _rests(robot, takes)
     # the markers' positions on the platform are given
     target = np.zeros(3) if choices.shape and choices.target is None else choices.target
     if choices.aligned:

@@ -26,6 +26,8 @@ _NOISE, _PART = 6.0, 0.01
 LEAST = 5
 # Smaller changes [m, rad] are rounding of our own arithmetic.
 _SAME = 1e-10
+# Times are written with so many digits: differences are off by up to this part of an interval.
+_ROUNDED = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,11 +90,12 @@ def find_dwells(
             f"the body is seen in {counted(int(seen.sum()), 'row')}; expected at least {LEAST}"
         )
     step = float(np.median(np.diff(stream.t_s)))
-    if LEAST * step > rest_for:
+    if LEAST * step > rest_for + _ROUNDED * step:
+        shortest = np.ceil(100.0 * LEAST * step - _ROUNDED) / 100.0
         raise stream.error(
-            f"expected at least {LEAST} samples in a dwell of {rest_for:g} s, got one every "
-            f"{step:.3g} s: a dwell of one sample cannot be averaged; log faster, give a longer "
-            "--rest-for, or, if each row is a resting pose already, write it as measurements",
+            f"expected at least {LEAST} samples in the shortest dwell, {rest_for:g} s, got one "
+            f"every {step:.3g} s; log faster, give --rest-for {shortest:g} or longer, or, if "
+            "each row is a resting pose already, write it as measurements",
             row=1,
         )
     half = max(1, round(_WINDOW / step))
@@ -100,8 +103,9 @@ def find_dwells(
         _speed(stream, stream.position, half), arm * _turning(stream, half)
     )  # fmt: skip
     limit = rest_speed or _limit(stream, speed, half, step)
-    bounds = _pieces(stream.t_s, speed < limit, breaks)
-    long = [(a, b) for a, b in bounds if stream.t_s[b - 1] - stream.t_s[a] >= rest_for]
+    bounds = _pieces(stream.t_s, speed <= limit, breaks)
+    least = rest_for - _ROUNDED * step
+    long = [(a, b) for a, b in bounds if stream.t_s[b - 1] - stream.t_s[a] >= least]
     good = [(a, b) for a, b in long if seen[a:b].sum() >= LEAST]
     if not good:
         raise stream.error(
@@ -166,10 +170,14 @@ def _turning(stream: Stream, half: int) -> Array:
 
 def _limit(stream: Stream, speed: Array, half: int, step: float) -> float:
     """[m/s] Slower is at rest: the speed that noise simulates, or a part of the usual one."""
+    feigned = sample_noise(stream) * np.sqrt(2.0 / half) / ((half + 1) * step)
+    return float(max(_NOISE * feigned, _PART * np.nanpercentile(speed, 95), _SAME / _WINDOW))
+
+
+def sample_noise(stream: Stream) -> float:
+    """[m] Usual distance of single samples from their mean, by second differences of positions."""
     bend = stream.position[2:] - 2.0 * stream.position[1:-1] + stream.position[:-2]
-    noise = float(np.nanmedian(np.linalg.norm(bend, axis=1))) / np.sqrt(6.0)
-    feigned = noise * np.sqrt(2.0 / half) / ((half + 1) * step)
-    return float(max(_NOISE * feigned, _PART * np.nanpercentile(speed, 95)))
+    return float(np.nanmedian(np.linalg.norm(bend, axis=1))) / float(np.sqrt(6.0))
 
 
 def _pieces(t_s: Array, still: NDArray[np.bool_], breaks: Array) -> list[tuple[int, int]]:

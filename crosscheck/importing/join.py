@@ -16,6 +16,10 @@ from seecr.errors import InputFileError
 from seecr.pose import Array
 from seecr.prediction.experiment import Experiment
 
+# Differences of times are off by so much [s]: those of the day, in seconds since 1970, are 2e-7
+# apart at the least.
+_ROUNDED = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class HeldCommands:
@@ -71,7 +75,7 @@ def held_commands(log: Measurements, rest_for: float, clock: float, end: float) 
     first = np.concatenate([[0], 1 + np.flatnonzero(changes)])
     begin = log.t_s[first] + clock
     stop = np.append(begin[1:], max(end, begin[-1]))
-    held = stop - begin >= rest_for
+    held = stop - begin >= rest_for - _ROUNDED
     passed = int((~held).sum())
     return HeldCommands(log, first[held], begin[held], stop[held], passed, clock)
 

@@ -19,6 +19,7 @@ from crosscheck.importing.logged import Logged, Stream
 from crosscheck.importing.markers import body_of_markers
 from crosscheck.importing.motive import read_motive
 from crosscheck.importing.poses import read_poses
+from crosscheck.importing.still import refuse_still
 from crosscheck.importing.vicon import read_vicon
 from crosscheck.measurements.data import Measurements
 from seecr.counted import between, counted
@@ -56,6 +57,7 @@ def take_of(
     export = READERS[form](path, choices).seen_only()
     export = replace(export, up=choices.up or export.up).upright()
     stream, fit = _stream(export, choices)
+    refuse_still(stream, export, log, choices)
     arm = float(np.sqrt(np.mean(np.sum(robot.anchor_points**2, axis=1))))
     clock = _clock(stream, robot, log, choices, arm, _apart(export.began, log.began))
     held = held_commands(log, choices.rest_for, clock.shift, float(stream.t_s[-1]))

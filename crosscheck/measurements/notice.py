@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crosscheck.measurements.data import Measurements
+from crosscheck.measurements.degrees import refuse_followed_in_degrees
 from crosscheck.measurements.sentinels import refuse_sentinels
 from seecr.columns.known import ANGLES, POSITION, Columns
 from seecr.columns.reach import away_from, check_reach
@@ -47,6 +48,7 @@ def notice(columns: Columns, robot: Robot, data: Measurements) -> list[str]:
     refuse_sentinels(columns, robot)
     _check_spread(columns, robot, data)
     _check_angles(columns, data)
+    refuse_followed_in_degrees(columns, robot, data)
     _refuse_zeros(columns, robot, data)
     return [
         *_far(robot, data),

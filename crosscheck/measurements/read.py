@@ -179,7 +179,7 @@ def _of_one_clock(given: Commands, robot: Robot) -> Measurements:
 
 def _open(path: str | Path, robot: Robot) -> Columns:
     table = read_table(Path(path))
-    return know_columns(table, robot.n_cables)
+    return know_columns(table, robot.n_cables, robot.cable_names)
 
 
 def _load(columns: Columns, robot: Robot, sigma_path: str | Path | None) -> Measurements:

@@ -17,6 +17,10 @@ NO_LIMITS: Limits = (0.0, np.inf)
 """Lowest and highest tension [N]."""
 
 
+MORE_POSES = 6
+"""Most poses that are added."""
+
+
 class Adding(StrEnum):
     """Kinds of measurements that could be added, in the words of ``plan.json``."""
 

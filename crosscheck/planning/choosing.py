@@ -14,7 +14,7 @@ from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.planning.adding import NO_LIMITS, Limits
 from crosscheck.planning.greedy import Wanted, chosen_poses
-from crosscheck.planning.places import held_within, tilted_grid, trustworthy
+from crosscheck.planning.places import held_within, taut_first, tilted_grid, trustworthy
 from crosscheck.planning.planned import Planned, Reads, expected_sigma, kinds_of, planned
 from crosscheck.planning.sight import all_visible
 from crosscheck.planning.visibility import EXACT, Signal, signal_left, signals
@@ -74,10 +74,10 @@ def choose_poses(
     tried, channels = _candidates(robot, box), Reads.of_kinds(robot.n_cables, kinds)
     plan, found = None, 0
     if robot.n_cables >= robot.n_dof:
-        plan = _usable(robot, held_within(robot, tried, limits), full, channels, limits)
+        plan = _usable(robot, held_within(robot, tried, limits), rows, full, channels, limits)
         found = 0 if plan is None else plan.problem.data.n_rows
     if robot.n_cables <= robot.n_dof and found < rows:  # few cables hold little, but rest nearby
-        plan = _usable(robot, tried, full, channels, limits)
+        plan = _usable(robot, tried, rows, full, channels, limits)
         found = 0 if plan is None else plan.problem.data.n_rows
     if plan is None or found < rows:
         cure = "ask for fewer --rows, a wider range of tensions, or another --box"
@@ -126,16 +126,19 @@ def _room(robot: Robot) -> tuple[Array, Array]:
 
 
 def _usable(
-    robot: Robot, poses: Array, sigma: Sigma, reads: Reads, limits: Limits
+    robot: Robot, poses: Array, rows: int, sigma: Sigma, reads: Reads, limits: Limits
 ) -> Planned | None:
-    """The plan of those poses at which the plain robot rests, stiff and within the limits."""
+    """The plan of those poses at which the plain robot rests, stiff and within the limits.
+
+    Those with slack cables are left out, if there are ``rows`` others.
+    """
     if len(poses) == 0:
         return None
     every = _plan(robot, poses, sigma, reads)
     tensions = every.base.state.prediction.tensions
     good = trustworthy(every, every) if every.problem.use.any() else every.problem.use
     good = good & (tensions <= limits[1]).all(axis=1) & (tensions >= limits[0]).all(axis=1)
-    kept = np.flatnonzero(good)
+    kept = np.flatnonzero(taut_first(every, good, rows))
     if len(kept) == 0:
         return None
     # a selection spread over all of them, as they are in the order of the grid

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -22,15 +22,19 @@ from crosscheck.planning.planned import (
     kinds_of,
     near_slack,
     planned,
+    slack_at,
 )
 from crosscheck.planning.proposer import propose
 from crosscheck.planning.result import Plan, Visible
 from crosscheck.planning.sight import all_visible
 from crosscheck.planning.visibility import Signal, signals, signals_like
 from seecr.arguments import silent
+from seecr.counted import counted, some
 from seecr.effects import Term, Terms, layout_of
 from seecr.equilibrium.strained import strained
 from seecr.pose import Array
+
+_MOST_LINES = 5
 
 
 def make_plan(
@@ -69,6 +73,8 @@ def make_plan(
     free = [layout_of(name, robot) for name in commands.free]
     plan = planned(robot, commands, full, read, Terms(Term(one, one.null) for one in free))
     notes = [*robot.notes, *strained(robot), *commands.notes, *assumed, *_unsolved(plan)]
+    loose = _loose(plan)
+    notes += _loose_words(loose, plan)
     if not plan.problem.use.any():
         return Plan(plan, (), {}, ((), np.zeros((0, 0))), (), (), tuple(notes))
     progress("sensitivities", 0.1)
@@ -91,7 +97,24 @@ def make_plan(
         suggestions=suggestions,
         slack=tuple((int(commands.line[k]), names[i]) for k, i in near_slack(plan)),
         notes=tuple(dict.fromkeys(notes)),
+        loose=loose,
     )
+
+
+def _loose(plan: Planned) -> tuple[tuple[int, tuple[str, ...]], ...]:
+    """The lines at which cables are slack, with these cables' names."""
+    names, slack = np.array(plan.problem.robot.cable_names), slack_at(plan)
+    rows = np.flatnonzero(plan.problem.use & slack.any(axis=1))
+    line = plan.problem.data.line
+    return tuple((int(line[k]), tuple(names[slack[k]].tolist())) for k in rows)
+
+
+def _loose_words(loose: Sequence[tuple[int, tuple[str, ...]]], plan: Planned) -> list[str]:
+    if not loose:
+        return []
+    lines = [f"line {line} ({' '.join(cables)})" for line, cables in loose]
+    rows = counted(int(plan.problem.use.sum()), "pose")
+    return [f"cables are slack at {len(loose)} of {rows}: {some(lines, _MOST_LINES)}"]
 
 
 def _unsolved(plan: Planned) -> list[str]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.measurements.data import Measurements
-from crosscheck.planning.adding import NO_LIMITS, Adding, Extension, Limits, like
-from crosscheck.planning.planned import Planned, near_slack
+from crosscheck.planning.adding import MORE_POSES, NO_LIMITS, Adding, Extension, Limits, like
+from crosscheck.planning.planned import Planned, near_slack, slack_at
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
@@ -29,6 +30,9 @@ def more_poses(
 ) -> Extension | None:
     """Poses in and around the planned region, some tilted, at which the robot can hold still.
 
+    Tensions that balance the load are not those that commanded lengths bring about: of the poses,
+    those are left out at which these leave a cable slack, if enough others are left.
+
     Args:
         plan: what is planned. limits: lowest and highest tension [N].
         box: (2, 3) [m] lowest and highest position; by default anywhere near what is planned.
@@ -40,7 +44,8 @@ def more_poses(
     poses = held_within(robot, poses, limits)
     if len(poses) == 0:
         return None
-    poses = poses[trustworthy(like(plan, commands_at(plan.problem, poses)), plan)]
+    tried = like(plan, commands_at(plan.problem, poses))
+    poses = poses[taut_first(tried, trustworthy(tried, plan), MORE_POSES)]
     if len(poses) == 0:
         return None
     found = like(plan, commands_at(plan.problem, poses))
@@ -60,6 +65,12 @@ def trustworthy(candidates: Planned, plan: Planned) -> np.ndarray:
     for row, _cable in near_slack(candidates):
         good[row] = False
     return np.asarray(good)
+
+
+def taut_first(candidates: Planned, good: NDArray[np.bool_], enough: int) -> NDArray[np.bool_]:
+    """(n,) the good ones at which no cable is slack, if they are enough; else all good ones."""
+    taut = good & ~slack_at(candidates).any(axis=1)
+    return taut if taut.sum() >= enough else good
 
 
 def commands_at(problem: Problem, poses: Array) -> Measurements:

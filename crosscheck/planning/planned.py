@@ -191,6 +191,11 @@ def _as_read(commands: Measurements, readings: Readings, reads: Reads) -> Measur
     )
 
 
+def slack_at(plan: Planned) -> NDArray[np.bool_]:
+    """(n, m) bool which cables are slack where the model rests."""
+    return np.asarray(plan.base.state.prediction.solution().slack)
+
+
 def near_slack(plan: Planned) -> list[tuple[int, int]]:
     """Rows and cables about to go slack or taut, where small errors change which cables pull."""
     states = plan.base.state.prediction.found.states

@@ -15,9 +15,9 @@ import numpy as np
 from crosscheck.fit.least_squares.state import derivatives
 from crosscheck.fit.preparation.prepare import Progress
 from crosscheck.measurements.data import Measurements
-from crosscheck.planning.adding import Adding, Extension
+from crosscheck.planning.adding import MORE_POSES, Adding, Extension
 from crosscheck.planning.greedy import Wanted, chosen_poses
-from crosscheck.planning.planned import Planned
+from crosscheck.planning.planned import Planned, slack_at
 from crosscheck.planning.visibility import EXACT, Signal, signal_left, signals_together
 from seecr.arguments import silent
 from seecr.counted import counted
@@ -27,8 +27,6 @@ from seecr.pose import Array, rotvec_from_quat
 
 # Squared signal, in units of the noise, that tells two effects apart (docs/diagnosis.md).
 NEEDED = 15.0
-# Most poses that are added.
-MORE_POSES = 6
 # Repeating everything doubles each signal. A proposal must multiply it by more than _GAINS, and
 # bring it to this part of what is needed.
 _GAINS, _NEAR = 2.5, 0.1
@@ -72,6 +70,7 @@ class Suggestion:
         gains: first what reaches the needed signal, then what only comes nearer to it.
         poses: (k, 7) poses to add, if poses are added.
         commands: what to command for it; None for sensors.
+        slack: the cables that are slack at each of the poses, by name.
     """
 
     kind: Adding
@@ -79,6 +78,7 @@ class Suggestion:
     gains: tuple[Gain, ...]
     poses: Array | None = None
     commands: Measurements | None = None
+    slack: tuple[tuple[str, ...], ...] = ()
 
     @property
     def reached(self) -> tuple[Gain, ...]:
@@ -89,10 +89,11 @@ class Suggestion:
     def places(self) -> tuple[str, ...]:
         """The poses to add, in words."""
         out = []
-        for pose in self.poses if self.poses is not None else ():
+        for k, pose in enumerate(self.poses if self.poses is not None else ()):
             turn = " ".join(f"{angle:.3g}" for angle in np.degrees(rotvec_from_quat(pose[3:])))
             x, y, z = pose[:3]
-            out.append(f"({x:.4g} {y:.4g} {z:.4g}) m, turned by ({turn}) deg")
+            loose = f", slack: {' '.join(self.slack[k])}" if self.slack and self.slack[k] else ""
+            out.append(f"({x:.4g} {y:.4g} {z:.4g}) m, turned by ({turn}) deg{loose}")
         return tuple(out)
 
     def as_json(self) -> dict[str, Any]:
@@ -101,6 +102,7 @@ class Suggestion:
             "kind": self.kind.value,
             "words": self.words,
             "poses": self.poses,
+            "slack": None if self.poses is None else self.slack,
             "gains": self.gains,
         }
 
@@ -162,7 +164,9 @@ def _few_poses(
     few = {n: Signal(s.layout, s.shape, s.columns[some]) for n, s in there.items()}
     words = f"add the {counted(len(rows), 'pose')} listed below"
     gains, told = _gains(own, few, open_), grid.plan.problem.data.rows(rows)
-    return Suggestion(Adding.POSES, words, gains, grid.poses[rows], told)
+    names = np.array(grid.plan.problem.robot.cable_names)
+    slack = tuple(tuple(names[loose].tolist()) for loose in slack_at(grid.plan)[rows])
+    return Suggestion(Adding.POSES, words, gains, grid.poses[rows], told, slack)
 
 
 def telling_apart(

@@ -118,6 +118,7 @@ class Plan(Result):
         suggestions: what to add, the most useful first.
         slack: (line, cable) of cables about to go slack or taut.
         notes: what was assumed or left out.
+        loose: (line, cables) of poses at which cables are slack.
     """
 
     planned: Planned
@@ -127,6 +128,7 @@ class Plan(Result):
     suggestions: tuple[Suggestion, ...]
     slack: tuple[tuple[int, str], ...]
     notes: tuple[str, ...]
+    loose: tuple[tuple[int, tuple[str, ...]], ...] = ()
 
     @property
     def sentence(self) -> str:
@@ -196,5 +198,6 @@ class Plan(Result):
             "confusion": {"effects": list(names), "containment": table},
             "add": self.suggestions,
             "near_slack": [{"line": line, "cable": cable} for line, cable in self.slack],
+            "slack": [{"line": line, "cables": list(cables)} for line, cables in self.loose],
             "notes": list(self.notes),
         }

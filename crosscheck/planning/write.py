@@ -13,6 +13,7 @@ from crosscheck.given import numbers_of
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.write import write_measurements
 from crosscheck.planning.adding import Adding
+from crosscheck.planning.proposer import Suggestion
 from crosscheck.planning.result import Plan
 from seecr.errors import InputError, InputFileError
 from seecr.files import check_writable
@@ -42,14 +43,15 @@ def write_plan(plan: Plan, folder: str | Path, own: bool = True) -> tuple[str, .
     if not isinstance(plan, Plan):
         raise InputError(f"expected a plan, as make_plan returns it, got {type(plan).__name__}")
     folder = Path(folder)
-    files = {_OWN: plan.planned.problem.data} if own else {}
+    files = {_OWN: (plan.planned.problem.data, "")} if own else {}
     for item in plan.suggestions:
         if item.reached and item.commands is not None:
-            files[_addition(item.kind)] = item.commands
-    for name, commands in files.items():
+            files[_addition(item.kind)] = (item.commands, _slack_remark(item))
+    for name, (commands, slack) in files.items():
         check_writable(folder / name)
         folder.mkdir(parents=True, exist_ok=True)
-        write_measurements(folder / name, _unread(commands), remark_of(commands))
+        remarks = "; ".join(filter(None, [remark_of(commands), slack]))
+        write_measurements(folder / name, _unread(commands), remarks)
     return tuple(files)
 
 
@@ -106,6 +108,12 @@ def remark_of(commands: Measurements) -> str:
     """Which lines, below the remark and the header, are way points; "" if none are."""
     lines = ", ".join(str(row + 3) for row in np.flatnonzero(~commands.read))
     return lines and f"way points, passed without a reading: lines {lines}"
+
+
+def _slack_remark(item: Suggestion) -> str:
+    """Which lines, below the remark and the header, leave cables slack; "" if none do."""
+    loose = [f"line {k + 3} ({' '.join(names)})" for k, names in enumerate(item.slack) if names]
+    return f"cables are slack at {', '.join(loose)}" if loose else ""
 
 
 def _unread(data: Measurements) -> Measurements:

@@ -143,7 +143,10 @@ def image(figure: Figure, words: str) -> str:
     _keep(figure, buffer.getvalue(), words)
     text = base64.b64encode(buffer.getvalue()).decode("ascii")
     alt = html.escape(words, quote=True)
-    return f'<img alt="{alt}" src="data:image/svg+xml;base64,{text}">'
+    # a narrower figure is that part of the page's width: its letters are as large as others'
+    part = figure.get_figwidth() / WIDTH
+    style = f' style="--part: {part:.3f}"' if part < 1.0 else ""
+    return f'<img alt="{alt}"{style} src="data:image/svg+xml;base64,{text}">'
 
 
 class _Dots(PathPatch):

@@ -93,6 +93,7 @@ def _parameter(
         flags.append("at its bound")
     if not np.isfinite(error):
         flags.append("not determined by these data")
+        shown = shown if bound else ""
     if abs(size) > PLAUSIBLE:
         flags.append(f"{short(float(abs(size)), 2)} plausible sizes")
     return ParameterRow(

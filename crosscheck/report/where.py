@@ -25,6 +25,8 @@ _MOST_ARROWS = 250
 # the dark page, on which figures are inverted.
 _COLOURS = ListedColormap(colormaps["viridis_r"](np.linspace(0.42, 1.0, 128)))
 
+# What is left empty at the edges [in].
+_EDGE = 0.08
 # A title of more letters than these does not fit above a panel: the effects are counted instead.
 _LONGEST = 48
 
@@ -44,7 +46,10 @@ def failure_map(problem: Problem, before: Drawn, after: Drawn) -> str:
             len(rows), across, squeeze=False, gridspec_kw={"height_ratios": rows}
         )
         columns = panels.T if len(stages) == 1 else panels
-        _draw(figure, columns, problem, stages, place, views)
+        bar = _draw(figure, columns, problem, stages, place, views)
+        if bar is not None:
+            _move_beside(figure, bar, panels.ravel().tolist())
+            _crop(figure)
         words = "Where the model fails" + (", before and after" if len(stages) > 1 else "")
         return image(figure, words)
 
@@ -65,7 +70,8 @@ def _draw(
     stages: list[Drawn],
     place: Array,
     views: list[tuple[int, int]],
-) -> None:
+) -> Axes | None:
+    """Draw the panels; the colour bar's axes, if there is one."""
     magnify = magnification(problem, stages[0].state)
     kind = _coloured(problem)
     top = _top(problem, stages[0], kind) if kind else 1.0
@@ -87,6 +93,42 @@ def _draw(
         )  # fmt: skip
         bar.set_label(f"{kind.name} error [{kind.unit}]")
         bar.outline.set_visible(False)
+        return bar.ax
+    return None
+
+
+def _move_beside(figure: Figure, bar: Axes, panels: list[Axes]) -> None:
+    """Move the colour bar to the panels, which equal scales of x and y make narrower than planned.
+
+    Beside them, as far as it was to be from them, and at half their height.
+    """
+    layout = figure.get_layout_engine()
+    assert layout is not None
+    layout.execute(figure)
+    figure.set_layout_engine("none")
+    planned = max(panel.get_position(original=True).x1 for panel in panels)
+    for panel in panels:
+        panel.apply_aspect()
+    places = [panel.get_position() for panel in panels]
+    low, high = min(one.y0 for one in places), max(one.y1 for one in places)
+    bar.apply_aspect()
+    here = bar.get_position()
+    height = min(here.height, high - low)
+    bar.set_aspect("auto")
+    left = here.x0 - planned + max(one.x1 for one in places)
+    bar.set_position((left, 0.5 * (low + high - height), here.width, height))
+
+
+def _crop(figure: Figure) -> None:
+    """Cut what is empty at the right and below, without moving anything on the paper."""
+    wide, high = figure.get_size_inches()
+    seen = figure.get_tightbbox(figure._get_renderer())  # type: ignore[attr-defined]
+    right, cut = min(wide, seen.x1 + _EDGE), max(0.0, seen.y0 - _EDGE)
+    for axes in figure.axes:
+        x, y, w, h = axes.get_position(original=True).bounds
+        place = (x * wide / right, (y * high - cut) / (high - cut))
+        axes.set_position((*place, w * wide / right, h * high / (high - cut)))
+    figure.set_size_inches(right, high - cut)
 
 
 def _title(stages: list[Drawn], column: int, magnify: float) -> str:

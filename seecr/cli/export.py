@@ -12,6 +12,7 @@ from seecr.cli.arguments import (
     pose_of,
     robot_at,
     robot_options,
+    scalar_last,
 )
 from seecr.cli.following import following
 from seecr.cli.options import FILE, Number, json_option, made_by
@@ -73,9 +74,10 @@ def command(
     out.parent.mkdir(parents=True, exist_ok=True)
     files = {out: found.text} | ({beside: found.mujoco_text} if found.mujoco_text else {})
     write_texts(files, "cannot write the MJCF")
-    notes = [*machine.notes, *(own.notes if own else ())]
-    if beside not in files and beside.exists():
-        notes.append(f"{beside.name} is of an earlier export: now no such file is needed")
+    slip = scalar_last(machine, coordinates[3:])
+    notes = [*machine.notes, *(own.notes if own else ()), *slip]
+    if beside not in files and beside.is_file():
+        notes.append(_without(beside))
     if as_json:
         document = {
             "made": made_by(machine.source, model), "exit_status": 0, "notes": notes,
@@ -88,3 +90,19 @@ def command(
     for line in [*notes, *found.lines(out.name, beside.name), then]:
         click.echo(line)
     return 0
+
+
+def _without(beside: Path) -> str:
+    """Remove the file for MuJoCo of an earlier export, which is of another model; what was done.
+
+    A file of that name that no export wrote is the user's own.
+    """
+    from seecr.exported.export import wrote
+
+    if not wrote(beside):
+        return f"{beside.name} is of no export: it stays, though no such file is needed now"
+    try:
+        beside.unlink()
+    except OSError as error:
+        return f"{beside.name} is of an earlier export and cannot be removed: {error.strerror}"
+    return f"{beside.name} of an earlier export removed: now no such file is needed"

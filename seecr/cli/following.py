@@ -14,10 +14,29 @@ if TYPE_CHECKING:
 
 Words = tuple[object, ...]
 
+STDIN = "/dev/stdin"
+"""Standard input, as a path."""
+
+# Stands for a file that came through a pipe.
+_SAVED = "INPUT"
+
 
 def following(*words: object) -> str:
-    """The line that names a command, as a shell takes it."""
-    return f"next: {typed(*words)}"
+    """The line that names a command, as a shell takes it.
+
+    What came through a pipe is gone: a file stands in its place.
+    """
+    if not any(_piped(word) for word in words):
+        return f"next: {typed(*words)}"
+    line = typed(*(_SAVED if _piped(word) else word for word in words))
+    return f"next: {line}  # {_SAVED}: what came through the pipe, saved as a file"
+
+
+def _piped(word: object) -> bool:
+    """Whether a word is a file that can be read only once."""
+    if not isinstance(word, Path):
+        return False
+    return str(word) == STDIN or str(word).startswith(("/dev/fd/", "/proc/")) or word.is_fifo()
 
 
 def typed(*words: object) -> str:

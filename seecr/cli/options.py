@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from seecr.cli.following import STDIN
 from seecr.cli.group import ARGUMENTS
 
 if TYPE_CHECKING:
@@ -57,7 +58,15 @@ def _within(numbers: click.IntRange | click.FloatRange) -> str:
     return f" {least}" if high is None else f" {least} and at most {high:g}"
 
 
-FILE = click.Path(path_type=Path)
+class _File(click.Path):
+    """A path; ``-`` is standard input, as everywhere."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The path of what is given."""
+        return super().convert(STDIN if value == "-" else value, param, ctx)
+
+
+FILE = _File(path_type=Path)
 """A file that the command itself opens, so that the error is its own."""
 
 

@@ -17,6 +17,7 @@ from seecr.cli.arguments import (
     picture_options,
     robot_at,
     robot_options,
+    scalar_last,
     turned_option,
 )
 from seecr.cli.following import following
@@ -143,7 +144,7 @@ def command(
             inside = found.feasible if at_least is None else found.likely(at_least)
             pairs = found.crossings(inside)
             places = boundary(machine, *pairs, tolerance=edge, at_least=at_least, **asked)
-        notes = [*machine.notes, *strained(machine)]
+        notes = [*machine.notes, *strained(machine), *scalar_last(machine, turned or ())]
         if own is not None:
             notes += [*own.notes, *beyond_line(found, own.reach)]
         status = 3 if found.elastic and not np.any(found.rests) else 0

@@ -57,7 +57,7 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
         InputFileError: with line and column of the mistake.
     """
     path = Path(path)
-    columns = know_columns(read_table(path), robot.n_cables)
+    columns = know_columns(read_table(path), robot.n_cables, robot.cable_names)
     run = runs(columns)
     lengths = command_lengths(columns, robot)
     if lengths is None:

@@ -1,6 +1,7 @@
 """What the columns of commands and measurements mean: names, units, and which belong together.
 
-A name is a quantity and, after the last underscore, its unit: ``cmd_x_mm``, ``length_3_m``.
+A name is a quantity and, after the last underscore, its unit: ``cmd_x_mm``, ``length_3_m``. Cables
+have their number in the MJCF or, if that is not a number, their tendon's name: ``length_left_m``.
 Quaternions (``cmd_qw``) have no unit. Columns with other names are ignored and listed as unused.
 """
 
@@ -13,7 +14,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.columns.names import meant_by, other_rotations, question, unused_note
+from seecr.columns.names import (
+    meant_by,
+    no_cable_note,
+    numbered,
+    of_no_cable,
+    other_rotations,
+    question,
+    unused_note,
+)
 from seecr.columns.quantity import QUANTITY
 from seecr.columns.table import Table, show
 from seecr.counted import counted
@@ -49,7 +58,7 @@ class Columns:
     Attributes:
         table: the cells. known: columns by quantity (``"cmd_x"``, ``"length_3"``).
         unused: names of the others. meant: for those close to a missing name, that name.
-        notes: sentences for the reader, collected while reading.
+        notes: sentences for the reader, collected while reading. named: names of the cables.
     """
 
     table: Table
@@ -57,6 +66,7 @@ class Columns:
     unused: tuple[str, ...]
     meant: dict[str, str]
     notes: list[str] = field(default_factory=list)
+    named: tuple[str, ...] = ()
 
     @property
     def n_rows(self) -> int:
@@ -104,11 +114,18 @@ class Columns:
         """`` (NOTE; NOTE)`` about misspelt columns, for errors about a missing column."""
         notes = [question(name, meant) for name, meant in self.meant.items()]
         notes += unused_note([], other_rotations(self.unused))
+        lost = of_no_cable([name for name in self.unused if name not in self.meant])
+        notes += no_cable_note(lost, self.named)
         return f" ({'; '.join(note.rstrip('.') for note in notes)})" if notes else ""
 
 
-def know_columns(table: Table, n_cables: int) -> Columns:
+def know_columns(table: Table, n_cables: int, cables: Sequence[str] = ()) -> Columns:
     """Identify the columns of a table for a robot with ``n_cables`` cables.
+
+    Args:
+        table: the cells.
+        n_cables: how many cables the robot has.
+        cables: their names, which columns may have in place of a number.
 
     Raises:
         InputFileError: a missing or unknown unit, a repeated column, a cable that the robot does
@@ -118,7 +135,7 @@ def know_columns(table: Table, n_cables: int) -> Columns:
     known: dict[str, Column] = {}
     unused = []
     for index, name in enumerate(table.names):
-        found = _parse_name(table, name, n_cables)
+        found = _parse_name(table, name, n_cables, cables)
         if found is None:
             unused.append(name or f"(column {index + 1}, without a name)")
             continue
@@ -129,9 +146,11 @@ def know_columns(table: Table, n_cables: int) -> Columns:
         known[quantity] = Column(name, index, unit)
     meant = meant_by(unused, _absent(known, n_cables))
     turned = other_rotations(unused)
-    rest = [name for name in unused if name not in meant and name not in turned]
-    notes = [question(name, near) for name, near in meant.items()] + unused_note(rest, turned)
-    columns = Columns(table, known, tuple(unused), meant, notes)
+    lost = of_no_cable([name for name in unused if name not in meant])
+    rest = [name for name in unused if name not in (*meant, *turned, *lost)]
+    notes = [question(name, near) for name, near in meant.items()]
+    notes += [*no_cable_note(lost, cables), *unused_note(rest, turned)]
+    columns = Columns(table, known, tuple(unused), meant, notes, tuple(cables))
     _check_one_way(columns)
     return columns
 
@@ -151,8 +170,10 @@ def _check_names(table: Table) -> None:
             raise table.error(f"{text}; rename or remove one", column=name)
 
 
-def _parse_name(table: Table, name: str, n_cables: int) -> tuple[str, Unit] | None:
-    match = QUANTITY.fullmatch(name)
+def _parse_name(
+    table: Table, name: str, n_cables: int, cables: Sequence[str]
+) -> tuple[str, Unit] | None:
+    match = QUANTITY.fullmatch(numbered(name, cables))
     if match is None:
         return None
     quantity, suffix = match[1], match[2] or ""
@@ -160,7 +181,8 @@ def _parse_name(table: Table, name: str, n_cables: int) -> tuple[str, Unit] | No
         return None
     units = of_columns(_si_of(quantity))
     if suffix not in units:
-        raise table.error(_unit_fault(quantity, suffix, units), column=name)
+        shown = name.removesuffix(f"_{suffix}") if suffix else name
+        raise table.error(_unit_fault(shown, suffix, units), column=name)
     _check_cable(table, quantity, name, n_cables)
     return quantity, units[suffix]
 

@@ -9,8 +9,13 @@ from seecr.commands.loads import Loads
 from seecr.description.robot import Robot
 from seecr.pose import Array
 
-# A load at which all cables together would be stretched to more than this many times their length.
-_STRAIN = 10.0
+# A load that would strain all cables together, if they were parallel to it, by this much: few ropes
+# bear it. Robots with softer ones carry so many times their platform's weight or their tension.
+_STRAIN, _TIMES = 0.05, 10.0
+# A payload of so many times the platform's mass is noted.
+_HEAVY = 5.0
+# Units that a load which is too large by a thousand may be in.
+_SMALLER = {"kg": "g", "kN": "N"}
 
 
 def known_loads(columns: Columns, robot: Robot) -> Loads | None:
@@ -19,7 +24,7 @@ def known_loads(columns: Columns, robot: Robot) -> Loads | None:
     Raises:
         InputFileError: a centre without a payload, an incomplete centre, one that is farther from
             the platform than the robot is large, a payload that leaves the platform without mass,
-            or a load that would stretch all cables to many times their length.
+            or a load that the cables cannot carry.
     """
     mass = _payload(columns, robot)
     wrench = np.zeros((columns.n_rows, 6))
@@ -51,23 +56,39 @@ def _payload(columns: Columns, robot: Robot) -> Array | None:
     gravity = float(np.linalg.norm(robot.gravity))
     if gravity > 0.0:
         _refuse_heavy(columns, "payload", mass, _most(robot) / gravity, "kg")
+        _note_heavy(columns, mass, robot)
     return mass
 
 
 def _most(robot: Robot) -> float:
     """More than all cables together can carry [N]."""
-    return _STRAIN * float(np.sum(robot.ea))
+    weight = robot.mass * float(np.linalg.norm(robot.gravity))
+    pull = float(np.sum(robot.ea * np.maximum(robot.reference_lengths / robot.rest_lengths - 1, 0)))
+    return max(_STRAIN * float(np.sum(robot.ea)), _TIMES * weight, _TIMES * pull)
 
 
 def _refuse_heavy(columns: Columns, quantity: str, load: Array, most: float, unit: str) -> None:
+    smaller = _SMALLER.get(columns.known[quantity].unit.suffix)
+    guess = f"is it in {smaller}? Name the column {quantity}_{smaller}" if smaller else "check it"
     columns.refuse(
         np.abs(load) > most,
         quantity,
         lambda row: (
             f"expected a load that the cables of this robot can carry, at most {most:.3g} {unit}, "
-            f"got {load[row]:g} {unit}"
+            f"got {load[row]:g} {unit}; {guess}"
         ),
     )
+
+
+def _note_heavy(columns: Columns, mass: Array, robot: Robot) -> None:
+    """Note payloads in kg that are many times the platform's mass."""
+    most = float(np.max(mass))
+    column = columns.known["payload"]
+    if robot.mass > 0.0 and most > _HEAVY * robot.mass and column.unit.suffix == "kg":
+        columns.notes.append(
+            f"Column {column.name} is up to {most:g} kg, {most / robot.mass:.3g} times the mass of "
+            "the platform: if it is in g, name it payload_g."
+        )
 
 
 def _refuse_far(columns: Columns, centre: Array, robot: Robot) -> None:

@@ -16,6 +16,9 @@ _ROTATION = re.compile(
     r"roll|pitch|yaw|euler|heading|rotvec|rodrigues|(?:^|_)(?:phi|theta|psi|rot)(?:_|$)",
     re.IGNORECASE,
 )
+_OF_CABLE = re.compile(r"(length|tension)_(.+)")
+# So much of a name that it would be a column, if it were a cable's; results have others besides.
+_OF_NO_CABLE = re.compile(r"(length|tension)_(?!\d+_)[^_]+(_(m|cm|mm|um|N|kN))?")
 OUR_ROTATIONS = (
     "a rotation is meas_rx_deg meas_ry_deg meas_rz_deg with R = Rx(rx) Ry(ry) Rz(rz), or the "
     "quaternion meas_qw meas_qx meas_qy meas_qz"
@@ -53,6 +56,40 @@ def _distinct(name: str) -> set[str]:
 def other_rotations(unused: Sequence[str]) -> list[str]:
     """Names of rotations by words that have different meanings for different people."""
     return [name for name in unused if _ROTATION.search(name)]
+
+
+def numbered(name: str, cables: Sequence[str]) -> str:
+    """The name of a column with the number of its cable, from 1, in place of the cable's name.
+
+    Other names stay as they are. A cable whose name is a number has no name here: numbers are those
+    in the order of the robot's description.
+    """
+    match = _OF_CABLE.fullmatch(name)
+    if match is None:
+        return name
+    prefix, rest = match[1], match[2]
+    for number, cable in enumerate(cables, start=1):
+        unit = rest.removeprefix(cable)
+        if rest.startswith(cable) and not cable.isdigit() and re.fullmatch(r"(_[^_]*)?", unit):
+            return f"{prefix}_{number}{unit}"
+    return name
+
+
+def of_no_cable(unused: Sequence[str]) -> list[str]:
+    """Names of lengths or tensions of no cable that the robot has."""
+    return [name for name in unused if _OF_NO_CABLE.fullmatch(name)]
+
+
+def no_cable_note(names: Sequence[str], cables: Sequence[str]) -> list[str]:
+    """The sentence about :func:`of_no_cable`, which names the cables that there are."""
+    if not names or not cables:
+        return unused_note(names, [])
+    word, verb = ("Column", "is") if len(names) == 1 else ("Columns", "are")
+    numbers = ", ".join(f"{k} ({cable})" for k, cable in enumerate(cables, start=1))
+    return [
+        f"{word} {', '.join(names)} {verb} not used: the robot's cables are {numbers}, by number "
+        "or name."
+    ]
 
 
 def question(name: str, meant: str) -> str:

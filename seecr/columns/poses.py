@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.columns.angles import refuse_degrees
 from seecr.columns.known import ANGLES, POSITION, QUATERNION, Columns
 from seecr.description.joints import pose_of_values
 from seecr.pose import NORM_TOLERANCE, Array, quat_from_rxyz, rxyz_from_quat
@@ -24,15 +25,23 @@ def command_lengths(columns: Columns, robot: Robot) -> Array | None:
     missing = [f"length_{i}_m" for i in range(1, m + 1) if i not in given]
     if missing:
         raise columns.half_there("length", missing, f"all {m} cables of the robot")
-    return np.stack([_length(columns, f"length_{i}") for i in given], axis=1)
+    rest = robot.rest_lengths.tolist()
+    return np.stack([_length(columns, f"length_{i}", rest[i - 1]) for i in given], axis=1)
 
 
-def _length(columns: Columns, quantity: str) -> Array:
-    length = columns.numbers(quantity)
+def _length(columns: Columns, quantity: str, rest: float) -> Array:
+    """One column (n,) [m] of lengths; ``rest`` [m] is the rest length at the reference pose."""
+    length, unit = columns.numbers(quantity), columns.known[quantity].unit
+    one = unit.to_si(1.0)
+    toml = columns.table.path.with_suffix(".toml").name
     columns.refuse(
         length <= 0,
         quantity,
-        lambda row: f"expected a length above zero, got {length[row]:g} m",
+        lambda row: (
+            f"expected a length above zero, got {length[row] / one:.6g} {unit.suffix}: it is all "
+            "of the cable from its exit point on; to changes since the reference pose add its rest "
+            f'length there, {rest / one:.6g} {unit.suffix}, and put lengths = "told" into {toml}'
+        ),
     )
     return length
 
@@ -152,6 +161,9 @@ def _group(
         parts: the coordinates' names.
         free: (3,) which of them the robot can change. reference: (3,) the reference pose's.
         blank_is_nan: whether cells may be empty.
+
+    Raises:
+        InputFileError: a missing column, or radians that must be degrees.
     """
     prefix, word, unit = of
     absent = [k for k, part in enumerate(parts) if f"{prefix}_{part}" not in columns.known]
@@ -164,6 +176,8 @@ def _group(
         columns.notes.append(
             f"No {names}: the robot cannot move there, the reference pose's value is used."
         )
+    if parts == ANGLES:
+        refuse_degrees(columns, prefix, parts)
     values = np.tile(np.asarray(reference, float), (columns.n_rows, 1))
     for k, part in enumerate(parts):
         if k not in absent:
@@ -216,7 +230,12 @@ def _check_norm(columns: Columns, prefix: str, quat: Array, norm: Array) -> None
 
 
 def measured_orientation(columns: Columns) -> tuple[Array | None, Array]:
-    """Quaternions (n, 4) or None, and angles (n, 3) [rad] of incomplete orientations."""
+    """Quaternions (n, 4) or None, and angles (n, 3) [rad] of incomplete orientations.
+
+    Raises:
+        InputFileError: an incomplete quaternion, or radians that must be degrees.
+    """
+    refuse_degrees(columns, "meas", ANGLES)
     angles = columns.readings("meas", ANGLES)
     if columns.present("meas", QUATERNION):
         quat = _quaternions(columns, "meas", blank_is_nan=True)

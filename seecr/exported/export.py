@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +30,8 @@ from seecr.statics.starts import commanded_poses
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects
 
+# The comment at the top of a file for MuJoCo alone, by which it is known to be of an export.
+_ALONE = "for MuJoCo alone, written by seecr export"
 # Directions whose sine is smaller count as equal.
 _ALONG = 1e-12
 
@@ -167,6 +170,16 @@ def export(robot: GivenRobot, effects: GivenEffects = (), at: ArrayLike | None =
     return Export(described, text, mujoco_text, solution, plain_names, bodies, lengths, nowhere)
 
 
+def wrote(path: Path) -> bool:
+    """Whether an export wrote a file for MuJoCo alone."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, ValueError):
+        return False
+    comment, end, _rest = text.partition("-->")
+    return bool(end) and comment.rstrip().endswith(_ALONE)
+
+
 def _sorted(
     robot: Robot, effects: Sequence[Effect], pose: np.ndarray
 ) -> tuple[Expressed, Solution | None]:
@@ -209,7 +222,7 @@ def _inside(said: Expressed) -> tuple[Effect, ...]:
 def _for_mujoco(
     robot: Robot, effects: tuple[Effect, ...], pose: np.ndarray, solution: Solution
 ) -> str:
-    comment = f"{robot.name} with {_names(effects)}; for MuJoCo alone, written by seecr export"
+    comment = f"{robot.name} with {_names(effects)}; {_ALONE}"
     return bodies_text(setup_with(effects, robot, Commands(pose)), solution, comment)
 
 

@@ -48,6 +48,8 @@ Bars = Sequence[BarBalance] | None
 
 # More zones of slack cables than these are not listed in a terminal.
 _MOST_SPANS = 12
+# More other equilibria than these are only in the JSON.
+_MOST_OTHERS = 3
 # A rotation of a command below this [rad] is rounding.
 _NO_TURN = 1e-9
 # A component of a direction below this is not mentioned.
@@ -72,13 +74,15 @@ def pose_lines(solution: Solution, spread: Spread | None = None) -> Iterator[str
     pose, away = solution.pose[0], solution.deviation[0]
     if not np.isfinite(pose).all():
         return
-    place, angles = 1e3 * pose[:3], np.degrees(rxyz_from_quat(pose[3:]))
+    place, (about, angles) = 1e3 * pose[:3], _turn(solution.robot, pose[3:])
     if spread is None:
         at, turned = _three(place, ".3f"), _three(angles, ".3f")
     else:
         at = _known(place, 1e3 * spread.position[0])
-        turned = _known(angles, np.degrees(spread.rotation[0]))
-    yield f"rests at x y z {at} mm, turned rx ry rz {turned} deg"
+        # about one axis, the others' errors are zero
+        errors = np.degrees(spread.rotation[0])
+        turned = _known(angles, errors if len(angles) == 3 else [float(np.linalg.norm(errors))])
+    yield f"rests at x y z {at} mm, turned {about} {turned} deg"
     if spread is not None:
         yield from _spread_lines(spread)
     yield "  quaternion " + " ".join(figures(q, ".7f") for q in np.round(pose[3:], 9))
@@ -113,8 +117,22 @@ def _off(values: Array) -> str:
     return f"± {moved} mm, ± {turned} deg about x y z"
 
 
-def _known(values: Array, errors: Array) -> str:
-    """Three numbers with as many digits as their standard errors justify."""
+def _turn(robot: Robot, quat: Array) -> tuple[str, Array]:
+    """What the platform is turned about in words, and by which angles (k,) [deg].
+
+    Of a platform with one hinge it is one angle, where rx ry rz are 180 -12 180 beyond a right one.
+    """
+    hinges = [joint for joint in robot.joints if joint.kind == "hinge"]
+    turn = rotvec_from_quat(quat)
+    if len(hinges) == 1 and np.linalg.norm(np.cross(turn, hinges[0].axis)) < _NO_TURN:
+        # the axis that has that letter may point the other way
+        along = np.abs(hinges[0].axis) if _axis_name(hinges[0]) in "xyz" else hinges[0].axis
+        return f"about {_axis_name(hinges[0])} by", np.degrees([turn @ along])
+    return "rx ry rz", np.degrees(rxyz_from_quat(quat))
+
+
+def _known(values: Array, errors: Sequence[float] | Array) -> str:
+    """Numbers with as many digits as their standard errors justify."""
     return ", ".join(with_error(*pair)[0] for pair in zip(values + 0.0, errors, strict=True))
 
 
@@ -313,20 +331,26 @@ def other_lines(
     whys = dict.fromkeys(one.why_not for one in passes if one.why_not)
     if len(away) == 0:
         yield "no other stable equilibrium was found"
-    for n, k in enumerate(away):
-        gap = pose_difference(others.pose[k], solution.pose[0])
-        slack = [n for n, s in zip(solution.robot.cable_names, others.slack[k], strict=True) if s]
+    gaps = pose_difference(others.pose[away], solution.pose[0])
+    # twisted ones, which nothing leads to, come last
+    order = np.argsort(np.linalg.norm(gaps[:, 3:], axis=1) > TWISTED, kind="stable")
+    for n in order[:_MOST_OTHERS]:
+        k, gap = away[n], gaps[n]
+        about, angles = _turn(solution.robot, others.pose[k, 3:])
+        slack = [c for c, s in zip(solution.robot.cable_names, others.slack[k], strict=True) if s]
         line = (
             f"could also rest {millimetres(np.linalg.norm(gap[:3]))} and "
             f"{np.degrees(np.linalg.norm(gap[3:])):.4g} deg away: at "
-            f"{_three(np.round(1e3 * others.pose[k, :3], 1), '.7g')} mm, turned "
-            f"{_three(np.degrees(rxyz_from_quat(others.pose[k, 3:])), '.4g')} deg, "
+            f"{_three(np.round(1e3 * others.pose[k, :3], 1), '.7g')} mm, turned {about} "
+            f"{_three(angles, '.4g')} deg, "
             f"{_more_energy(others.energy[k] - solution.energy[0])}slack: "
             f"{' '.join(slack) or 'none'}"
         )
         if passes:
             line += f"; {passes[n].kind if passes[n].why_not else passes[n].words}"
         yield line
+    if len(away) > _MOST_OTHERS:
+        yield f"and at {len(away) - _MOST_OTHERS} more places, all of them with --json"
     yield from (f"{NO_BARRIER}: {why}" for why in whys)
 
 

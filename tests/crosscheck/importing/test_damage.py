@@ -151,7 +151,8 @@ DAMAGE = {
     ),
     "a dwell of one sample": (
         "poses", lambda x: [x[0], *x[1::50]],
-        r"line 3: expected at least 5 samples in a dwell of 0.5 s, got one every 1 s: a dwell of"
+        r"line 3: expected at least 5 samples in the shortest dwell, 0.5 s, got one every 1 s; log "
+        r"faster, give --rest-for 5 or longer, or, if each row is"
     ),
     "nothing at rest": (
         "poses", lambda x: [x[0], *(f"{0.02 * k:.2f},{0.01 * k:.4f},0,0,1,0,0,0"

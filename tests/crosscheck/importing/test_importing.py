@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import made_recordings as made_of
 import numpy as np
@@ -21,6 +22,7 @@ from crosscheck.importing.markers import aligning, body_of_markers
 from crosscheck.measurements.dwells import mean_error
 from seecr.errors import InputError, InputFileError
 from seecr.pose import quat_rotate, rotvec_from_quat
+from seecr.units import millimetres
 
 pytestmark = pytest.mark.slow
 
@@ -141,12 +143,37 @@ def test_poses_in_the_base_frame_stay_what_they_are(home, tmp_path):
     )  # fmt: skip
     data = found.measured
     assert data.free == () and data.stands.all()
+    (said,) = [note for note in found.notes if "from the commands" in note]
+    off = np.linalg.norm(data.position - data.command_pose[:, :3], axis=1)
+    assert said.startswith(f"the readings are {millimetres(np.median(off), 3)} and ")
     assert np.abs(data.position - home.truth.position).max() < 5 * data.sigma.position_m
     off = rotvec_from_quat(
         np.concatenate([data.quat_wxyz[:, :1], -data.quat_wxyz[:, 1:]], axis=1)
     ) + rotvec_from_quat(home.truth.quat_wxyz)
     assert np.abs(off).max() < 6 * data.sigma.orientation_rad
     assert data.command_pose == pytest.approx(home.truth.command_pose, abs=1e-8)
+
+
+def test_another_frame_than_the_base_frame_is_said_with_what_would_align_it(
+    made, commands, tmp_path
+):
+    """A tracker turned by 34 degrees and 1.7 m away was used as it is without a word."""
+    found = import_case(
+        "poses", [made_of.poses_csv(tmp_path / "a.csv", made)], ROBOT, [commands],
+        ImportChoices(aligned=True),
+    )  # fmt: skip
+    assert found.measured.free == ()
+    off = next(note for note in found.notes if note.startswith("the readings are "))
+    away = np.median(np.linalg.norm(
+        found.measured.position - found.measured.command_pose[:, :3], axis=1
+    ))  # fmt: skip
+    assert off.startswith(f"the readings are {millimetres(away, 3)} and ") and away > 0.5
+    (turned,) = [note for note in found.notes if "Without --aligned it is aligned" in note]
+    shift = np.linalg.norm(made_of.SHIFT)
+    got = re.match(r"turned by ([\d.]+) deg and moved by ([\d.]+) m they would be", turned)
+    assert got is not None
+    assert float(got[1]) == pytest.approx(np.degrees(0.6), abs=1.5)
+    assert float(got[2]) == pytest.approx(shift, abs=0.1)
 
 
 def test_frames_align_by_points_that_the_user_names(made, tmp_path):
@@ -312,6 +339,18 @@ def test_a_swing_that_dies_out_is_no_rest():
     dwells = find_dwells(Stream(None, t, np.arange(len(t)), position), np.zeros(0))
     assert len(dwells) == 1 and 2.5 < dwells.begin_s[0] < 7.0
     assert np.abs(dwells.position).max() < 1e-4
+
+
+@pytest.mark.parametrize("begin", [0.0, 1234.5, 1.7e9])
+def test_rounded_times_do_not_make_an_interval_longer(begin: float) -> None:
+    """Differences of 0.1 s were a little more or less, and with it five of them than 0.5 s."""
+    t = begin + np.round(np.arange(0.0, 30.0, 0.1), 6)
+    place = np.stack([np.repeat(np.arange(10.0), 30), 0 * t, 0 * t], axis=1)
+    place[[29, 59, 89]] += 0.5
+    dwells = find_dwells(Stream(None, t, np.arange(len(t)), place), np.zeros(0))
+    assert len(dwells) == 10
+    with pytest.raises(InputFileError, match=r"got one every 0.11 s; log faster, give --rest-for"):
+        find_dwells(Stream(Path("log"), 1.1 * t, np.arange(len(t)), place), np.zeros(0))
 
 
 @pytest.mark.parametrize("rate", [10, 100])

@@ -37,3 +37,17 @@ def test_another_load_is_another_command(
         t_s=np.arange(float(ROWS)) if timed else None,
     )  # fmt: skip
     assert held_commands(log, 0.5, 0.0, float(ROWS)).row.tolist() == rows
+
+
+@pytest.mark.parametrize("begin", [0.0, 1234.5, 1.7e9])
+def test_a_command_held_just_long_enough_counts_though_times_are_rounded(begin: float) -> None:
+    rows = 40
+    pose = np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (rows, 1))
+    pose[:, 0] = np.arange(rows)
+    log = Measurements(
+        path=Path("log.csv"), n_cables=2, run=np.full(rows, "a"), command_pose=pose,
+        t_s=begin + 0.1 * np.arange(rows),
+    )  # fmt: skip
+    end = float(log.t_s[-1]) + 1.0
+    assert held_commands(log, 0.1, 0.0, end).row.tolist() == list(range(rows))
+    assert held_commands(log, 0.11, 0.0, end).row.tolist() == [rows - 1]

@@ -188,7 +188,8 @@ def test_a_name_is_guessed_by_its_spelling_alone(write: Write, robot: Robot):
         "several conventions: here a rotation is meas_rx_deg meas_ry_deg meas_rz_deg with "
         "R = Rx(rx) Ry(ry) Rz(rz), or the quaternion meas_qw meas_qx meas_qy meas_qz." in notes
     )
-    assert "Not used: tension_A_N, operator." in notes
+    assert "Column tension_A_N is not used: the robot's cables are 1 (cable1), " in notes
+    assert "Not used: operator." in notes
     with pytest.raises(InputFileError, match=r"no measurement; .*R = Rx\(rx\) Ry\(ry\) Rz\(rz\)"):
         load_measurements(write(f"{CMD},meas_yaw_deg", "0,0,0,1"), robot)
 
@@ -285,11 +286,12 @@ REFUSED = {
     "heavier than all cables bear": (
         [LOADED, "a,0,0,0,0,1e9"],
         r"line 2, column payload_kg: expected a load that the cables of this robot can carry, at "
-        r"most [\d.e+]+ kg, got 1e\+09 kg$",
+        r"most [\d.e+]+ kg, got 1e\+09 kg; is it in g\? Name the column payload_g$",
     ),
     "a force of giganewtons": (
         [f"{POSE},force_z_kN", "a,0,0,0,0,-1e6"],
-        r"line 2, column force_z_kN: expected a load .* at most [\d.e+]+ N, got -1e\+09 N$",
+        r"line 2, column force_z_kN: expected a load .* at most [\d.e+]+ N, got "
+        r"-1e\+09 N; is it in N\? Name",
     ),
     "moment in newtons": (
         [f"{POSE},moment_x_N", "a,0,0,0,0,1"],

@@ -283,3 +283,20 @@ def test_commands_that_were_made_are_as_if_read(csv_file, robot):
     assert rest.line.tolist() == [2, 4] and rest.command_lengths.tolist() == [[0.5] * 4] * 2
     with pytest.raises(InputError, match="commands of several clocks; expected those of one file"):
         commands_of(replace(made, clock=np.arange(3)), robot)
+
+
+def test_cables_are_read_by_their_names_too(csv_file, robot):
+    """Tensions by name were left out without a word, lengths were "no command"."""
+    header = ["cable3", "cable1", "cable2", "cable4"]
+    lengths = ",".join(f"length_{name}_mm" for name in header)
+    path = csv_file(f"{lengths},tension_cable2_N,tension_4_N", "1303,1301,1302,1304,7,9")
+    data = load_measurements(path, robot)
+    assert data.command_lengths[0] == pytest.approx([1.301, 1.302, 1.303, 1.304])
+    assert np.array_equal(data.tensions[0], [np.nan, 7.0, np.nan, 9.0], equal_nan=True)
+    twice = csv_file(f"{CMD},tension_cable2_N,tension_2_N", "0,0,0,7,7")
+    with pytest.raises(InputFileError, match="column tension_2_N: says the same as ten"):
+        load_measurements(twice, robot)
+    bare = csv_file(f"{CMD},tension_cable2_kg", "0,0,0,7")
+    expected = "unknown unit 'kg'; expected tension_cable2_N or tension_cable2_kN"
+    with pytest.raises(InputFileError, match=expected):
+        load_measurements(bare, robot)

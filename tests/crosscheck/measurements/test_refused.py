@@ -230,7 +230,18 @@ REFUSED = {
     ),
     "length zero": (
         [LENGTHS + ",meas_x_m", "1,1,0,1,0"],
-        "line 2, column length_3_m: expected a length above zero, got 0 m",
+        "line 2, column length_3_m: expected a length above zero, got 0 m: it is all of the cable "
+        "from its exit point on; to changes since the reference pose add its rest length there, "
+        '1.3 m, and put lengths = "told" into measured.toml$',
+    ),
+    "changes of lengths": (
+        [LENGTHS.replace("_m", "_mm") + ",meas_x_m", "12,-51.5,3,4,0"],
+        r"column length_2_mm: expected a length above zero, got -51\.5 mm: .* there, 1300 mm, and",
+    ),
+    "a cable of another name": (
+        [LENGTHS.replace("length_3", "length_rear") + ",meas_x_m", "1,1,1,1,0"],
+        r"expected all 4 cables of the robot, length_3_m missing \(Column length_rear_m is not "
+        r"used: the robot's cables are 1 \(cable1\), 2 \(cable2\), .*, by number or name\)$",
     ),
     "norm": (
         [QUAT, "0,0,0,1,0,0,0", "0,0,0,0.9,0,0,0"],

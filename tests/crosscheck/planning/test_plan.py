@@ -14,13 +14,14 @@ from crosscheck.fit.effects.candidates import Trials, null_fit, try_candidate
 from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.together import together
-from crosscheck.planning.adding import Adding
+from crosscheck.planning.adding import MORE_POSES, Adding
+from crosscheck.planning.choosing import choose_poses
 from crosscheck.planning.design import make_plan
 from crosscheck.planning.extensions import extensions
 from crosscheck.planning.greedy import Wanted, chosen_poses
-from crosscheck.planning.places import more_poses
+from crosscheck.planning.places import more_poses, taut_first
 from crosscheck.planning.planned import Reads, near_slack, planned
-from crosscheck.planning.proposer import MORE_POSES, NEEDED, telling_apart
+from crosscheck.planning.proposer import NEEDED, telling_apart
 from crosscheck.planning.visibility import (
     needed,
     signal_left,
@@ -31,6 +32,7 @@ from crosscheck.planning.visibility import (
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Terms
+from seecr.equilibrium.solving import solve
 from seecr.files import json_text
 from seecr.pose import rotvec_from_quat
 from seecr.workspace.zones import feasible
@@ -323,3 +325,39 @@ def test_poses_to_add_are_listed_where_they_are_said_to_be(robot, commands):
             *item.places
         ]
     assert listed
+
+
+@pytest.mark.parametrize("name", ["planar_vertical", "demobot_cogiro"])
+def test_chosen_and_proposed_poses_leave_no_cable_slack(name: str) -> None:
+    """Half of them did: tensions could hold the platform there, commanded lengths did not."""
+    robot = load_robot(model_path(name))
+    chosen = choose_poses(robot, 20)
+    found = make_plan(robot, chosen)
+    poses = next(s for s in found.suggestions if s.kind == "poses")
+    assert poses.commands is not None
+    for commands in (chosen, poses.commands):
+        assert not solve(robot, commands.command_pose).slack.any()
+    assert found.loose == () and set(poses.slack) == {()}
+    assert not any("slack" in text for text in (*found.notes, *poses.places))
+
+
+def test_where_cables_are_slack_is_said_if_there_are_no_other_poses() -> None:
+    robot = load_robot(model_path("planar_vertical"))
+    high = np.tile(robot.reference_pose, (8, 1))
+    high[:, 0] += np.linspace(-0.1, 0.1, 8)
+    high[4:, 2] = robot.exit_points[:, 2].max() - 0.03
+    found = make_plan(robot, high)
+    slack = solve(robot, high).slack
+    names = np.array(robot.cable_names)
+    rows = np.flatnonzero(slack.any(axis=1))
+    assert 0 < len(rows) < 8
+    lines = tuple((int(k) + 2, tuple(names[slack[k]].tolist())) for k in rows)
+    assert found.loose == lines
+    said = (
+        f"cables are slack at {len(rows)} of 8 poses: line {lines[0][0]} ({' '.join(lines[0][1])})"
+    )
+    assert said in " ".join(found.notes)
+    assert found.as_json()["slack"][0] == {"line": lines[0][0], "cables": list(lines[0][1])}
+    good, loose = np.ones(8, dtype=bool), slack.any(axis=1)
+    assert taut_first(found.planned, good, 8 - len(rows)).tolist() == (~loose).tolist()
+    assert taut_first(found.planned, good, 9 - len(rows)).all()

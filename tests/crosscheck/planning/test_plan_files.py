@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from crosscheck.planning.adding import Adding
-from crosscheck.planning.write import sometimes_written
+from crosscheck.planning.proposer import Suggestion
+from crosscheck.planning.write import _slack_remark, sometimes_written
 
 OWN = {"poses.csv", "poses.toml"}
 
@@ -31,3 +32,10 @@ def test_poses_are_removed_only_if_the_older_plan_wrote_them(tmp_path: Path) -> 
 def test_a_file_that_is_no_plan_says_nothing(tmp_path: Path, text: str) -> None:
     (tmp_path / "plan.json").write_text(text)
     assert not OWN & set(sometimes_written(tmp_path, None))
+
+
+def test_lines_that_leave_cables_slack_are_remarked_in_the_file_itself() -> None:
+    """Below the remark and the header, lines count from 3."""
+    item = Suggestion(Adding.POSES, "", (), slack=((), ("a", "b"), (), ("c",)))
+    assert _slack_remark(item) == "cables are slack at line 4 (a b), line 6 (c)"
+    assert _slack_remark(Suggestion(Adding.POSES, "", (), slack=((), ()))) == ""

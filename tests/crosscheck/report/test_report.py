@@ -282,6 +282,32 @@ def test_the_title_above_a_narrow_map_is_whole(
                 assert box.y0 >= 0.0 and box.y1 <= figure.bbox.height, text
 
 
+@pytest.mark.parametrize("spread", [(2.0, 0.0, 1.0), (1.0, 0.01, 1.0), (0.1, 0.1, 1.0)])
+@pytest.mark.parametrize("alone", [True, False])
+def test_the_colours_of_a_map_stand_beside_it_and_nothing_is_empty(
+    spread: tuple[float, float, float], alone: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A quarter of the picture was empty between a wide map and its colours."""
+    kept: list[Figure] = []
+    monkeypatch.setattr(where, "image", lambda figure, _words: kept.append(figure))
+    found = diagnosis("pulleys")
+    assert found.search is not None
+    before, after = shown_stages(found)
+    for stage in (before, after):
+        pose = stage.state.prediction.pose.copy()
+        pose[:, :3] = np.random.default_rng(1).uniform(size=(len(pose), 3)) * spread
+        monkeypatch.setitem(stage.state.prediction.kept, "pose", pose)
+    failure_map(found.search.problem, before, before if alone else after)
+    (figure,) = kept
+    figure.draw_without_rendering()
+    *panels, bar = figure.axes
+    wide = figure.get_figwidth()
+    gap = bar.get_position().x0 - max(panel.get_position().x1 for panel in panels)
+    assert 0.0 < gap * wide < 0.3
+    box = figure.get_tightbbox(figure._get_renderer())  # type: ignore[attr-defined]
+    assert wide - box.x1 < 0.2 and box.y0 < 0.2
+
+
 def test_partial_data_show_what_they_have() -> None:
     position = text_of(page("position_only"))
     assert "rms position error [mm]" in position
@@ -358,7 +384,10 @@ def test_a_bound_and_a_blind_parameter_are_flagged() -> None:
     finding = replace(found.missing[0], at_bound=np.array([True]), stderr=np.array([np.inf]))
     (row,) = finding_card(found, finding).parameters
     assert row.flags == "at its bound, not determined by these data"
-    assert row.stderr == "undetermined"
+    assert row.stderr == "undetermined" and float(row.value) != 0.0  # its bound
+    blind = replace(found.missing[0], stderr=np.array([np.inf]))
+    (row,) = finding_card(found, blind).parameters
+    assert row.flags == "not determined by these data" and row.value == ""
     assert "at its bound" not in text_of(page("pulleys"))
 
 

@@ -66,6 +66,14 @@ def test_only_what_reaches_the_needed_signal_is_proposed_and_three_gains_are_tol
     assert [line for line in found.lines() if line.startswith("add")] == ["add: turn it"]
 
 
+def test_poses_that_leave_cables_slack_name_these() -> None:
+    two = np.concatenate([TURNED, TURNED])
+    add = Suggestion(Adding.POSES, "", (), two, slack=((), ("cable2", "cable7")))
+    assert [place.partition(" deg")[2] for place in add.places] == ["", ", slack: cable2 cable7"]
+    assert add.as_json()["slack"] == ((), ("cable2", "cable7"))
+    assert Suggestion(Adding.PAYLOAD, "", ()).as_json()["slack"] is None
+
+
 def test_cables_near_slack_are_listed_up_to_five() -> None:
     slack = tuple((line, "cable1") for line in range(2, 9))
     (line,) = [line for line in printed(plan(slack=slack)) if line.startswith("Close to the limit")]

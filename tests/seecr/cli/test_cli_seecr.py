@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from seecr.cli import COMMANDS, main
-from seecr.cli.arguments import robot_at
+from seecr.cli.arguments import robot_at, scalar_last
 from seecr.columns.command_file import read_commands
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
@@ -262,10 +262,15 @@ def test_export_tells_of_the_model_and_of_an_earlier_file_also_as_json(tmp_path:
     said = json.loads(run("export", "demobot_cogiro", out, "--model", model, "--json").stdout)
     assert said["exit_status"] == 0 and len(said["files"]) == 2
     assert said["notes"] == [f"{model} does not say which robot it was made for"]
+    alone = tmp_path / "out-mujoco.xml"
+    assert alone.exists()
     later = json.loads(run("export", "demobot_cogiro", out, "--json").stdout)
-    note = "out-mujoco.xml is of an earlier export: now no such file is needed"
+    note = "out-mujoco.xml of an earlier export removed: now no such file is needed"
     assert later["files"] == [str(out)] and later["notes"] == [note]
-    assert note in run("export", "demobot_cogiro", out).stdout.splitlines()
+    assert not alone.exists()
+    alone.write_text("<mujoco><!-- for MuJoCo alone, by hand --></mujoco>")
+    note = "out-mujoco.xml is of no export: it stays, though no such file is needed now"
+    assert note in run("export", "demobot_cogiro", out).stdout.splitlines() and alone.exists()
 
 
 def test_negative_numbers_are_coordinates() -> None:
@@ -598,3 +603,37 @@ def test_where_there_is_no_answer_no_others_are_spoken_of() -> None:
     result = CliRunner().invoke(main, ["pose", "camera", *place])
     assert result.exit_code == 3 and "no answer: a cable would have no length" in result.output
     assert "other stable equilibrium" not in result.output
+
+
+TURNED = "quaternions are scalar first: 0 0 0 1 turns the platform by 180 deg about z from its "
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        ["pose", "demobot_cogiro", *PLACE, "0", "0", "0", "1", "--alone"],
+        ["sweep", "demobot_cogiro", "--line", *PLACE, "0.2", "0.2", "0.15", "--turned", *"0001",
+         "--no-recording", "--figure", "none"],
+        ["export", "demobot_cogiro", "there.xml", *PLACE, *"0001", "--model", "m.toml"],
+    ],
+)  # fmt: skip
+def test_a_scalar_that_seems_to_be_last_is_noted(
+    args: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The identity with its scalar last had been half a turn without a word."""
+    monkeypatch.chdir(tmp_path)
+    model = '[[effect]]\nname = "pulley_radius"\nparameters.radius_m = 0.001\n'
+    (tmp_path / "m.toml").write_text(model)
+    said = run(*args)
+    assert f"{TURNED}reference pose; if the scalar is last there, write 1 0 0 0" in said.stdout
+    assert "scalar first" not in run("pose", "demobot_cogiro", *PLACE, *"1000", "--alone").stdout
+
+
+def test_scalars_are_last_where_that_turns_less_than_a_right_angle_and_in_all_rows() -> None:
+    robot = load_robot(model_path("demobot_cogiro"))
+    tilted = [0.0, 0.0, np.sin(0.3), np.cos(0.3)]
+    (said,) = scalar_last(robot, [tilted, [0.0, 0.0, 0.0, 1.0]])
+    assert "0 0 0.2955 0.9553 turns the platform by 180 deg from its" in said
+    half = [0.0, 0.0, np.sin(0.4), np.cos(0.4)]  # 46 degrees
+    assert scalar_last(robot, [half]) == scalar_last(robot, [tilted, [1.0, 0.0, 0.0, 0.0]]) == ()
+    assert scalar_last(robot, [[0.0, 1.0, 0.0, 0.0]]) == scalar_last(robot, []) == ()

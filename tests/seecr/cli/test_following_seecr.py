@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import shlex
+import subprocess
 import sys
 from pathlib import Path
 
@@ -152,3 +154,26 @@ def test_where_no_pose_can_be_corrected_the_workspace_is_named(
     lost = run("seecr", "correct", "demobot_cogiro", "p.csv", "--lowest", "1e9")
     assert lost.exit_code == 3
     assert lost.stdout.splitlines()[-1] == "next: seecr map demobot_cogiro"
+
+
+@pytest.mark.parametrize("given", ["/dev/stdin", "/dev/fd/63", "pipe"])
+def test_what_came_through_a_pipe_is_not_named_again(given: str, tmp_path: Path) -> None:
+    """Standard input was to be read twice."""
+    os.mkfifo(tmp_path / "pipe")
+    saved = "  # INPUT: what came through the pipe, saved as a file"
+    line = next_line("seecr", "map", tmp_path / given, "--turned", 1)
+    assert line.split(" ", 1)[1].partition("map")[2] == f" INPUT --turned 1{saved}"
+    assert next_line("seecr", "map", Path("a.csv")).endswith("map a.csv")
+
+
+@pytest.mark.skipif(not Path("/dev/stdin").exists(), reason="no standard input with a path here")
+def test_a_dash_is_standard_input(tmp_path: Path) -> None:
+    """It was no such file."""
+    text = "cmd_x_m,cmd_y_m,cmd_z_m\n0.3,0.25,0.15\n0.35,0.25,0.15\n"
+    args = ["-m", "seecr", "sweep", "demobot_cogiro", "-", *QUIET, "--out", str(tmp_path / "out")]
+    done = subprocess.run(
+        [sys.executable, *args], input=text, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "demobot_cogiro: 2 of 2 poses at rest" in done.stdout
+    assert " correct demobot_cogiro INPUT  # INPUT: what came" in done.stdout

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from seecr.columns.names import meant_by, other_rotations, unused_note
+from seecr.columns.names import (
+    meant_by,
+    no_cable_note,
+    numbered,
+    of_no_cable,
+    other_rotations,
+    unused_note,
+)
 
 POSITION = ("cmd_x_m", "cmd_y_m", "cmd_z_m")
 
@@ -54,3 +61,35 @@ def test_one_column_is_not_several() -> None:
     assert one.startswith("Column yaw is not used, because ")
     assert several.startswith("Columns roll yaw are not used, because ")
     assert rest == "Not used: a, b." and unused_note([], []) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "same"),
+    [
+        ("length_left_mm", "length_1_mm"),
+        ("tension_upper_left_N", "tension_2_N"),
+        ("tension_upper_N", "tension_3_N"),
+        ("tension_left", "tension_1"),
+        ("tension_4_N", "tension_4_N"),  # the fourth, though the first has that name
+        ("tension_Left_N", "tension_Left_N"),
+        ("tension_left_stderr_N", "tension_left_stderr_N"),
+        ("meas_left_m", "meas_left_m"),
+    ],
+)
+def test_a_cable_is_its_number_or_its_name(name: str, same: str) -> None:
+    assert numbered(name, ("left", "upper_left", "upper", "1")) == same
+
+
+def test_what_is_of_no_cable_is_said_with_those_there_are() -> None:
+    results = ["tension_1_stderr_N", "length_scale_of_all", "cmd_x_m", "tensions_N"]
+    assert of_no_cable(["length_rear_mm", "tension_rear", *results]) == [
+        "length_rear_mm", "tension_rear",
+    ]  # fmt: skip
+    assert no_cable_note(["length_rear_mm"], ("left", "right")) == [
+        "Column length_rear_mm is not used: the robot's cables are 1 (left), 2 (right), by number "
+        "or name."
+    ]
+    assert no_cable_note(["length_a_m", "length_b_m"], ("left",))[0].startswith(
+        "Columns length_a_m, length_b_m are not used: "
+    )
+    assert no_cable_note([], ("left",)) == []

@@ -11,6 +11,7 @@ import seecr
 from seecr.description.shipped import model_path
 from seecr.effects import Term
 from seecr.equilibrium.passes import Barrier
+from seecr.pose import quat_from_rotvec
 from seecr.prediction.uncertainty import Spread
 from seecr.report.words import (
     SAGS,
@@ -212,3 +213,41 @@ def test_frequencies_say_that_cables_have_no_inertia_where_that_matters() -> Non
         "the frequencies by their inertia"
     ]
     assert not any("of the platform alone" in line for line in pose_lines(light))
+
+
+def test_in_a_plane_the_turn_is_one_angle() -> None:
+    """A bar upside down was turned by rx ry rz 180, -11.66, 180 deg."""
+    robot = seecr.load_robot(model_path("planar_vertical"))
+    over = np.array([*robot.reference_pose[:3], *quat_from_rotvec(np.radians([0.0, 168.34, 0.0]))])
+    found = replace(seecr.solve(robot, [robot.reference_pose]), pose=over[None])
+    text = "\n".join(pose_lines(found))
+    assert " mm, turned about y by 168.340 deg\n" in text and "rx" not in text
+    down = replace(robot.joints[2], axis=np.array([0.0, -1.0, 0.0]))
+    other = replace(found, robot=replace(robot, joints=(*robot.joints[:2], down)))
+    assert "turned about y by 168.340 deg" in "\n".join(pose_lines(other))
+    askew = replace(robot.joints[2], axis=np.array([0.6, 0.8, 0.0]), name="tilt")
+    leaning = np.array([*over[:3], *quat_from_rotvec(np.radians(-30.0) * askew.axis)])
+    robot = replace(robot, joints=(*robot.joints[:2], askew))
+    lean = replace(found, robot=robot, pose=leaning[None])
+    assert "turned about tilt by -30.000 deg" in "\n".join(pose_lines(lean))
+    turned = np.radians([[0.0, 0.02, 0.0]])
+    seen = np.concatenate([np.zeros((1, 3)), turned], axis=1)
+    spread = Spread(np.zeros((1, 3)), turned, np.ones((1, 4)), seen)
+    assert "turned about y by 168.340 deg" in "\n".join(pose_lines(found, spread))
+
+
+def test_three_other_equilibria_are_listed_twisted_ones_last() -> None:
+    """Ten lines of twisted ones had stood between the pose and what to do next."""
+    robot = seecr.load_robot(model_path("demobot_parallel"))
+    found = seecr.solve(robot, [robot.reference_pose])
+    turned = np.tile(robot.reference_pose, (5, 1))
+    turned[:, 0] += [0.1, 0.11, 0.12, 0.13, 0.14]
+    rests = replace(seecr.solve(robot, turned), energy=np.zeros(5))
+    pose = rests.pose.copy()
+    pose[:2, 3:] = [0.0, 0.0, 0.0, 1.0]
+    *lines, more = other_lines(found, replace(rests, pose=pose))
+    away = np.linalg.norm(pose[2:, :3] - found.pose[0, :3], axis=1)
+    for line, metres in zip(lines, away, strict=True):
+        assert line.startswith(f"could also rest {1e3 * metres:.4g} mm and ")
+    assert more == "and at 2 more places, all of them with --json"
+    assert len(list(other_lines(found, replace(rests, pose=pose).rows([0, 2, 3])))) == 3
