@@ -16,6 +16,7 @@ from crosscheck.fit.preparation.freed import freed
 from crosscheck.fit.preparation.parts import groups_of, laid_out
 from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.fit.suspect_data.another_robot import another_robot_doubts
+from crosscheck.fit.suspect_data.conventions import misread_orientations
 from crosscheck.fit.suspect_data.exchanged_columns import exchange_doubts
 from crosscheck.fit.suspect_data.tension_unit import tension_doubts
 from crosscheck.measurements.data import Measurements
@@ -102,8 +103,23 @@ def prepare(
         *said,
     )
     problem = problem.with_groups(groups_of(data, terms))
-    refusal = refusal_of(problem, plain.pose[:, :3], data.sigma)
+    refusal = refusal_of(problem, plain.pose[:, :3], data.sigma) or _misread(problem, plain)
     return Prepared(problem, terms, notes, blocks_note(problem), refusal, int(found.free.sum()))
+
+
+def _misread(problem: Problem, plain: Prediction) -> Refusal | None:
+    """A refusal if orientations are of another convention: what is off then is no effect."""
+    found = misread_orientations(problem, plain.readings)
+    if found is None:
+        return None
+    return Refusal(
+        Unfit.OTHER_CONVENTION,
+        problem.data.n_rows,
+        off=found.off,
+        left=found.left,
+        convention=found.convention.value,
+        file=f" of {found.file}" if found.file else "",
+    )
 
 
 def _filled_in(problem: Problem) -> list[str]:
