@@ -116,8 +116,8 @@ def test_no_effect_is_taken_for_a_convention(name: str, deg: float) -> None:
 
 
 def test_a_platform_that_tilts_the_other_way_is_no_convention() -> None:
-    """Its centre of mass is on the other side: all rotations are the opposite of those expected."""
-    there, here = (term(COGIRO, "centre_of_mass", shift_x_m=x) for x in (0.02, -0.02))
+    """A drum is too large, not too small: all rotations are the opposite of those expected."""
+    there, here = (term(COGIRO, "drum_gain", gain_3=x) for x in (0.02, -0.02))
     data = tilting((there,), deg=0.0)
     problem = Problem(COGIRO, data, data.sigma, np.ones(data.n_rows, dtype=bool))
     expected = problem.experiment.predict(Terms((here,)).effects).readings
