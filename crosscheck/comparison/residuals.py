@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.comparison.associations import associations
 from crosscheck.comparison.coloured import coloured_noise
+from crosscheck.comparison.outliers import rows_far_off
 from crosscheck.comparison.quantities import channels
 from crosscheck.comparison.result import Comparison, Coordinate, Group, UnsolvedRow, WorstRow
 from crosscheck.comparison.tracking import tracking
 from crosscheck.comparison.travel import Travel, regions_of, travel
 from crosscheck.fit.effects.contradictions import contradictions
-from crosscheck.fit.least_squares.problem import Problem, rms_by_kind
+from crosscheck.fit.least_squares.problem import Problem, Rms, kinds_read, rms_by_kind
 from crosscheck.fit.least_squares.state import State, evaluate
-from crosscheck.fit.noise.outliers import outlying_rows
 from crosscheck.fit.noise.whiteness import as_table, whiteness
-from crosscheck.fit.preparation.prepare import noise_floor, prepare
+from crosscheck.fit.preparation.prepare import Prepared, noise_floor, prepare
+from crosscheck.fit.words import rms_words
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
 from crosscheck.measurements.data import Names
 from crosscheck.measurements.read import GivenData, measurements_of
@@ -27,6 +29,9 @@ _MOST_WORST = 10
 
 def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Comparison:
     """Compare a model with measurements; only values that the data leave free are fitted.
+
+    All errors are those of all rows. What they depend on, and whether they are noise, is asked
+    without outliers.
 
     Args:
         robot: a robot, or its MJCF file.
@@ -39,8 +44,8 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
     robot = robot_of(robot)
     data = measurements_of(data, robot)
     terms, said = model_of(model, robot)
-    ready = prepare(robot, data, terms)
-    problem = ready.problem
+    ready = prepare(robot, data, terms, outliers=rows_far_off)
+    problem, outliers = ready.problem, _outliers_of(ready)
     # nothing is cross-validated here, so that the note about its blocks is left out
     notes = [*said, *contradictions(terms), *ready.notes]
     notes += [str(ready.refusal)] if ready.refusal else []
@@ -49,10 +54,13 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
     factor = problem.noise(plain)
     state = evaluate(problem, terms, factor)
     way = travel(problem, state.prediction)
-    some = problem.n_readings > 0
-    if some:
-        notes += _outliers(problem, state)
-    white = whiteness(problem, state.white, ready.fitted) if some else None
+    judged, left = problem, state
+    if outliers.any():
+        judged = problem.only(~outliers)
+        left = evaluate(judged, terms, factor, state)
+        notes.append(_outlier_note(problem, outliers, rms_by_kind(judged, state.raw)))
+    some = judged.n_readings > 0
+    white = whiteness(judged, left.white, ready.fitted) if some else None
     return Comparison(
         problem=problem,
         state=state,
@@ -63,22 +71,41 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
         runs=tuple(_groups(problem, state, data.run, data.runs)),
         directions=tuple(_groups(problem, state, way.direction)),
         regions=tuple(_groups(problem, state, regions_of(problem, way.pose))),
-        associations=tuple(associations(problem, state.white, state.prediction) if some else ()),
+        associations=tuple(associations(judged, left.white, left.prediction) if some else ()),
         worst=tuple(_worst(problem, state, way)),
         whiteness=white,
-        coloured=coloured_noise(problem, state, factor) if white and not white.is_noise else None,
+        coloured=coloured_noise(judged, left, factor) if white and not white.is_noise else None,
         unsolved=tuple(_unsolved(problem, state)),
         notes=tuple(dict.fromkeys(notes)),
+        times_noise=_times_noise(judged, left),
+        outliers=outliers,
+        rms_without=rms_by_kind(judged, state.raw),
         refusal=ready.refusal,
         tracking=tracking(problem, state),
     )
 
 
-def _outliers(problem: Problem, state: State) -> list[str]:
-    rows = outlying_rows(problem, state)
-    if not rows.any():
-        return []
-    return [f"{problem.data.lines_of(rows)}: possible outliers (included in all errors)"]
+def _outliers_of(ready: Prepared) -> NDArray[np.bool_]:
+    """(n,) outliers; of data without readings nobody looks for any."""
+    none = np.zeros(ready.problem.data.n_rows, dtype=bool)
+    return none if ready.far_off is None else ready.far_off
+
+
+def _outlier_note(problem: Problem, outliers: NDArray[np.bool_], without: Rms) -> str:
+    return (
+        f"{problem.data.lines_of(outliers)}: possible outliers, included in all errors (without "
+        f"them {rms_words(without)} rms), but not in what these depend on, nor in whether they are "
+        "noise"
+    )
+
+
+def _times_noise(problem: Problem, state: State) -> dict[str, float]:
+    """The rms of whitened residuals, by kind of reading."""
+    table = as_table(problem, state.white)
+    return {
+        kind.name: float(np.sqrt(np.nanmean(table[:, kind.columns] ** 2)))
+        for kind in kinds_read(problem)
+    }
 
 
 def _coordinates(problem: Problem, state: State) -> Iterator[Coordinate]:

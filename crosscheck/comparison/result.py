@@ -10,10 +10,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.coloured import Coloured
-from crosscheck.comparison.quantities import QuantityKind, channels
+from crosscheck.comparison.quantities import channels
+from crosscheck.comparison.sentence import misfit_sentence, noise_sentence, size_words
 from crosscheck.comparison.tracking import Tracking
 from crosscheck.comparison.travel import Travel
 from crosscheck.fit.least_squares.problem import (
@@ -128,6 +130,10 @@ class Comparison(Result):
         associations: what the errors are associated with, the strongest first.
         worst: rows with the largest errors, the worst first.
         whiteness: tests whether the residuals are noise; None if nothing could be compared.
+        times_noise: rms of the residuals over the noise, by kind of reading.
+        outliers: (n,) rows that ``associations``, ``whiteness``, ``coloured`` and ``times_noise``
+            leave out; all errors include them.
+        rms_without: errors by kind without outliers.
         coloured: the residuals as noise with autocorrelation or outliers; None if they are white
             noise, or no noise.
         unsolved: rows for which the model has no equilibrium.
@@ -152,6 +158,9 @@ class Comparison(Result):
     coloured: Coloured | None
     unsolved: tuple[UnsolvedRow, ...]
     notes: tuple[str, ...]
+    times_noise: dict[str, float]
+    outliers: NDArray[np.bool_]
+    rms_without: Rms
     refusal: Refusal | None = None
     tracking: Tracking | None = None
 
@@ -198,35 +207,24 @@ class Comparison(Result):
                 return said
             if errors_are_noise(self.problem, self.state.prediction):
                 return said  # so many times themselves says nothing
-            return f"{said} The errors are {w.scale:.3g} times the noise."
+            size = size_words(w.scale, self.times_noise)
+            return f"{said} {size[0].upper()}{size[1:]}."
         if w.is_noise:
-            times = f"{w.scale:.2f} times the {self._known_as} noise"
-            return f"Model and data agree: the residuals are noise ({times})."
-        if self.coloured is not None:
-            return f"Model and data agree: the residuals are noise ({self.coloured.words})."
-        size = f"the errors are {w.scale:.3g} times the noise"
-        if not w.structured:
-            return (
-                f"The residuals look random, but {size}: either it is {self._known_as} too small, "
-                "or many small effects are missing."
-            )
-        goes = self._goes_with()
-        return f"The model misses something: {size} and correlated between neighbouring rows{goes}."
+            said = noise_sentence(w, self._known_as, self.associations)
+        elif self.coloured is not None:
+            said = f"Model and data agree: the residuals are noise ({self.coloured.words})."
+        else:
+            said = misfit_sentence(w, self.times_noise, self._known_as, self.associations)
+        if not self.outliers.any():
+            return said
+        rows = counted(int(self.outliers.sum()), "outlier")
+        return f"{said} {rows} ({self.problem.data.lines_of(self.outliers)}) left out of this."
 
     @property
     def _known_as(self) -> str:
         """How the size of the noise is known."""
         stated = kinds_stated(self.problem) == kinds_read(self.problem)
         return "stated" if stated else "estimated"
-
-    def _goes_with(self) -> str:
-        strongest = next((a for a in self.associations if a.significant), None)
-        if strongest is None:
-            return ""
-        share = f"{100 * strongest.share:.0f} %"
-        if strongest.kind is QuantityKind.EVERYWHERE:
-            return f"; {share} of their mean square is a constant offset"
-        return f"; {strongest.against} explains {share} of their variance"
 
     def lines(self) -> list[str]:
         """The errors by kind beside the noise, and the verdict."""
@@ -264,11 +262,18 @@ class Comparison(Result):
             "model": {t.name: dict(zip(t.layout.names, t.vector, strict=True)) for t in self.terms},
             "rows": {"all": problem.data.n_rows, "compared": int(problem.use.sum())},
             "rms": self.rms,
+            "outliers": {
+                "rows": np.flatnonzero(self.outliers),
+                "lines": problem.data.line[self.outliers],
+                "rms_without": self.rms_without,
+            },
             "noise_floor": self.floor,
             "tracking": self.tracking,
             "sigma": problem.sigma,
             "coloured_noise": self.coloured,
-            "residual": None if w is None else {**vars(w), "structured": w.structured},
+            "residual": None
+            if w is None
+            else {**vars(w), "structured": w.structured, "times_noise": self.times_noise},
             "coordinates": self.coordinates,
             "runs": self.runs,
             "directions": self.directions,

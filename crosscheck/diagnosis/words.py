@@ -8,6 +8,7 @@ from crosscheck.diagnosis.chances import PROBABLE, Chances
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.fit.effects.possible import largest_size
 from crosscheck.fit.reasons import DiagnosisVerdict, probability_words
+from crosscheck.fit.words import rms_words
 from seecr.counted import counted
 from seecr.effects import Term
 
@@ -144,17 +145,21 @@ def none_of(tried: int) -> str:
 def _words_of(effect: MissingEffect) -> str:
     names = ", ".join(effect.indistinguishable)
     alike = f" (or {names}, indistinguishable on these data)" if names else ""
-    return f"adding {effect.effect}{alike} {removed(effect.share)}"
+    does = removed(effect.share)
+    if effect.share < _NO_SHARE:
+        does = f"leaves {rms_words(effect.rms)} on all rows, though it {does}"
+    return f"adding {effect.effect}{alike} {does}"
 
 
 def removed(share: float) -> str:
     """What an effect does to the error on held-out runs.
 
     Noise may have been stated too large, or be small by chance. Then all error is below it, and
-    what an effect explains of that is no share of the unexplained.
+    what an effect explains of that is no share of the unexplained. Or an effect predicts nothing
+    until the next one is in the model.
     """
     if share < _NO_SHARE:
-        return "explains error on held-out runs that is not larger than the noise"
+        return "removes no error beyond the noise on held-out runs by itself"
     return f"removes {percent(share)} of the unexplained error on held-out runs"
 
 

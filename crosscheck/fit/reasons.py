@@ -124,6 +124,10 @@ class Unfit(Enum):
         "readings contradict each other: lines {lines} have the same command but readings far "
         "apart, and so do others"
     )
+    OTHER_CONVENTION = (
+        "the measured orientations{file} are {off} from those that the model expects, and only "
+        "{left} if {convention}: they seem to be written by another convention"
+    )
     BLIND = "noise of {noise} would hide every effect, even at ten times its plausible size"
     NOTHING_TO_TRY = "none of the effects considered is visible in these data: {lacking}"
     UNSOLVED_MODEL = "some rows could not be solved with the model's values"
@@ -148,6 +152,9 @@ _REMEDIES = {
     Unfit.CONTRADICTION: "measure these poses again or remove the wrong rows; if the tracker or "
     "the winches were set up anew in between, put each set-up into a file of its own and use "
     "crosscheck add tracker_frame (or another effect) --per file",
+    Unfit.OTHER_CONVENTION: "write how the platform is turned as seen from the base: quaternions "
+    "with the scalar first (meas_qw meas_qx meas_qy meas_qz), or angles with "
+    "R = Rx(rx) Ry(ry) Rz(rz)",
     Unfit.BLIND: "check the stated noise and its units ([sigma] in the TOML beside the file is in "
     "metres and radians; or use --sigma position=0.1mm), or measure with less noise",
     Unfit.NOTHING_TO_TRY: "record what they need, or consider other effects",
@@ -168,6 +175,8 @@ class Refusal:
         lost: how many have no equilibrium. readings: how many readings are left.
         lines: lines of the file that show it. noise: noise of the readings, with units.
         lacking: effects, and what the data lack for each.
+        off, left: distances, with units, of orientations from those expected, as they stand and by
+            another convention. convention: which one. file: " of " and their file, of several.
     """
 
     unfit: Unfit
@@ -177,6 +186,10 @@ class Refusal:
     lines: str = ""
     noise: str = ""
     lacking: str = ""
+    off: str = ""
+    left: str = ""
+    convention: str = ""
+    file: str = ""
 
     @property
     def remedy(self) -> str:
@@ -199,6 +212,10 @@ class Refusal:
             lines=self.lines,
             noise=self.noise,
             lacking=self.lacking,
+            off=self.off,
+            left=self.left,
+            convention=self.convention,
+            file=self.file,
         )
 
 

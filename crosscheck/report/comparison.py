@@ -77,10 +77,11 @@ def _cells(found: Comparison, rms: Rms) -> list[str]:
 
 def _groups(found: Comparison) -> list[tuple[str, str, list[str]]]:
     """Name, rows and errors: of all rows, of noise, and of every run, travel and region."""
-    out = [
-        ("all rows", str(int(found.problem.use.sum())), _cells(found, found.rms)),
-        ("noise alone", "", _cells(found, found.floor)),
-    ]
+    out = [("all rows", str(int(found.problem.use.sum())), _cells(found, found.rms))]
+    if found.outliers.any():
+        rows = int((found.problem.use & ~found.outliers).sum())
+        out.append(("without outliers", str(rows), _cells(found, found.rms_without)))
+    out.append(("noise alone", "", _cells(found, found.floor)))
     every: Sequence[tuple[str, Sequence[Group]]] = (
         ("run", found.runs), ("travel", found.directions), ("region", found.regions),
     )  # fmt: skip

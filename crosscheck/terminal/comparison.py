@@ -66,6 +66,9 @@ def _errors(found: Comparison) -> Table:
     kinds = [k for k in KINDS if found.rms.get(k.key) is not None]
     table = table_of(["rms error", *(heading(k) for k in kinds), "rows"])
     _add(table, kinds, "all rows", found.rms, int(found.problem.use.sum()), "bold")
+    if found.outliers.any():
+        rows = int((found.problem.use & ~found.outliers).sum())
+        _add(table, kinds, "without outliers", found.rms_without, rows)
     _add(table, kinds, "noise alone", found.floor, "", "dim")
     for title, groups in (
         ("run", found.runs),

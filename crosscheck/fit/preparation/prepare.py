@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.fit.effects.held_out import blocks_note
 from crosscheck.fit.least_squares.problem import Problem, Rms, rms_by_kind
@@ -16,6 +17,7 @@ from crosscheck.fit.preparation.freed import freed
 from crosscheck.fit.preparation.parts import groups_of, laid_out
 from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.fit.suspect_data.another_robot import another_robot_doubts
+from crosscheck.fit.suspect_data.conventions import misread_orientations
 from crosscheck.fit.suspect_data.exchanged_columns import exchange_doubts
 from crosscheck.fit.suspect_data.tension_unit import tension_doubts
 from crosscheck.measurements.data import Measurements
@@ -26,6 +28,9 @@ from seecr.prediction.experiment import Prediction
 
 Progress = Callable[[str, float], None]
 """Called with what is being done and the fraction that is done, 0 to 1."""
+
+Finder = Callable[[Problem, Terms], NDArray[np.bool_]]
+"""Called with the data and the model as it stands; returns which rows (n,) are outliers."""
 
 # What a pose consists of, in words.
 _PARTS = ("x", "y", "z", *(f"rotation about {axis}" for axis in "xyz"))
@@ -42,6 +47,7 @@ class Prepared:
         blocks_note: which blocks cross-validation leaves out, if they are not whole runs; else "".
         refusal: why nothing can be said about these data; None if something can.
         fitted: how many values were fitted in advance because the data leave them free.
+        far_off: (n,) outliers, which count in none of the estimates; None if nobody looked for any.
     """
 
     problem: Problem
@@ -50,6 +56,7 @@ class Prepared:
     blocks_note: str
     refusal: Refusal | None
     fitted: int = 0
+    far_off: NDArray[np.bool_] | None = None
 
     @property
     def all_notes(self) -> tuple[str, ...]:
@@ -58,7 +65,11 @@ class Prepared:
 
 
 def prepare(
-    robot: Robot, data: Measurements, terms: Terms, considered: frozenset[str] | None = None
+    robot: Robot,
+    data: Measurements,
+    terms: Terms,
+    considered: frozenset[str] | None = None,
+    outliers: Finder | None = None,
 ) -> Prepared:
     """Leave out rows that have no equilibrium, estimate unstated noise, and fit what is free.
 
@@ -66,6 +77,7 @@ def prepare(
         robot, data: what was measured.
         terms: effects of the model as it stands.
         considered: names of the effects that may be missing; by default the whole catalogue.
+        outliers: finds outliers, without which noise is estimated; by default nobody looks for any.
     """
     considered = frozenset(catalogue()) if considered is None else considered
     every = np.ones(data.n_rows, dtype=bool)
@@ -83,8 +95,11 @@ def prepare(
     if found.free.any():
         plain = problem.experiment.predict(terms.effects)
         if estimates:  # the first residuals also contained the error of the frame
-            known = replace(problem, sigma=data.sigma)
-            problem, estimates = estimate_sigma(known, plain)
+            problem, estimates = estimate_sigma(problem.with_sigma(data.sigma), plain)
+    far_off = None if outliers is None else outliers(problem, terms)
+    if far_off is not None and far_off.any() and estimates:
+        others, estimates = estimate_sigma(problem.only(~far_off).with_sigma(data.sigma), plain)
+        problem = problem.with_sigma(others.sigma)
     odd = [
         *another_robot_doubts(problem, plain.readings),
         *tension_doubts(problem, plain),
@@ -102,8 +117,25 @@ def prepare(
         *said,
     )
     problem = problem.with_groups(groups_of(data, terms))
-    refusal = refusal_of(problem, plain.pose[:, :3], data.sigma)
-    return Prepared(problem, terms, notes, blocks_note(problem), refusal, int(found.free.sum()))
+    refusal = refusal_of(problem, plain.pose[:, :3], data.sigma) or _misread(problem, plain)
+    return Prepared(
+        problem, terms, notes, blocks_note(problem), refusal, int(found.free.sum()), far_off
+    )
+
+
+def _misread(problem: Problem, plain: Prediction) -> Refusal | None:
+    """A refusal if orientations are of another convention: what is off then is no effect."""
+    found = misread_orientations(problem, plain.readings)
+    if found is None:
+        return None
+    return Refusal(
+        Unfit.OTHER_CONVENTION,
+        problem.data.n_rows,
+        off=found.off,
+        left=found.left,
+        convention=found.convention.value,
+        file=f" of {found.file}" if found.file else "",
+    )
 
 
 def _filled_in(problem: Problem) -> list[str]:

@@ -13,7 +13,7 @@ from crosscheck.calibration.unknown.varying import Varying
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.explained import _sentence
 from crosscheck.diagnosis.result import MissingEffect
-from crosscheck.diagnosis.words import doubts_about, hints_of, noise_left, one_of, removed
+from crosscheck.diagnosis.words import doubts_about, hints_of, noise_left, one_of, removed, words_of
 from crosscheck.fit.reasons import DiagnosisVerdict
 
 
@@ -91,9 +91,24 @@ def test_what_a_field_could_replace_is_told_if_that_is_not_excluded() -> None:
 
 def test_where_all_error_is_below_the_noise_no_share_of_it_is_told() -> None:
     """Points that moved were "removes 0 %", beside errors that fell."""
-    assert removed(0.0) == "explains error on held-out runs that is not larger than the noise"
+    assert removed(0.0) == "removes no error beyond the noise on held-out runs by itself"
     assert removed(0.526) == "removes 52.6 % of the unexplained error on held-out runs"
     assert "removes 0.1 %" in removed(0.001)
+
+
+def test_an_effect_that_predicts_only_with_the_next_one_tells_what_it_leaves_on_all_rows() -> None:
+    """Certain effects "explained error that is not larger than the noise", of millimetres."""
+    names = ("centre_of_mass", "platform_mass")
+    left = {"position_rms_m": 0.00221, "orientation_rms_rad": None, "tension_rms_N": None}
+    first, then = (
+        cast(MissingEffect, SimpleNamespace(effect=n, indistinguishable=[], share=s, rms=left))
+        for n, s in zip(names, (0.0, 0.9997), strict=True)
+    )
+    assert words_of([first, then]) == (
+        "adding centre_of_mass leaves 2.21 mm on all rows, though it removes no error beyond the "
+        "noise on held-out runs by itself; then adding platform_mass removes 99.9 % of the "
+        "unexplained error on held-out runs"
+    )
 
 
 def test_what_data_do_not_tell_apart_is_told_with_what_to_do_about_each() -> None:
