@@ -26,7 +26,7 @@ from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.holding.balance import balance_of, bends
 from seecr.holding.distribution import tension_limits
-from seecr.holding.inside import farthest_inside
+from seecr.holding.inside import margins_inside
 from seecr.pose import Array, all_finite, quat_rotate, transform_points
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.result import Record, Result
@@ -126,7 +126,9 @@ def tension_margin(
 
     It is exact: the largest t with lowest + t <= tau <= highest - t and W tau + w_e = 0. It is
     negative if tensions within bounds cannot balance the load, and infinite if cables can be
-    tightened without limit.
+    tightened without limit. A cable with weight pulls at least about what it weighs; if a pose can
+    only be held with less, by cables that hang loosely, the margin is zero, and negative ones count
+    from what such cables weigh.
 
     Args:
         robot: as described, or its MJCF; its mass, centre of mass and gravity are the load.
@@ -201,7 +203,7 @@ def margins_with(
         tables = _pushed(tables, wrench)
     some = np.zeros((1, 6)) if wrenches is None else wrenches_of(wrenches)
     if bends(tables):
-        every = [farthest_inside(_pushed(tables, one), low, high).margins for one in some]
+        every = [margins_inside(_pushed(tables, one), low, high) for one in some]
         return np.asarray(np.min(every, axis=0))
     matrices, load = balance_of(tables, low)
     # load of -W tau = w: the signs are those of the gradient
