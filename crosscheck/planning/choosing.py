@@ -13,6 +13,7 @@ from crosscheck.fit.prepare import Progress
 from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.planning.adding import NO_LIMITS, Limits
+from crosscheck.planning.arguments import box_given, limits_given
 from crosscheck.planning.greedy import Wanted, chosen_poses
 from crosscheck.planning.places import held_within, tilted_grid, trustworthy
 from crosscheck.planning.planned import Planned, Reads, expected_sigma, kinds_of, planned
@@ -45,7 +46,7 @@ def choose_poses(
     rows: int,
     *,
     sigma: Sigma | None = None,
-    reads: Collection[str] = (),
+    reads: Collection[str] | str = (),
     limits: Limits = NO_LIMITS,
     box: Array | None = None,
     progress: Progress = lambda _text, _part: None,
@@ -66,9 +67,11 @@ def choose_poses(
 
     Raises:
         CrosscheckError: the robot can hold too few poses within the limits.
-        InputError: ``rows`` is not a whole number from 1 on.
+        InputError: ``rows`` is not a whole number from 1 on; limits or a box of another form, or
+            reversed.
     """
     robot, rows = robot_of(robot), whole(rows, "rows", least=1)
+    limits, box = limits_given(limits), box_given(box)
     progress("looking for poses", 0.0)
     kinds = kinds_of(reads, sigma or Sigma())
     full, _assumed = expected_sigma(robot, sigma or Sigma(), kinds)
@@ -81,7 +84,7 @@ def choose_poses(
         plan = _usable(robot, tried, full, channels, limits)
         found = 0 if plan is None else plan.problem.data.n_rows
     if plan is None or found < rows:
-        cure = "ask for fewer --rows, a wider range of tensions, or another --box"
+        cure = "ask for fewer rows, a wider range of tensions, or another box"
         raise CrosscheckError(
             f"robot {robot.name} can be held at {found} of {counted(len(tried), 'pose')} that "
             f"were tried; expected {rows} or more; {ITS_A_POINT if robot.is_point else cure}"

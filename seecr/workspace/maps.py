@@ -18,7 +18,7 @@ from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
-from seecr.pose import Array
+from seecr.pose import NORM_TOLERANCE, Array
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.prediction.model import GivenEffects
 from seecr.statics.starts import commanded_poses
@@ -81,6 +81,11 @@ def _quaternion(values: ArrayLike) -> Array:
     array = finite(values, "orientation")
     if array.shape != (4,):
         raise InputError(f"orientation must be (4,), qw qx qy qz, got {array.shape}")
+    norm = float(np.linalg.norm(array))
+    if abs(norm - 1.0) > NORM_TOLERANCE:
+        raise InputError(
+            f"orientation: expected a unit quaternion qw qx qy qz, got one of norm {norm:.4g}"
+        )
     return np.asarray(commanded_poses(np.concatenate([np.zeros(3), array]), "orientation")[0, 3:])
 
 

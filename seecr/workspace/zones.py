@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seecr.arguments import finite
+from seecr.arguments import finite, numbers
 from seecr.commands.data import Commands
 from seecr.compiled.columns import EXTERNAL_FORCE, EXTERNAL_MOMENT
 from seecr.counted import counted
@@ -295,7 +295,7 @@ def _by_rank(matrices: Array, loads: Array, low: Array, high: Array, scale: floa
 
 
 def _wrench(value: ArrayLike, n: int) -> Array:
-    wrench = np.asarray(value, float)
+    wrench = numbers(value, "wrench")
     if wrench.shape not in ((6,), (n, 6)) or not all_finite(wrench):
         raise InputError(f"wrench must be (6,) or ({n}, 6) finite numbers, got {wrench.shape}")
     return wrench
@@ -305,12 +305,14 @@ def wrenches_of(values: ArrayLike) -> Array:
     """A set of wrenches (k, 6) [N, N m].
 
     Raises:
-        InputError: another shape, or numbers that are not finite.
+        InputError: another shape, none, or numbers that are not finite.
     """
-    some = np.atleast_2d(np.asarray(values, float))
-    if some.ndim != 2 or some.shape[1] != 6:
-        raise InputError(f"wrenches must be (k, 6) [N, N m], got {np.shape(values)}")
-    return finite(some, "wrenches [N, N m]")
+    some = np.atleast_2d(finite(values, "wrenches [N, N m]"))
+    if some.ndim != 2 or some.shape[1] != 6 or len(some) == 0:
+        raise InputError(
+            f"wrenches must be (k, 6) [N, N m] with k above zero, got {np.shape(values)}"
+        )
+    return some
 
 
 def _rows(wrench: ArrayLike | None, rows: NDArray[np.intp]) -> ArrayLike | None:
