@@ -308,10 +308,10 @@ def wrenches_of(values: ArrayLike) -> Array:
         InputError: another shape, none, or numbers that are not finite.
     """
     some = np.atleast_2d(finite(values, "wrenches [N, N m]"))
-    if some.ndim != 2 or some.shape[1] != 6 or len(some) == 0:
-        raise InputError(
-            f"wrenches must be (k, 6) [N, N m] with k above zero, got {np.shape(values)}"
-        )
+    if some.size == 0:
+        raise InputError(f"wrenches: expected one or more, (k, 6) [N, N m], got {np.shape(values)}")
+    if some.ndim != 2 or some.shape[1] != 6:
+        raise InputError(f"wrenches must be (k, 6) [N, N m], got {np.shape(values)}")
     return some
 
 

@@ -22,11 +22,11 @@ AT = [HOME[0]], [HOME[1]], [HOME[2]]
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: seecr.tension_margin(ROBOT, HOME, wrenches=np.zeros((0, 6))), "k above zero"),
-        (lambda: seecr.feasible(ROBOT, HOME, wrenches=[]), r"wrenches must be \(k, 6\)"),
+        (lambda: seecr.tension_margin(ROBOT, HOME, wrenches=np.zeros((0, 6))), "one or more"),
+        (lambda: seecr.feasible(ROBOT, HOME, wrenches=[]), "wrenches: expected one or more"),
         (
             lambda: seecr.feasible(ROBOT, HOME, effects=[STIFF], wrenches=np.zeros((0, 6))),
-            "k above zero",
+            "wrenches: expected one or more",
         ),
         *(
             (lambda most=most: seecr.equilibria(ROBOT, HOME, most=most), "most: expected a whole")

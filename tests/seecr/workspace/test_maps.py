@@ -302,7 +302,8 @@ def test_a_map_says_which_slices_it_has_and_what_is_white(
     found = workspace_map(robot, x, y, [0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4])
     path = tmp_path / "map.svg"
     panels = drawn_panels(monkeypatch, path, found)
-    assert "4 of 7 values of z; white: cannot be held (margin); orange" in path.read_text()
+    assert "4 of 7 values of z; white: cannot be held (margin); arrows: " in path.read_text()
+    assert "orange: the edge" in path.read_text()
     assert all(len(ax.collections) == 2 for ax in panels[:4]), "an edge in the margins' panels too"
     cells = path.read_text().count("<path")
     assert cells < found.margin.size, "no path for each cell: lines would show between them"
