@@ -12,6 +12,7 @@ import sys
 from collections.abc import Collection, Iterator
 from dataclasses import is_dataclass
 from enum import Enum
+from functools import cached_property
 from importlib import import_module
 from inspect import Parameter, cleandoc, get_annotations, getdoc, isclass, signature
 from math import inf
@@ -172,11 +173,14 @@ def _members(found: type) -> Iterator[str]:
     """What a class has beside its attributes, with the first line of each."""
     lines = []
     for name, member in sorted(vars(found).items()):
-        function = member.fget if isinstance(member, property) else getattr(found, name)
+        kept = isinstance(member, cached_property)
+        function = member.func if kept else getattr(found, name)
+        function = member.fget if isinstance(member, property) else function
         text = getdoc(function) if callable(function) else None
         if name.startswith("_") or not text:
             continue
-        call = "" if isinstance(member, property) else _signature(function, inf)
+        valued = kept or isinstance(member, property)
+        call = "" if valued else _signature(function, inf)
         lines.append(f"- `.{name}{call}`: {_linked(text.split(chr(10))[0])}")
     if lines:
         yield "\n".join(lines) + "\n"

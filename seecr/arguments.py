@@ -32,6 +32,8 @@ def numbers(values: ArrayLike, name: str) -> Array:
         InputError: it is something else.
     """
     try:
+        if isinstance(values, np.ma.MaskedArray):  # what is masked is no number
+            values = np.ma.filled(values.astype(float), np.nan)
         array = np.asarray(values)
         if array.dtype.kind == "c":  # NumPy would drop the imaginary part
             raise TypeError

@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 GivenData: TypeAlias = Measurements | str | Path | Sequence[str | Path]
 """Measurements, their file, or several files of one robot."""
 
+_NONE = "there are no commands; expected one or more"
+
 GivenCommands: TypeAlias = Measurements | Commands | str | Path | ArrayLike
 """Commands, their file, or commanded poses (n, 7)."""
 
@@ -139,17 +141,24 @@ def commands_of(given: GivenCommands, robot: Robot) -> Measurements:
 
     Raises:
         InputFileError: any mistake in the file.
-        InputError: something other than commands.
+        InputError: something other than commands, or none.
     """
-    if isinstance(given, Measurements):
-        return given
     if isinstance(given, str | Path):
         return load_commands(given, robot)
-    if isinstance(given, Commands):
-        return _of_one_clock(given, robot)
+    if isinstance(given, Measurements | Commands):
+        if (given.n_rows if isinstance(given, Measurements) else len(given)) == 0:
+            raise InputError(_NONE)
+        return given if isinstance(given, Measurements) else _of_one_clock(given, robot)
+    return _of_poses(given, robot)
+
+
+def _of_poses(given: ArrayLike, robot: Robot) -> Measurements:
+    """Poses (n, 7) as a file of them would be read, one run."""
     from seecr.statics.starts import commanded_poses  # takes a while to import
 
     pose = commanded_poses(given)
+    if len(pose) == 0:
+        raise InputError(_NONE)
     run = np.full(len(pose), "all")
     return Measurements(Path("poses.csv"), robot.n_cables, run, command_pose=pose)
 

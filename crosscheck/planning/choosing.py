@@ -13,10 +13,12 @@ from crosscheck.fit.preparation.prepare import Progress
 from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.planning.adding import NO_LIMITS, Limits
+from crosscheck.planning.arguments import box_given, limits_given
 from crosscheck.planning.greedy import Wanted, chosen_poses
 from crosscheck.planning.places import held_within, taut_first, tilted_grid, trustworthy
 from crosscheck.planning.planned import Planned, Reads, expected_sigma, kinds_of, planned
 from crosscheck.planning.sight import all_visible
+from crosscheck.planning.upright import upright
 from crosscheck.planning.visibility import EXACT, Signal, signal_left, signals
 from seecr.arguments import silent, whole
 from seecr.counted import counted
@@ -44,7 +46,7 @@ def choose_poses(
     rows: int,
     *,
     sigma: Sigma | None = None,
-    reads: Collection[str] = (),
+    reads: Collection[str] | str = (),
     limits: Limits = NO_LIMITS,
     box: Array | None = None,
     progress: Progress = silent,
@@ -65,9 +67,11 @@ def choose_poses(
 
     Raises:
         CrosscheckError: the robot can hold too few poses within the limits.
-        InputError: ``rows`` is not a whole number from 1 on.
+        InputError: ``rows`` is not a whole number from 1 on; limits or a box of another form, or
+            reversed.
     """
     robot, rows = robot_of(robot), whole(rows, "rows", least=1)
+    limits, box = limits_given(limits), box_given(box)
     progress("looking for poses", 0.0)
     kinds = kinds_of(reads, sigma or Sigma())
     full, _assumed = expected_sigma(robot, sigma or Sigma(), kinds)
@@ -80,7 +84,7 @@ def choose_poses(
         plan = _usable(robot, tried, rows, full, channels, limits)
         found = 0 if plan is None else plan.problem.data.n_rows
     if plan is None or found < rows:
-        cure = "ask for fewer --rows, a wider range of tensions, or another --box"
+        cure = "ask for fewer rows, a wider range of tensions, or another box"
         raise CrosscheckError(
             f"robot {robot.name} can be held at {found} of {counted(len(tried), 'pose')} that "
             f"were tried; expected {rows} or more; {ITS_A_POINT if robot.is_point else cure}"
@@ -103,21 +107,27 @@ def choose_poses(
 
 
 def _candidates(robot: Robot, box: Array | None) -> Array:
-    low, high = _room(robot) if box is None else box
+    frame = upright(robot) if box is None else np.eye(3)
+    low, high = _room(robot, frame) if box is None else box
     if robot.joints:
         slides = ~robot.hinges
-        axes = np.array([joint.axis for joint in robot.joints])
+        axes = np.array([joint.axis for joint in robot.joints]) @ frame
         reach = np.where(slides, 0.5 * np.abs(axes @ (high - low)), _TURN)
-        middle = np.where(slides, axes @ (0.5 * (low + high) - robot.reference_pose[:3]), 0.0)
+        home = robot.reference_pose[:3] @ frame
+        middle = np.where(slides, axes @ (0.5 * (low + high) - home), 0.0)
         random = np.random.default_rng(0).uniform(-1.0, 1.0, (_JOINT_POSES, len(reach)))
         return np.asarray(pose_of_values(robot, middle + reach * random)[0])
-    return tilted_grid(robot, low, high, _GRID)
+    return tilted_grid(robot, low, high, _GRID, frame)
 
 
-def _room(robot: Robot) -> tuple[Array, Array]:
-    """A box inside the exit points; if these are all above home, it begins a little below home."""
-    low, high = robot.exit_points.min(axis=0), robot.exit_points.max(axis=0)
-    home, span = robot.reference_pose[:3], high - low
+def _room(robot: Robot, frame: Array) -> tuple[Array, Array]:
+    """A box along the axes of a frame (3, 3), the last one upwards, inside the exit points.
+
+    If these are all above home, it begins a little below home.
+    """
+    exits = robot.exit_points @ frame
+    low, high = exits.min(axis=0), exits.max(axis=0)
+    home, span = robot.reference_pose[:3] @ frame, high - low
     inner_low, inner_high = low + _SIDE * span, high - _SIDE * span
     below = _BELOW * (high[2] - home[2])
     inner_high[2] = high[2] - _TOP * (high[2] - min(low[2], home[2] - below))

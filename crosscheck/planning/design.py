@@ -12,6 +12,7 @@ from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import GivenCommands, commands_of
 from crosscheck.planning.adding import NO_LIMITS, Limits
+from crosscheck.planning.arguments import box_given, limits_given
 from crosscheck.planning.detours import detours
 from crosscheck.planning.extensions import extensions
 from crosscheck.planning.greedy import Wanted
@@ -43,7 +44,7 @@ def make_plan(
     sigma: Sigma | None = None,
     progress: Progress = silent,
     *,
-    reads: Collection[str] = (),
+    reads: Collection[str] | str = (),
     limits: Limits = NO_LIMITS,
     box: Array | None = None,
 ) -> Plan:
@@ -55,16 +56,17 @@ def make_plan(
             readings in it are ignored.
         sigma: expected noise; by default that of the commands.
         progress: called with what is being done and the fraction that is done.
-        reads: kinds of readings there will be, of "position", "orientation" and "tension"; by
-            default the pose, and tensions if their noise is stated.
+        reads: kinds of readings there will be, of "position", "orientation" and "tension", or one
+            of them; by default the pose, and tensions if their noise is stated.
         limits: lowest and highest tension [N] of poses that are proposed.
         box: (2, 3) [m] lowest and highest position of these.
 
     Raises:
         CrosscheckError: there is an unknown kind of reading.
-        InputError: there are no commands.
+        InputError: there are no commands; limits or a box of another form, or reversed.
     """
     robot = robot_of(robot)
+    limits, box = limits_given(limits), box_given(box)
     commands = commands_of(commands, robot)
     stated = sigma or commands.sigma
     kinds = kinds_of(reads, stated)

@@ -9,6 +9,7 @@ from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.measurements.data import Measurements
 from crosscheck.planning.adding import MORE_POSES, NO_LIMITS, Adding, Extension, Limits, like
 from crosscheck.planning.planned import Planned, near_slack, slack_at
+from crosscheck.planning.upright import box_around, upright
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
@@ -101,31 +102,39 @@ def _planned_poses(plan: Planned) -> Array:
 def _grid(plan: Planned, box: Array | None) -> Array:
     """Positions on a grid, in the box if there is one, each level and with two tilts."""
     robot, pose = plan.problem.robot, _planned_poses(plan)
-    low, high = _box(robot, pose[:, :3])
+    frame = upright(robot)
+    low, high = _box(robot, pose[:, :3] @ frame, frame)
     if box is not None:
+        own = box_around(box[0], box[1], frame)
         # where the box is beside what is planned, all of it
-        apart = (high < box[0]) | (low > box[1])
-        low = np.where(apart, box[0], np.maximum(low, box[0]))
-        high = np.where(apart, box[1], np.minimum(high, box[1]))
-    return tilted_grid(robot, low, high, _GRID)
+        apart = (high < own[0]) | (low > own[1])
+        low = np.where(apart, own[0], np.maximum(low, own[0]))
+        high = np.where(apart, own[1], np.minimum(high, own[1]))
+    return tilted_grid(robot, low, high, _GRID, frame)
 
 
-def tilted_grid(robot: Robot, low: Array, high: Array, steps: tuple[int, int, int]) -> Array:
-    """Positions on a grid of so many steps [m], each level and with two tilts, as poses (n, 7)."""
+def tilted_grid(
+    robot: Robot, low: Array, high: Array, steps: tuple[int, int, int], frame: Array
+) -> Array:
+    """Positions on a grid of so many steps [m], each level and with two tilts, as poses (n, 7).
+
+    The grid and the axes of the tilts are along the columns of ``frame`` (3, 3).
+    """
     axes = [np.linspace(low[k], high[k], steps[k]) for k in range(3)]
-    place = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    place = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3) @ frame.T
     n = len(place)
     level = np.tile(robot.reference_pose[3:], (n, 1))
     out = [np.concatenate([place, level], axis=1)]
     for shift in (0, 3):
-        tilt = _TILT_RAD * _TILTS[(np.arange(n) + shift) % len(_TILTS)]
+        tilt = _TILT_RAD * _TILTS[(np.arange(n) + shift) % len(_TILTS)] @ frame.T
         out.append(np.concatenate([place, quat_multiply(quat_from_rotvec(tilt), level)], axis=1))
     return np.concatenate(out)
 
 
-def _box(robot: Robot, place: Array) -> tuple[Array, Array]:
-    """The planned region with a margin, inside the exit points."""
-    exits_low, exits_high = robot.exit_points.min(axis=0), robot.exit_points.max(axis=0)
+def _box(robot: Robot, place: Array, frame: Array) -> tuple[Array, Array]:
+    """The planned region with a margin, inside the exit points, along the axes of a frame."""
+    exits = robot.exit_points @ frame
+    exits_low, exits_high = exits.min(axis=0), exits.max(axis=0)
     low, high = place.min(axis=0), place.max(axis=0)
     room = np.maximum(exits_high - exits_low, 0.2 * float(np.max(exits_high - exits_low)))
     margin = _BEYOND * np.maximum(high - low, 0.2 * room)

@@ -68,7 +68,7 @@ class Reads:
         wrong = [kind for kind in kinds if kind not in READ]
         if wrong or not kinds:
             got = repr(wrong[0]) if wrong else "nothing"
-            raise CrosscheckError(f"--reads: expected some of {', '.join(READ)}, got {got}")
+            raise CrosscheckError(f"reads: expected some of {', '.join(READ)}, got {got}")
         every = np.full(3, "position" in kinds)
         tensions = np.full(n_cables, "tension" in kinds)
         return cls(every, "orientation" in kinds, np.zeros(3, dtype=bool), tensions)
@@ -105,9 +105,10 @@ class Planned:
         return ~np.asarray(self.base.state.prediction.solved)
 
 
-def kinds_of(reads: Collection[str], sigma: Sigma) -> tuple[str, ...]:
+def kinds_of(reads: Collection[str] | str, sigma: Sigma) -> tuple[str, ...]:
     """The kinds that are named; by default the pose, and tensions if their noise is stated."""
-    return tuple(reads) or (READ if sigma.tension_N is not None else READ[:2])
+    given = (reads,) if isinstance(reads, str) else tuple(reads)
+    return given or (READ if sigma.tension_N is not None else READ[:2])
 
 
 def usual_cell(tension: float) -> float:
@@ -164,7 +165,7 @@ def planned(
     if prediction.solved.any() and not problem.measured.any():
         raise CrosscheckError(
             f"robot {robot.name}: its joints lock all that would be read "
-            f"({', '.join(reads.kinds)}); expected --reads of what moves, or of tension"
+            f"({', '.join(reads.kinds)}); expected readings of what moves, or of tension"
         )
     factor = problem.noise(prediction)
     return Planned(problem, null_fit(problem, model, factor, refit=False), factor, reads)

@@ -137,7 +137,7 @@ class Plan(Result):
             rows = self.planned.problem.data.n_rows
             return (
                 f"Nothing can be planned with so few rows ({rows}): an effect needs more rows "
-                "than it has parameters; add poses, or have them chosen with --rows 40."
+                "than it has parameters; add poses, or have 40 rows chosen."
             )
         if not self.effects:
             return "Nothing can be planned: the model has no equilibrium at any of the rows."

@@ -24,6 +24,7 @@ from crosscheck.suite.pool import Pool
 from crosscheck.suite.results import CaseResult, Worst, counts, worst_of
 from crosscheck.suite.thresholds import Thresholds, load_thresholds
 from crosscheck.suite.verdicts import Answers, Verdict, held_to, judge_poses
+from seecr.arguments import whole
 from seecr.counted import counted
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
@@ -188,10 +189,10 @@ def run_suite(
         the results in the order of the cases.
 
     Raises:
-        InputError: no case, or something that is not one.
+        InputError: no case, something that is not one, or ``jobs`` not a whole number from 1 on.
         CrosscheckError: a name that no shipped case has.
     """
-    began = time.perf_counter()
+    began, jobs = time.perf_counter(), whole(jobs, "jobs", least=1)
     chosen = chosen_cases(cases, seed)
     if not isinstance(thresholds, Thresholds):
         thresholds = load_thresholds(thresholds)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-    from seecr import Model, Robot, Solution
+    from seecr import Commands, Model, Robot, Solution
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -177,15 +177,27 @@ def model_at(given: Path | None, robot: Robot) -> Model | None:
     return replace(model, notes=(*model.notes, *_usual(model)))
 
 
-def notes_of(model: Model | None, solution: Solution) -> tuple[str, ...]:
-    """What is to be told of a robot, of commands, of a model, and of answers beyond its data."""
+def notes_of(
+    model: Model | None, solution: Solution, commands: Commands | None = None
+) -> tuple[str, ...]:
+    """What is to be told of a robot, of commands, of a model, and of answers beyond its data.
+
+    Args:
+        model: of the robot. solution: of the commands.
+        commands: as given; None for poses without times and temperatures.
+    """
+    from seecr import Commands
+    from seecr.effects.unfed import unfed
     from seecr.equilibrium.strained import strained, strained_rows
 
     robot = solution.robot
     much = (*strained(robot), *strained_rows(solution))
     slips = (*outside(robot, solution.command), *scalar_last(robot, solution.command[:, 3:]))
     said = (*robot.notes, *much, *slips)
-    return said if model is None else (*said, *model.notes, *model.beyond(solution))
+    if model is None:
+        return said
+    given = Commands(solution.command) if commands is None else commands
+    return (*said, *model.notes, *unfed(model.terms.effects, given), *model.beyond(solution))
 
 
 def outside(robot: Robot, commands: NDArray[np.float64]) -> tuple[str, ...]:

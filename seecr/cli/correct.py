@@ -135,7 +135,7 @@ def command(
             tell("corrected", 1.0)
         status = 0 if found.stays.all() and found.reached.any() else 3
         told = replace(found.solution, line=found.commands.line)
-        notes = [*notes_of(own, told), *wanted.notes, *tracker]
+        notes = [*notes_of(own, told, wanted.commands), *wanted.notes, *tracker]
         made = made_by(machine.source, poses, model)
         document = {
             "made": made, "exit_status": status, "notes": notes, **found.as_json(kept)

@@ -166,7 +166,7 @@ def command(
         met = midline_points(solution)
         if rows.aimed:
             said = (*said, _WANTED)
-        notes = [*notes_of(own, solution), *said, *gave_up, *why_not, *too_many]
+        notes = [*notes_of(own, solution, commands), *said, *gave_up, *why_not, *too_many]
         document = {
             "made": made_by(machine.source, poses, model),
             "exit_status": status,

@@ -248,10 +248,11 @@ class Robot:
 
     @cached_property
     def length(self) -> float:
-        """The robot's characteristic length [m], which makes torques comparable with forces.
+        """Characteristic length [m]: half the largest distance of two anchor points; see glossary.
 
-        It is half the largest distance of two anchor points: cables can balance a torque of weight
-        times length by moving the weight from one anchor point to another. It is at least a
+        It makes torques comparable with forces, and is in every stiffness of one unit: cables can
+        balance a torque of weight times length by moving the weight from one anchor point to
+        another. It is at least a
         hundredth of the largest distance from the reference position to an exit point, which
         matters for a platform with one anchor point.
         """

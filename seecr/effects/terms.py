@@ -141,7 +141,8 @@ def _place_of(layout: Layout, key: str) -> int:
     if key not in layout.names:
         near = difflib.get_close_matches(key, layout.names, n=3, cutoff=0.0)
         raise InputError(
-            f"effect {layout.name}: no parameter {key}; the nearest are {', '.join(near)}"
+            f"effect {layout.name}: no parameter {key}; the nearest "
+            f"{'is' if len(near) == 1 else 'are'} {', '.join(near)}"
         )
     return layout.names.index(key)
 

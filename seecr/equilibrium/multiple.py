@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seecr.arguments import whole
 from seecr.commands.data import Commands
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.joints import pose_of_values, values_of_pose
@@ -65,9 +66,11 @@ def equilibria(
         a :class:`Solution` with one row per equilibrium; :func:`seecr.solve` may find any of them.
 
     Raises:
-        InputError: more than one pose, or effects with a history or a cable law of their own.
+        InputError: more than one pose, effects with a history or a cable law of their own, or
+            ``most`` is not a whole number from 1 on.
     """
     robot, command = robot_of(robot), commanded_poses(pose)
+    most = whole(most, "most", least=1)
     if len(command) != 1:
         raise InputError(f"equilibria needs one commanded pose (7,), got {len(command)}")
     acting = effects_of(effects, robot)

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from seecr.compiled.columns import ANCHOR, EXIT, FRICTION, GAP, REST, UP, WEIGHT
-from seecr.pose import Array, quat_to_matrix
+from seecr.compiled.columns import FRICTION, GAP, REST, UP, WEIGHT
+from seecr.pose import Array
+from seecr.statics.spans import ways
 from seecr.statics.tables import Tables
 from seecr.threads import in_parts
 
@@ -130,10 +131,8 @@ def _bent(bend: Array, rise: Array, flat: Array) -> tuple[Array, Array, Array, A
 
 def _rises(tables: Tables) -> Array:
     """(n, m) height of exit points above anchor points, over the distance between them."""
-    turn = quat_to_matrix(tables.poses[:, 3:])
-    anchors = tables.cables[..., ANCHOR : ANCHOR + 3] @ np.swapaxes(turn, 1, 2)
-    ways = tables.cables[..., EXIT : EXIT + 3] - tables.poses[:, None, :3] - anchors
+    way = ways(tables)
     up = tables.load[:, None, UP : UP + 3]
-    spans = np.linalg.norm(ways, axis=2)
+    spans = np.linalg.norm(way, axis=2)
     # a cable without a span, its anchor point at its exit point, has no direction: it hangs level
-    return np.asarray((ways * up).sum(axis=2) / np.where(spans > 0.0, spans, 1.0))
+    return np.asarray(-(way * up).sum(axis=2) / np.where(spans > 0.0, spans, 1.0))

@@ -55,6 +55,8 @@ _LOOSEST = 12.0**-0.5
 _GAINED = 2.0
 # Rounds with loose cables, residual at their end [load], and allowed error of tensions [load].
 _NEWTON, _EXACT, _OFF = 30, 1e-12, 1e-9
+# Most rounds in which margins are counted from lower limits.
+_EASED = 20
 # Attempts, each with fewer loose cables.
 _AGAIN = 4
 # Loose cables are also sought from these multiples of a cable's weight, or share of the load.
@@ -128,6 +130,29 @@ def farthest_inside(tables: Tables, low: Array, high: Array, hopeless: float = n
             first = rest_for(some, share * first_tensions(some, weighs[rows]))
             _loosen(out, rows, some, could[rows], low, high, first)
     return out
+
+
+def margins_inside(tables: Tables, low: Array, high: Array) -> Array:
+    """Margins (n,) [N] of tensions from limits (m,) asked for, which what cables weigh may exceed.
+
+    The largest t with low + t <= tensions <= high - t that leaves no cable below its own least
+    tension. :func:`farthest_inside` counts t from that where it is the larger one, a lower bound
+    that is exact at zero. It is counted from lower limits the farther inside tensions turn out to
+    be, in rounds that only increase t.
+    """
+    found, weighs = farthest_inside(tables, low, high), least_of_heavy(tables)
+    margins = found.margins
+    counts = (margins > 0.0) & np.isfinite(margins)
+    rows = np.flatnonzero(counts & (weighs > low).any(axis=1))
+    for _ in range(_EASED):
+        if len(rows) == 0:
+            break
+        least = np.maximum(low, weighs[rows] - margins[rows, None])
+        again = _tightened(take(tables, rows), least, found.high[rows], np.inf).margins
+        gain = np.where(np.isfinite(again), again - margins[rows], 0.0)
+        margins[rows] += np.maximum(gain, 0.0)
+        rows = rows[(gain > _ENOUGH * tables.scale[rows]) & (least > low).any(axis=1)]
+    return margins
 
 
 def holds_tightly(tables: Tables, low: Array, high: Array) -> NDArray[np.bool_]:

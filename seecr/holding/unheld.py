@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seecr.counted import counted
 from seecr.pose import Array
@@ -70,6 +71,20 @@ def why_not_held(
         )
     unloaded = float(np.abs(load).max()) <= rounding
     return f"{_SLACK}: {'; '.join(said)}" if unloaded else "; ".join(said)
+
+
+def without_span(gone: NDArray[np.bool_], pulleys: NDArray[np.bool_], names: Sequence[str]) -> str:
+    """A sentence about a pose at which cables ``gone`` (m,) have no length.
+
+    Args:
+        gone: (m,) cables whose anchor point is at the exit point or within its pulley.
+        pulleys: (m,) cables that run over one.
+        names: of the m cables.
+    """
+    k, more = int(np.argmax(gone)), int(gone.sum()) - 1
+    where = "within its pulley" if pulleys[k] else "at its exit point"
+    others = f", nor would {counted(more, 'more cable')}" if more else ""
+    return f"{_who(names[k])} would have no length, its anchor point {where}{others}"
 
 
 def _scale(load: Array, low: Array) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr.commands.data import Commands
+from seecr.compiled.columns import RADIUS
 from seecr.counted import between, counted, rows_words
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
@@ -20,7 +21,7 @@ from seecr.holding.distribution import tension_limits, wanted_tensions
 from seecr.holding.hanging import bridged_lengths, least_of_heavy
 from seecr.holding.inside import balances, counted_balance, holds_tightly
 from seecr.holding.lengths import Held, hold, holds_firmly
-from seecr.holding.unheld import why_not_held
+from seecr.holding.unheld import why_not_held, without_span
 from seecr.inverse.history import REACHED, lengths_with_history
 from seecr.inverse.nearest import Nearest, Reaching, nearest, poses_in_place
 from seecr.inverse.told import told_lengths
@@ -28,6 +29,7 @@ from seecr.pose import Array, pose_difference
 from seecr.prediction.experiment import Experiment, Prediction, effects_of
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics.solution import Solution
+from seecr.statics.spans import spanless
 from seecr.statics.starts import Commanded, commands_from
 from seecr.statics.tables import Tables, assemble, take
 from seecr.units import millimetres, without_rounding
@@ -385,6 +387,11 @@ class _Search:
             return tuple(out)
         some = take(tables, lost)
         weighs, names = least_of_heavy(some), self.robot.cable_names
+        gone, pulleys = spanless(some), some.cables[..., RADIUS] > 0.0
+        for k in np.flatnonzero(gone.any(axis=1)):
+            out[lost[k]] = without_span(gone[k], pulleys[k], names)
+        free = np.flatnonzero(~gone.any(axis=1))
+        some, weighs, lost = take(some, free), weighs[free], lost[free]
         for i, w, row in zip(lost, weighs, balances(some, limits.low, limits.high), strict=True):
             matrix, load, low, high = row
             out[i] = why_not_held(matrix, load, low, high, names, w)

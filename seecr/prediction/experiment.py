@@ -20,6 +20,7 @@ from seecr.effects.checked import edit_readings
 from seecr.effects.edits import Edits
 from seecr.effects.setup import Setup, plain_setup
 from seecr.effects.terms import Term
+from seecr.effects.unfed import unfed
 from seecr.pose import Array
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics import batch
@@ -57,6 +58,8 @@ class Prediction(Result):
         sensors: effects that edit the readings.
         walk: the equilibria at all N waypoints, if the path was solved in order.
         solved: (n,) bool, a stable equilibrium was found.
+        notes: sentences on effects that are left out, because commands have no times or
+            temperatures.
     """
 
     setup: Setup
@@ -67,6 +70,7 @@ class Prediction(Result):
     sensors: tuple[Effect, ...] = ()
     walk: batch.Evaluation | None = field(default=None, repr=False)
     kept: dict[str, Array] = field(default_factory=dict, repr=False)
+    notes: tuple[str, ...] = ()
 
     @property
     def solved(self) -> NDArray[np.bool_]:
@@ -118,7 +122,11 @@ class Prediction(Result):
 
     def lines(self) -> list[str]:
         """How many rows came to rest, and where, as for a solution."""
-        return self.solution().lines()
+        return [*self.solution().lines(), *self.notes]
+
+    def as_json(self) -> Record:
+        """The rows, and the notes."""
+        return {"rows": self.records(), "notes": self.notes}
 
     def records(self) -> list[Record]:
         """The readings, one row per command."""
@@ -331,7 +339,7 @@ def predict(
         model: from :func:`seecr.load_model`, its file, or effects with values; none by default.
 
     Returns:
-        a :class:`Prediction`; check ``solved`` before using a row.
+        a :class:`Prediction`; check ``solved`` before using a row, and ``notes``.
 
     Raises:
         InputError: poses, robot or effects of a wrong type or shape, or a row without lengths.
@@ -341,7 +349,10 @@ def predict(
     """
     robot = robot_of(robot)
     told = answered(commands_from(commands, robot))
-    return Experiment(robot, told).predict(effects_of(model, robot))
+    effects = effects_of(model, robot)
+    found = Experiment(robot, told).predict(effects)
+    found.notes = unfed(effects, told)
+    return found
 
 
 def effects_of(given: GivenEffects, robot: Robot) -> list[Effect]:

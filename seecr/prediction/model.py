@@ -204,7 +204,7 @@ def effects_given(
 
     Raises:
         InputFileError: there is no such file, or it holds no model of this robot.
-        InputError: something other than effects with values.
+        InputError: something other than effects with values, or an effect twice.
     """
     if isinstance(given, Model | str | Path):
         model = model_given(given, robot)
@@ -213,6 +213,10 @@ def effects_given(
     wrong = [one for one in every if not isinstance(one, Term | Effect)]
     if wrong:
         raise no_effects(wrong[0] if isinstance(given, Iterable) else given)
+    names = [one.name for one in every]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"effect {name} is in the list twice; expected it once")
     return every, ()
 
 

@@ -32,6 +32,8 @@ _NO, _YES = "#D9D9D9", COLOURS[0]
 _FREE, _STRIPES = "#D0D0D0", "#606060"
 # A grid larger than this [m] is labelled in metres.
 _LARGE = 5.0
+# A row of panels is as high as so wide a panel needs, and the room around it, within limits [inch].
+_PANEL, _ROOM, _LOWEST, _HIGHEST = 2.4, 0.35, 1.7, 2.3
 # Letters of a title that fit into an inch.
 _LETTERS = 13
 # Logarithmic colours end where so much of what can be held is softer, or stiffer.
@@ -75,7 +77,7 @@ def map_figure(
         panels += [_turn_panel] if found.robot.turns else []
         panels.append(_soft_panel)
     n = len(cut.picked)
-    size = (0.9 + 2.9 * n, 0.7 + 2.3 * len(panels))
+    size = (0.9 + 2.9 * n, 0.7 + _height(cut) * len(panels))
     with figure(path, len(panels), n, sharex=True, sharey=True, figsize=size) as axes:
         for row, panel in zip(axes, panels, strict=True):
             shown = panel(cut, row)
@@ -161,6 +163,12 @@ def _cut(found: Workspace, most: int) -> _Cut:
     return _Cut(found, across, wide, high, picked, slices, *(("m", 1.0) if metres else ("mm", 1e3)))
 
 
+def _height(cut: _Cut) -> float:
+    """Height of a row of panels [inch]: that of flat slices, and of the bar beside them."""
+    wide, high = (float(np.ptp(cut.found.axes[k])) for k in (cut.wide, cut.high))
+    return float(np.clip(_ROOM + _PANEL * high / wide, _LOWEST, _HIGHEST))
+
+
 def _words(cut: _Cut, edge: Array | None, at_least: float | None) -> Iterator[str]:
     """What is not drawn, and the colours and dots that no colour bar explains."""
     shown, whole = len(cut.picked), len(cut.found.axes[cut.across])
@@ -168,6 +176,8 @@ def _words(cut: _Cut, edge: Array | None, at_least: float | None) -> Iterator[st
         yield f"{shown} of {whole} values of {'xyz'[cut.across]}"
     yield from _white(cut)
     yield from _without_end(cut)
+    if cut.found.rests.any():
+        yield "arrows: what is beyond a bar's end has its last colour"
     dots = edge is not None and bool(np.any(cut.with_dots(edge)))
     if any(map(_has_edge, cut.inside())) or (dots and at_least is None):
         yield "orange: the edge of the poses that tensions within the limits can hold"

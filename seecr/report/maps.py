@@ -31,9 +31,10 @@ def likely_lines(found: Workspace, at_least: float | None) -> Iterator[str]:
     """How much of the grid can be held with at least a given probability."""
     if at_least is not None:
         likely = found.likely(at_least)
+        size = found.size_words(likely)
         yield (
             f"with a probability of {at_least:g} or more {counted(int(likely.sum()), 'pose')} can "
-            f"be held{found.size_words(likely)}"
+            f"be held{f', {size}' if size else ''}"
         )
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seecr.counted import counted
 from seecr.curves import alike
 from seecr.pose import Array
 from seecr.prediction.uncertainty import Spread
@@ -126,6 +127,17 @@ class _Sweep:
                 colour, alpha = _FEW if len(zone.slack) == counts[0] else _MANY
                 ax.axvspan(*self.ends(zone), color=colour, alpha=alpha, linewidth=0.0, zorder=0)
 
+    def shades(self) -> list[Any]:
+        """What the shades mean, for a legend; empty where nothing is shaded."""
+        from matplotlib.patches import Patch
+
+        counts = sorted({len(zone.slack) for zone in self.zones if zone.slack})
+        words = [f"{counted(counts[0], 'cable')} slack", "more"][: len(counts)] if counts else []
+        return [
+            Patch(color=colour, alpha=alpha, linewidth=0.0, label=said)
+            for said, (colour, alpha) in zip(words, (_FEW, _MANY), strict=False)
+        ]
+
     def line(self, ax: Any, values: Array, *how: str, **more: Any) -> None:
         """Draw points (n,), with lines within each run."""
         ax.plot(self._between(), self._broken(values), *how, **self.mark, **more)
@@ -218,7 +230,8 @@ def _slack(ax: Any, whole: _Sweep) -> None:
     if np.any(lost):
         at = whole.at[lost]
         ax.plot(at, np.zeros(int(lost.sum())), "x", color=COLOURS[4], label="not at rest")
-        _legend(ax)
+    if handles := [*ax.get_legend_handles_labels()[0], *whole.shades()]:
+        _legend(ax, handles=handles)
     ax.set_ylabel("slack cables")
     ax.set_ylim(-0.3, solution.robot.n_cables + 0.3)
     ax.yaxis.get_major_locator().set_params(integer=True)

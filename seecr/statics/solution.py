@@ -29,6 +29,7 @@ from seecr.pose import Array, rotvec_from_quat
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics import batch
 from seecr.statics.inertia import mass_matrices
+from seecr.statics.spans import spanless
 from seecr.statics.starts import start_of
 from seecr.statics.tables import Tables, take
 from seecr.threads import in_parts
@@ -340,9 +341,12 @@ def certify(robot: Robot, tables: Tables, found: batch.Evaluation) -> Solution:
     for outcome, words in _OF_OUTCOME.items():
         status[found.outcome == outcome] = words
     no_length = np.any(tables.cables[..., REST] <= 0.0, axis=1)
-    status[no_length] = Status.NO_LENGTH
     balanced = check.residual < TOLERANCE
     status[(status == Status.CONVERGED) & ~balanced] = Status.STALLED
+    # a pulley pays out some cable even where an anchor point is commanded to its exit point
+    failed = np.flatnonzero([one not in _BALANCED for one in status])
+    no_length[failed] |= spanless(take(tables, failed)).any(axis=1)
+    status[no_length] = Status.NO_LENGTH
     # not the deviations in ``found``: SciPy's search on joints leaves these at zero
     moved = check.deviation
     turn = np.where(moved[:, 3:4] < 0, -1.0, 1.0) * moved[:, 3:]

@@ -170,16 +170,17 @@ class Workspace(Result):
         return tuple(map(int, np.unravel_index(np.nanargmin(stiffness), stiffness.shape)))
 
     def size_words(self, poses: NDArray[np.bool_]) -> str:
-        """The size of some poses (nx, ny, nz) of the grid, as text."""
+        """The size of some poses (nx, ny, nz) of the grid, as text; "" of a single pose's grid."""
         along = sum(len(axis) > 1 for axis in self.axes)
         unit = {1: " m", 2: " m^2", 3: " m^3"}.get(along)
-        return "" if unit is None else f", {self.size(poses):.4g}{unit}"
+        return "" if unit is None else f"{self.size(poses):.4g}{unit}"
 
     def lines(self) -> list[str]:
         """How much of the grid can be held, and how far off the elastic robot is there."""
         n, held = self.margin.size, int(self.feasible.sum())
         size = self.size_words(self.feasible)
-        out = [f"{self.robot.name}: {held} of {counted(n, 'pose')} can be held{size}"]
+        of = f"{self.robot.name}: {held} of {counted(n, 'pose')} can be held"
+        out = [f"{of}, {size}" if size else of]
         half = float(np.median(self.margin[self.feasible])) if held else 0.0
         if half == np.inf:
             out.append("at half of them or more, all cables can be tightened without limit")
@@ -194,8 +195,8 @@ class Workspace(Result):
                 f"elastic robot: at rest at {int(rests.sum())} of {counted(n, 'command')}{slack}"
             )
             out += [
-                f"{poses} more ({status.name.lower()}), the first at {self.place(first)}: "
-                f"{status.value}"
+                f"not at rest at {poses} ({status.name.lower()}), "
+                f"{'' if poses == 1 else 'the first '}at {self.place(first)}: {status.value}"
                 for status, poses, first in self._unrested()
             ]
             where = rests & self.feasible

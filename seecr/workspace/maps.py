@@ -18,12 +18,13 @@ from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
-from seecr.pose import Array
+from seecr.pose import NORM_TOLERANCE, Array
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.prediction.model import GivenEffects
 from seecr.statics.starts import commanded_poses
 from seecr.threads import run_parts
 from seecr.workspace.chances import asked_chance, check_chance
+from seecr.workspace.extent import grid_ends, refuse_oblique, refuse_unreached
 from seecr.workspace.grid import NEVER, Workspace, codes_of
 from seecr.workspace.margins import margins_at, read_once
 
@@ -43,7 +44,9 @@ def default_axes(
 ) -> tuple[Array, Array, Array]:
     """A grid over the exit points, down to as far below the reference pose as they are above it.
 
-    It ends where the platform's lowest anchor point would be on the robot's floor, if it has one.
+    Below and above are along gravity. The grid ends where the platform's lowest anchor point would
+    be on the robot's floor, if it has one. Along an axis on which joints keep the platform in place
+    it has one value.
 
     Args:
         robot: as described, or its MJCF.
@@ -55,24 +58,22 @@ def default_axes(
         x, y and z of the grid, (nx,), (ny,) and (nz,) [m].
 
     Raises:
-        InputError: ``values`` is not a whole number from 1 on.
+        InputError: ``values`` is not a whole number from 1 on, ``orientation`` no quaternion, or
+            the joints keep the platform in a plane that is not along two axes.
     """
     robot = robot_of(robot)
     if values is None:
         # robots with too few cables are solved for their orientation, which is slow
         values = _VALUES if robot.n_cables >= robot.n_dof else _FEW
     values = whole(values, "values", 1)
-    points = np.concatenate([robot.exit_points, robot.reference_pose[None, :3]])
-    low, high = points.min(axis=0), points.max(axis=0)
-    mirrored = 2.0 * robot.reference_pose[:3] - high
-    down = np.abs(robot.up) > 0.5
-    low = np.where(down, np.minimum(low, mirrored), low)
     turned = robot.reference_pose[3:] if orientation is None else _quaternion(orientation)
-    low[2] = np.clip(robot.standing_height(turned), low[2], robot.reference_pose[2])
-    return tuple(
+    low, high = grid_ends(robot, turned)
+    axes = tuple(
         evenly(a, b, values) if b - a > 1e-9 * robot.length else np.array([a])
         for a, b in zip(low.tolist(), high.tolist(), strict=True)
-    )  # type: ignore[return-value]
+    )
+    refuse_oblique(robot, axes)
+    return axes  # type: ignore[return-value]
 
 
 def _quaternion(values: ArrayLike) -> Array:
@@ -80,6 +81,11 @@ def _quaternion(values: ArrayLike) -> Array:
     array = finite(values, "orientation")
     if array.shape != (4,):
         raise InputError(f"orientation must be (4,), qw qx qy qz, got {array.shape}")
+    norm = float(np.linalg.norm(array))
+    if abs(norm - 1.0) > NORM_TOLERANCE:
+        raise InputError(
+            f"orientation: expected a unit quaternion qw qx qy qz, got one of norm {norm:.4g}"
+        )
     return np.asarray(commanded_poses(np.concatenate([np.zeros(3), array]), "orientation")[0, 3:])
 
 
@@ -135,7 +141,8 @@ def workspace_map(
         check_chance(effects)
     if elastic or robot.n_cables < robot.n_dof:
         _refuse_memory(robot, effects)
-    turned = robot.reference_pose[3:] if orientation is None else finite(orientation, "orientation")
+    turned = robot.reference_pose[3:] if orientation is None else _quaternion(orientation)
+    refuse_unreached(robot, axes, turned)
     shape = (len(axes[0]), len(axes[1]), len(axes[2]))
     n = int(np.prod(shape))
     margin, slack = np.empty(n), np.full(n, NEVER, dtype=np.int8)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seecr.arguments import finite
+from seecr.arguments import finite, numbers
 from seecr.commands.data import Commands
 from seecr.compiled.columns import EXTERNAL_FORCE, EXTERNAL_MOMENT
 from seecr.counted import counted
@@ -26,7 +26,7 @@ from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.holding.balance import balance_of, bends
 from seecr.holding.distribution import tension_limits
-from seecr.holding.inside import farthest_inside
+from seecr.holding.inside import margins_inside
 from seecr.pose import Array, all_finite, quat_rotate, transform_points
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.result import Record, Result
@@ -126,7 +126,9 @@ def tension_margin(
 
     It is exact: the largest t with lowest + t <= tau <= highest - t and W tau + w_e = 0. It is
     negative if tensions within bounds cannot balance the load, and infinite if cables can be
-    tightened without limit.
+    tightened without limit. A cable with weight pulls at least about what it weighs; if a pose can
+    only be held with less, by cables that hang loosely, the margin is zero, and negative ones count
+    from what such cables weigh.
 
     Args:
         robot: as described, or its MJCF; its mass, centre of mass and gravity are the load.
@@ -201,7 +203,7 @@ def margins_with(
         tables = _pushed(tables, wrench)
     some = np.zeros((1, 6)) if wrenches is None else wrenches_of(wrenches)
     if bends(tables):
-        every = [farthest_inside(_pushed(tables, one), low, high).margins for one in some]
+        every = [margins_inside(_pushed(tables, one), low, high) for one in some]
         return np.asarray(np.min(every, axis=0))
     matrices, load = balance_of(tables, low)
     # load of -W tau = w: the signs are those of the gradient
@@ -293,7 +295,7 @@ def _by_rank(matrices: Array, loads: Array, low: Array, high: Array, scale: floa
 
 
 def _wrench(value: ArrayLike, n: int) -> Array:
-    wrench = np.asarray(value, float)
+    wrench = numbers(value, "wrench")
     if wrench.shape not in ((6,), (n, 6)) or not all_finite(wrench):
         raise InputError(f"wrench must be (6,) or ({n}, 6) finite numbers, got {wrench.shape}")
     return wrench
@@ -303,12 +305,14 @@ def wrenches_of(values: ArrayLike) -> Array:
     """A set of wrenches (k, 6) [N, N m].
 
     Raises:
-        InputError: another shape, or numbers that are not finite.
+        InputError: another shape, none, or numbers that are not finite.
     """
-    some = np.atleast_2d(np.asarray(values, float))
+    some = np.atleast_2d(finite(values, "wrenches [N, N m]"))
+    if some.size == 0:
+        raise InputError(f"wrenches: expected one or more, (k, 6) [N, N m], got {np.shape(values)}")
     if some.ndim != 2 or some.shape[1] != 6:
         raise InputError(f"wrenches must be (k, 6) [N, N m], got {np.shape(values)}")
-    return finite(some, "wrenches [N, N m]")
+    return some
 
 
 def _rows(wrench: ArrayLike | None, rows: NDArray[np.intp]) -> ArrayLike | None:

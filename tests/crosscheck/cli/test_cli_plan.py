@@ -89,15 +89,13 @@ def test_what_is_asked_of_a_plan_wrongly_is_said(poses, tmp_path):
     assert "expected POSES.csv or --rows N, got both" in refused("plan", *poses, "--rows", 9, *out)
     assert "got neither" in refused("plan", poses[0], *out)
     text = refused("plan", *poses, "--reads", "position,colour", *out)
-    assert "--reads: expected some of position, orientation, tension, got 'colour'" in text
+    assert "reads: expected some of position, orientation, tension, got 'colour'" in text
     for box in ("1,2", "0,0,0,1,1,inf"):
         assert "--box: expected X0,Y0" in refused("plan", poses[0], "--rows", 9, "--box", box, *out)
     far = refused("plan", poses[0], "--rows", 9, "--box", "0,0,0,1e300,1,1", *out)
     assert "X: expected metres, in the range of" in far
     text = refused("plan", poses[0], "--rows", 9, "--highest", "0.1", *out)
-    assert (
-        "can be held at 0 of" in text and "ask for fewer --rows, a wider range of tensions" in text
-    )
+    assert "can be held at 0 of" in text and "ask for fewer rows, a wider range of tensions" in text
 
 
 def test_a_plan_replaces_an_older_one_but_not_what_it_reads(tmp_path):

@@ -146,6 +146,11 @@ def test_a_measurement_has_an_error(error: float) -> None:
         Term.of(ROBOT, "drum_gain").measured(gain_2=(0.001, error))
 
 
+def test_the_only_parameter_that_there_is_is_the_nearest() -> None:
+    with pytest.raises(InputError, match=r"no parameter radius; the nearest is radius_m$"):
+        Term.of(ROBOT, "pulley_radius", radius=0.01)
+
+
 def test_a_parameter_that_there_is_not_is_answered_with_the_nearest() -> None:
     words = "^effect tracker_frame: no parameter shift_w_m; the nearest are shift_[xyz]_m, "
     frame = Term.of(ROBOT, "tracker_frame")

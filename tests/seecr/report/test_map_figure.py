@@ -144,6 +144,14 @@ def test_a_map_says_whose_it_is(drawn: Drawn) -> None:
     assert drawn(a_map(*[1.0] * 9)).get_suptitle() == "demobot_cogiro"
 
 
+def test_rows_of_flat_slices_are_low_and_the_ends_of_colours_are_told(drawn: Drawn) -> None:
+    robot = load_robot("demobot_cogiro")
+    flat = drawn(workspace_map(robot, AXIS, np.linspace(0.2, 0.3, 3), 0.1))
+    square = drawn(workspace_map(robot, AXIS, AXIS - 0.15, 0.1))
+    assert flat.get_size_inches()[1] < 0.8 * square.get_size_inches()[1]
+    assert "arrows: what is beyond a bar's end has its last colour" in title(flat)
+
+
 @pytest.mark.parametrize(
     ("robot", "turns"), [(slides(), False), (load_robot("planar_vertical"), True)]
 )

@@ -158,6 +158,8 @@ def test_zones_are_shaded_to_their_edges_and_slack_cables_change_there(drawn: Dr
     for ax in (tensions, slack, beside):
         shades = [(p.get_x(), p.get_x() + p.get_width()) for p in ax.patches]
         assert shades == [pytest.approx(pair, abs=1e-9) for pair in pairwise(edges)]
+    named = {text.get_text() for text in slack.get_legend().texts}
+    assert named == {"1 cable slack", "more"}
     line = slack.lines[0]
     assert line.get_xdata() == pytest.approx(np.repeat([*edges, 400.0], 2)[1:-1], abs=1e-9)
     assert line.get_ydata().tolist() == [2, 2, 1, 1, 0, 0]

@@ -246,9 +246,10 @@ def test_a_map_says_why_the_platform_is_not_at_rest(
         np.flatnonzero(found.free), lost if why == "singular" else np.array([], int)
     )
     sentence = alone.status[lost[0]].value
-    (said,) = (line for line in found.lines() if " more (" in line)
+    (said,) = (line for line in found.lines() if "not at rest at " in line)
     at = " ".join(f"{1e3 * x:.7g}" for x in places[lost[0]])
-    assert said == f"{len(lost)} more ({why}), the first at x y z {at} mm: {sentence}"
+    first = "at" if len(lost) == 1 else "the first at"
+    assert said == f"not at rest at {len(lost)} ({why}), {first} x y z {at} mm: {sentence}"
     (told,) = json.loads(found.to_json())["not_at_rest"]
     assert told == {
         "status": why, "poses": len(lost), "first_m": places[lost[0]].tolist(),
@@ -301,7 +302,8 @@ def test_a_map_says_which_slices_it_has_and_what_is_white(
     found = workspace_map(robot, x, y, [0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4])
     path = tmp_path / "map.svg"
     panels = drawn_panels(monkeypatch, path, found)
-    assert "4 of 7 values of z; white: cannot be held (margin); orange" in path.read_text()
+    assert "4 of 7 values of z; white: cannot be held (margin); arrows: " in path.read_text()
+    assert "orange: the edge" in path.read_text()
     assert all(len(ax.collections) == 2 for ax in panels[:4]), "an edge in the margins' panels too"
     cells = path.read_text().count("<path")
     assert cells < found.margin.size, "no path for each cell: lines would show between them"
@@ -506,6 +508,18 @@ def test_a_map_says_where_it_is_and_whether_it_ends_at_the_floor() -> None:
     assert document["floor_m"] == 0.0 and document["region_m"][0] == [0.04, 0.76]
     other = workspace_map(robot, 0.4, 0.25, [0.1, 0.2], elastic=False)
     assert other.region == "region: x 0.4 m, y 0.25 m, z 0.1 to 0.2 m"
+
+
+def test_the_size_of_a_map_is_words_of_their_own_and_one_dead_pose_is_told_as_one() -> None:
+    robot = robot_named("planar_vertical")
+    home = robot.reference_pose
+    found = workspace_map(robot, [home[0], home[0] + 0.25], home[1], home[2], elastic=False)
+    assert found.size_words(np.ones((2, 1, 1), bool)) == "0.25 m"
+    at = robot.exit_points[0] - robot.anchor_points[0]
+    dead = workspace_map(robot, *at)
+    assert dead.size_words(np.ones((1, 1, 1), bool)) == ""
+    assert dead.lines()[0] == "planar_vertical: 0 of 1 pose can be held"
+    assert dead.lines()[2].startswith("not at rest at 1 (no_length), at x y z ")
 
 
 def test_all_of_a_grid_is_as_large_as_its_box() -> None:

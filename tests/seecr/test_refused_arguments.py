@@ -1,0 +1,56 @@
+"""Arguments that once passed for something else: empty sets, masked numbers, half quaternions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import seecr
+from seecr.errors import InputError
+
+ROBOT = seecr.load_robot("planar_vertical")
+HOME = ROBOT.reference_pose
+STIFF = seecr.Term.of(ROBOT, "stiffness", factor=1.1)
+MASKED = np.ma.masked_invalid(np.array([[np.nan, *HOME[1:]]]))
+WHOLE = np.ma.masked_array(np.arange(3), mask=[False, True, False])
+AT = [HOME[0]], [HOME[1]], [HOME[2]]
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: seecr.tension_margin(ROBOT, HOME, wrenches=np.zeros((0, 6))), "one or more"),
+        (lambda: seecr.feasible(ROBOT, HOME, wrenches=[]), "wrenches: expected one or more"),
+        (
+            lambda: seecr.feasible(ROBOT, HOME, effects=[STIFF], wrenches=np.zeros((0, 6))),
+            "wrenches: expected one or more",
+        ),
+        *(
+            (lambda most=most: seecr.equilibria(ROBOT, HOME, most=most), "most: expected a whole")
+            for most in (10.5, "x", 0, -5)
+        ),
+        (lambda: seecr.solve(ROBOT, MASKED), "poses holds numbers that are not finite"),
+        (lambda: seecr.workspace_map(ROBOT, WHOLE, 0.0, 0.3), "x holds numbers that are not fini"),
+        (
+            lambda: seecr.workspace_map(ROBOT, *AT, orientation=[1, 0, 0]),
+            r"orientation must be \(4,\), qw qx qy qz, got \(3,\)",
+        ),
+        (
+            lambda: seecr.workspace_map(ROBOT, *AT, orientation=[0, 0, 0, 0]),
+            "orientation: expected a unit quaternion qw qx qy qz, got one of norm 0",
+        ),
+        (lambda: seecr.predict(ROBOT, HOME, [STIFF, STIFF]), "stiffness is in the list twice"),
+    ],
+)
+def test_it_is_told_in_one_line(call: Callable[[], Any], words: str) -> None:
+    with pytest.raises(InputError, match=words) as told:
+        call()
+    assert "\n" not in str(told.value)
+
+
+def test_masked_arrays_without_anything_masked_are_numbers() -> None:
+    poses = np.ma.masked_array(HOME[None], mask=False)
+    assert seecr.solve(ROBOT, poses).converged.all()

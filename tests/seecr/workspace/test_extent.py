@@ -1,0 +1,61 @@
+"""How far a default grid extends where gravity is not along -z, and where joints keep a plane."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from turned import turned
+
+from seecr.description.mjcf import load_robot
+from seecr.errors import InputError
+from seecr.workspace.extent import grid_ends
+from seecr.workspace.maps import default_axes, workspace_map
+
+COGIRO = replace(load_robot("demobot_cogiro"), floor=None)
+PLANAR = load_robot("planar_vertical")
+HALF = np.pi / 2.0
+
+
+@pytest.mark.parametrize("rotvec", [[2 * HALF, 0, 0], [HALF, 0, 0], [0, -HALF, 0], [0, 0, HALF]])
+def test_the_grid_turns_along_where_gravity_stays_along_an_axis(rotvec: list[float]) -> None:
+    other, turn = turned(COGIRO, rotvec)
+    own = np.array([[axis[0], axis[-1]] for axis in default_axes(COGIRO, 3)])
+    there = np.array([[axis[0], axis[-1]] for axis in default_axes(other, 3)])
+    np.testing.assert_allclose(there, np.sort(turn @ own, axis=1), atol=1e-12)
+
+
+def test_with_oblique_gravity_all_of_the_turned_box_is_in_the_grid() -> None:
+    other, turn = turned(COGIRO, [0.3, 0.5, 0.1])
+    low, high = grid_ends(COGIRO, COGIRO.reference_pose[3:])
+    x, y, z = np.meshgrid(*zip(low, high, strict=True), indexing="ij")
+    corners = np.stack([x, y, z], axis=-1).reshape(-1, 3) @ turn.T
+    wide = grid_ends(other, other.reference_pose[3:])
+    # a box of the points, whose corners are those of the box only where four points are
+    exits = other.exit_points
+    below = exits - 2.0 * ((exits - other.reference_pose[:3]) @ other.up)[:, None] * other.up
+    for points in (exits, below):
+        assert np.all(points >= wide[0] - 1e-12) and np.all(points <= wide[1] + 1e-12)
+    assert np.all(wide[1] - wide[0] <= np.ptp(corners, axis=0) + 1e-12)
+
+
+def test_the_grid_of_a_planar_robot_lies_in_its_plane_also_if_exit_points_do_not() -> None:
+    apart = PLANAR.exit_points + np.array([[0, 0.1, 0], [0, -0.1, 0]] * 4)[: PLANAR.n_cables]
+    robot = replace(PLANAR, exit_points=apart)
+    axes = default_axes(robot, 3)
+    assert [len(axis) for axis in axes] == [3, 1, 3] and axes[1][0] == robot.reference_pose[1]
+
+
+def test_a_plane_that_no_grid_lies_in_is_told() -> None:
+    other, _turn = turned(PLANAR, [0, 0, np.radians(30.0)])
+    with pytest.raises(InputError, match="do not reach a grid along x, y and z") as told:
+        default_axes(other)
+    assert "turn the robot in its MJCF" in str(told.value)
+
+
+def test_a_grid_beside_the_plane_says_where_it_leaves_it() -> None:
+    with pytest.raises(InputError, match="its joints cannot reach x y z") as told:
+        workspace_map(PLANAR, [0.4, 0.5], [0.0, 0.2], [0.1])
+    assert "x y z 0.4 0.2 0.1 m" in str(told.value)
+    assert f"here with y {PLANAR.reference_pose[1]:.6g} m" in str(told.value)
