@@ -87,6 +87,9 @@ def command(
     would have to push, or pull more than allowed. If the model has a covariance,
     correction.json gives for each row the probability that its tensions stay within the limits.
 
+    If POSES.csv states positions alone and the robot has fewer cables than degrees of freedom, it
+    may turn as the balance demands: positions are reached in whatever orientation holds them.
+
     Poses are those of the platform in the base frame. A calibration divides errors between robot
     and tracker as well as it can, and may leave the platform farther off in the base frame than
     before; only what the tracker will read is certain. With --as-read the platform is brought to
@@ -106,7 +109,7 @@ def command(
     from seecr import InputFileError, correct, kept_chance
     from seecr.columns.command_file import read_commands
     from seecr.files import check_replaces, json_text, staged, with_toml, write_texts
-    from seecr.report.corrections import chance_lines, corrected_csv, corrected_toml
+    from seecr.report.corrections import chance_lines, corrected_csv, corrected_toml, turned_words
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
@@ -118,6 +121,8 @@ def command(
             "lengths are what correct computes",
         )
     wanted, tracker = _as_tracked(machine, wanted, own, as_read)
+    # fewer cables than degrees of freedom hold no orientation of one's choice
+    turns = wanted.any_orientation and machine.n_cables < machine.n_dof
     limits = float("inf") if highest is None else highest
     near = _aim(aim, machine.n_cables)
     commands_of_it = ("corrected.csv", "corrected.toml")
@@ -126,7 +131,7 @@ def command(
         with progress_share("correcting") as tell:
             found = correct(
                 machine, wanted.commands, effects=own or (), lowest=lowest, highest=limits,
-                aim=near, prefer=prefer,
+                aim=near, prefer=prefer, any_orientation=turns,
             )  # fmt: skip
             within = {"lowest": lowest, "highest": limits}
             if own is not None:
@@ -136,6 +141,8 @@ def command(
         status = 0 if found.stays.all() and found.reached.any() else 3
         told = replace(found.solution, line=found.commands.line)
         notes = [*notes_of(own, told, wanted.commands), *wanted.notes, *tracker]
+        if turns and found.reached.any():
+            notes.append(turned_words(found))
         made = made_by(machine.source, poses, model)
         document = {
             "made": made, "exit_status": status, "notes": notes, **found.as_json(kept)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.columns.beside import choice
-from seecr.columns.known import know_columns
+from seecr.columns.known import ANGLES, QUATERNION, know_columns
 from seecr.columns.loads import known_loads
 from seecr.columns.poses import aimed_poses, command_lengths, command_poses
 from seecr.columns.reach import check_reach
@@ -38,12 +38,14 @@ class CommandFile:
             without such columns or lengths.
         run: (n,) names of runs.
         notes: sentences for the reader: what was assumed or filled in.
+        any_orientation: whether it states positions alone.
     """
 
     commands: Commands
     wanted: Array | None
     run: tuple[str, ...]
     notes: tuple[str, ...]
+    any_orientation: bool = False
 
 
 def read_commands(path: str | Path, robot: Robot) -> CommandFile:
@@ -78,7 +80,8 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
         stands=np.ones(len(run), dtype=bool) if stands else None,
         line=columns.table.line,
     )
-    return CommandFile(commands, wanted, tuple(run.tolist()), tuple(columns.notes))
+    free = lengths is None and not columns.present("cmd", QUATERNION + ANGLES)
+    return CommandFile(commands, wanted, tuple(run.tolist()), tuple(columns.notes), free)
 
 
 def _beside(path: Path) -> tuple[bool, bool]:

@@ -87,6 +87,18 @@ class Correction(Result):
     why_not: tuple[str, ...]
     strain_limit: float | None = None
 
+    def in_any_orientation(self) -> Correction:
+        """The same if positions alone are wanted, which other orientations may hold as well."""
+        off = np.linalg.norm(self.aimed[:, :3] - self.wanted[:, :3], axis=1)
+        kept = self.found & (off <= _MOVED)
+        said = zip(kept, self.why_not, strict=True)
+        return replace(
+            self,
+            wanted=np.where(kept[:, None], self.aimed, self.wanted),
+            held=self.held | kept,
+            why_not=tuple("" if one else why for one, why in said),
+        )
+
     @property
     def left(self) -> Array:
         """(n, 6) [m, rad] from the wanted pose to the platform's equilibrium."""
@@ -240,6 +252,7 @@ def correct(
     highest: ArrayLike = np.inf,
     aim: str | ArrayLike = "minimum",
     prefer: str = "pose",
+    any_orientation: bool = False,
 ) -> Correction:
     """Lengths to command so that the platform comes to rest at wanted poses.
 
@@ -263,6 +276,9 @@ def correct(
         prefer: what is nearest to a pose that cannot be held. "pose" minimises
             position^2 + (length x rotation)^2; "position" changes only the orientation, if that
             suffices.
+        any_orientation: positions alone are wanted: a pose counts as wanted with the orientation
+            that holds its position, the nearest to that given. For robots with fewer cables than
+            degrees of freedom, which turn as the balance demands.
 
     Returns:
         the lengths and what they lead to; check ``reached`` before using a row.
@@ -273,7 +289,8 @@ def correct(
     if prefer not in PREFERENCES:
         raise InputError(f"prefer must be one of {', '.join(PREFERENCES)}, got {prefer!r}")
     search = _search_of(robot_of(robot), poses, effects, lowest, highest, aim)
-    return search.run(prefer == "position")
+    found = search.run(any_orientation or prefer == "position")
+    return found.in_any_orientation() if any_orientation else found
 
 
 def margins_in_place(

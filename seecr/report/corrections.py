@@ -77,6 +77,16 @@ def chance_lines(found: Correction, kept: Array | None, minimum: bool = False) -
         )
 
 
+def turned_words(found: Correction) -> str:
+    """How far the platform turns where positions alone are wanted."""
+    turned = pose_difference(found.solution.pose, found.robot.reference_pose)[found.reached, 3:]
+    largest = np.degrees(np.max(np.linalg.norm(turned, axis=1), initial=0.0))
+    return (
+        "with fewer cables than degrees of freedom the platform turns as the balance demands, here "
+        f"by up to {largest:.3g} deg from the reference pose; state an orientation to have no other"
+    )
+
+
 def joint_lines(wanted: Array, read: Array, seen: float) -> Iterator[str]:
     """How far off a tracker reads poses (n, 7) where joints keep the platform from others.
 
