@@ -61,6 +61,7 @@ def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
     verdict = sought.judgement.verdict
     unknown = verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     search = steps_of_set(sought, frozenset(sought.judgement.sure))
+    fitted = len(sought.calibration.terms.names)
     chances = chances_of(sought)
     more = sought.judgement.more
     some = [] if more or unknown else alternatives(sought.found, sought.classes)
@@ -77,7 +78,7 @@ def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
     missing = [_missing(sought, search, chances, name, best, spread) for name in search.found]
     return diagnosis_of(
         verdict,
-        _sentence(sought, missing, search.tried, chances, some),
+        _sentence(sought.judgement, missing, search.tried, chances, some, fitted),
         missing,
         search,
         before=sought.calibration.before,
@@ -170,13 +171,20 @@ def _size_notes(sought: SetSearch) -> list[str]:
 
 
 def _sentence(
-    sought: SetSearch,
+    said: Judgement,
     missing: Sequence[MissingEffect],
     tried: int,
     chances: Chances,
     alternatives: Sequence[Names] = (),
+    fitted: int = 0,
 ) -> str:
-    said = sought.judgement
+    """The verdict in words.
+
+    Args:
+        said, missing, tried, chances: as in the diagnosis.
+        alternatives: sets of effects that explain as much.
+        fitted: how many effects were fitted together.
+    """
     if said.verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         return agreement_words(tried, hints_of(chances, ()))
     if said.imitated is not None:
@@ -211,7 +219,7 @@ def _sentence(
             "No few effects explain the error with certainty; most probably it is "
             f"{some}. {all_of_them}"
         )
-    every = counted(len(sought.calibration.terms.names), "effect")
+    every = counted(fitted, "effect")
     return (
         f"No few effects explain the error, but {every} together do: they reduce it from "
         f"{rms_words(together.before)} to {rms_words(together.held_out)} on held-out runs. "

@@ -17,7 +17,7 @@ from crosscheck.fit.preparation.freed import freed
 from crosscheck.fit.preparation.parts import groups_of, laid_out
 from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.fit.suspect_data.another_robot import another_robot_doubts
-from crosscheck.fit.suspect_data.conventions import misread_orientations
+from crosscheck.fit.suspect_data.conventions import Misread, misread_orientations
 from crosscheck.fit.suspect_data.exchanged_columns import exchange_doubts
 from crosscheck.fit.suspect_data.tension_unit import tension_doubts
 from crosscheck.measurements.data import Measurements
@@ -100,7 +100,9 @@ def prepare(
     if far_off is not None and far_off.any() and estimates:
         others, estimates = estimate_sigma(problem.only(~far_off).with_sigma(data.sigma), plain)
         problem = problem.with_sigma(others.sigma)
+    misread = misread_orientations(problem, plain.readings)
     odd = [
+        *([misread.words] if misread is not None and not misread.certain else []),
         *another_robot_doubts(problem, plain.readings),
         *tension_doubts(problem, plain),
         *exchange_doubts(problem, plain),
@@ -117,16 +119,15 @@ def prepare(
         *said,
     )
     problem = problem.with_groups(groups_of(data, terms))
-    refusal = refusal_of(problem, plain.pose[:, :3], data.sigma) or _misread(problem, plain)
+    refusal = refusal_of(problem, plain.pose[:, :3], data.sigma) or _refused(misread, problem)
     return Prepared(
         problem, terms, notes, blocks_note(problem), refusal, int(found.free.sum()), far_off
     )
 
 
-def _misread(problem: Problem, plain: Prediction) -> Refusal | None:
+def _refused(found: Misread | None, problem: Problem) -> Refusal | None:
     """A refusal if orientations are of another convention: what is off then is no effect."""
-    found = misread_orientations(problem, plain.readings)
-    if found is None:
+    if found is None or not found.certain:
         return None
     return Refusal(
         Unfit.OTHER_CONVENTION,

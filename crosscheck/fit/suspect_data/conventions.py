@@ -30,8 +30,9 @@ from seecr.pose import (
 )
 
 # Another convention brings four rows in five so many times nearer to what the model expects, also
-# if the target may sit on the platform, or the tracker stand, in any orientation.
-_NEARER = 2.0
+# if the target may sit on the platform, or the tracker stand, in any orientation. If it brings them
+# only rather nearer, that is said, and no more.
+_NEARER, _RATHER_NEARER = 2.0, 1.5
 # One that makes quite other rotations also brings them nearer to the commands: a platform that the
 # model takes for heavier on the wrong side tilts the other way, without any convention.
 _NEARER_TO_COMMANDS = 2.0
@@ -111,12 +112,23 @@ class Misread:
         convention: how they seem to be meant.
         file: name of the file that they are in; "" if there is only one.
         here, there: median angle [rad] to what is expected, as they stand and by that convention.
+        certain: whether so much nearer that no verdict is to be passed on them.
     """
 
     convention: Convention
     file: str
     here: float
     there: float
+    certain: bool
+
+    @property
+    def words(self) -> str:
+        """A sentence that asks about it."""
+        file = f"{self.file}: " if self.file else ""
+        return (
+            f"{file}The measured orientations are {self.off} from those that the model expects, "
+            f"and {self.left} if {self.convention.value}: is that how they are written?"
+        )
 
     @property
     def off(self) -> str:
@@ -134,7 +146,9 @@ def _in_words(angle: float) -> str:
 
 
 def misread_orientations(problem: Problem, readings: Readings) -> Misread | None:
-    """The first file whose orientations are certainly of another convention; None without one.
+    """The file whose orientations seem to be of another convention; None without one.
+
+    The first one for which that is certain; if none is, the first one.
 
     Args:
         problem: the data with their noise. readings: what the model as it stands predicts.
@@ -144,20 +158,18 @@ def misread_orientations(problem: Problem, readings: Readings) -> Misread | None
         return None
     whole = problem.counted[:, BY_NAME["orientation"].columns].all(axis=1)
     whole &= np.isfinite(readings.quat_wxyz).all(axis=1)
+    found = []
     for k in np.unique(data.file):
         rows = whole & (data.file == k)
         if rows.sum() >= _LEAST_ROWS:
-            found = _of_rows(problem, readings, rows)
-            if found is not None:
-                name = data.files[k] if data.files else ""
-                return Misread(found[0], name, found[1], found[2])
-    return None
+            found += _of_rows(problem, readings, rows, data.files[k] if data.files else "")
+    return min(found, key=lambda one: not one.certain, default=None)
 
 
 def _of_rows(
-    problem: Problem, readings: Readings, rows: NDArray[np.bool_]
-) -> tuple[Convention, float, float] | None:
-    """The convention of some rows, and their median angles as they stand and by it."""
+    problem: Problem, readings: Readings, rows: NDArray[np.bool_], file: str
+) -> list[Misread]:
+    """What seems to be the convention of some rows; empty if it is the file's."""
     assert problem.data.quat_wxyz is not None
     read, expected = problem.data.quat_wxyz[rows], readings.quat_wxyz[rows]
     apart = _angles(read, expected)
@@ -167,18 +179,19 @@ def _of_rows(
         least = max(least, _NOISE * float(np.median(noise)))
     here = min(map(_most, (apart, *_mounted(read, expected))))
     if here < least:
-        return None
+        return []
     by = {which: meant(read) for which, meant in _READINGS.items()}
     best = min(by, key=lambda which: _most(_angles(by[which], expected)))
     near = _angles(by[best], expected)
-    if here < _NEARER * _most(near):
-        return None
+    if here < _RATHER_NEARER * _most(near):
+        return []
     told = _told(problem)[rows]
     if best not in _ALIKE:
         from_told = _most(_angles(by[best], told))
         if _most(_angles(read, told)) < _NEARER_TO_COMMANDS * from_told:
-            return None
-    return best, float(np.median(apart)), float(np.median(near))
+            return []
+    certain = here >= _NEARER * _most(near)
+    return [Misread(best, file, float(np.median(apart)), float(np.median(near)), certain)]
 
 
 def _mounted(read: Array, expected: Array) -> Iterator[Array]:

@@ -88,7 +88,7 @@ def test_orientations_of_another_convention_are_known(convention: Convention, de
     data = tilting(deg=deg)
     assert data.quat_wxyz is not None
     found = found_in(replace(data, quat_wxyz=written_as(data.quat_wxyz, convention)))
-    assert found is not None and found.convention is convention
+    assert found is not None and found.convention is convention and found.certain
     assert found.there < 3.0 * NOISE and found.here > 1.5 * found.there
 
 
@@ -100,6 +100,17 @@ def test_outliers_and_an_effect_do_not_hide_it(convention: Convention) -> None:
     quat[::10] = quat_multiply(quat_from_rotvec(np.array([0.5, -0.3, 0.1])), quat[::10])
     found = found_in(replace(data, quat_wxyz=quat))
     assert found is not None and found.convention is convention
+
+
+def test_where_conventions_hardly_differ_it_is_asked_and_no_more() -> None:
+    data = tilting(deg=3.2)
+    assert data.quat_wxyz is not None
+    odd = replace(data, quat_wxyz=written_as(data.quat_wxyz, Convention.ROTATION_VECTOR))
+    ready = prepare(COGIRO, odd, Terms())
+    assert ready.refusal is None
+    (note,) = (note for note in ready.notes if note.endswith("is that how they are written?"))
+    assert "deg if the three angles are a rotation vector: is that how" in note
+    assert not any("are written?" in note for note in prepare(COGIRO, data, Terms()).notes)
 
 
 @pytest.mark.parametrize("deg", [0.0, 4.0, 15.0])
