@@ -119,6 +119,7 @@ TRADE = {
     "crosscheck.suite.worst_pose": {"FILE_NAME"},
     "crosscheck.suite.write": {"RESULTS"},
     "crosscheck.twin": {"FILES"},
+    "seecr.exported.export": {"wrote"},
     # what results were made of
     "seecr.made": {"Made"},
     "seecr.description.fingerprint": {"fingerprint"},
@@ -134,6 +135,7 @@ TRADE = {
     "seecr.counted": {"counted"},
     "seecr.units": {"millimetres"},
     "seecr.description.robot": {"ITS_A_POINT"},
+    "seecr.effects.unfed": {"unfed"},
     "seecr.equilibrium.strained": {"strained", "strained_rows"},
     "seecr.equilibrium.multiple": {"elsewhere", "on_their_way"},
     # processes

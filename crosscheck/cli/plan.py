@@ -85,9 +85,10 @@ def command(
 
     POSES.csv holds commands in the same format as a file of measurements; readings in it are
     ignored. With --rows the poses are chosen: of those where the robot comes to rest within the
-    tension limits, without a slack cable if there are enough of them, those that together reveal
-    and distinguish most effects. The noise comes from --sigma, or from [sigma] in the TOML beside
-    POSES.csv, or else is that of good sensors.
+    tension limits, those that together reveal and distinguish most effects. At some of them cables
+    may be slack, which is said; with --lowest there are none such where enough others are. The
+    noise comes from --sigma, or from [sigma] in the TOML beside POSES.csv, or else is that of good
+    sensors.
 
     For each effect: the smallest visible size; the smallest size at which it can be named although
     another effect imitates it; which effects it would be indistinguishable from. Then what to add:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.coloured import Coloured
 from crosscheck.comparison.quantities import channels
-from crosscheck.comparison.sentence import misfit_sentence, noise_sentence, size_words
+from crosscheck.comparison.sentence import error_size_words, misfit_sentence, noise_sentence
 from crosscheck.comparison.tracking import Tracking
 from crosscheck.comparison.travel import Travel
 from crosscheck.fit.least_squares.problem import (
@@ -207,7 +207,7 @@ class Comparison(Result):
                 return said
             if errors_are_noise(self.problem, self.state.prediction):
                 return said  # so many times themselves says nothing
-            size = size_words(w.scale, self.times_noise)
+            size = error_size_words(w.scale, self.times_noise)
             return f"{said} {size[0].upper()}{size[1:]}."
         if w.is_noise:
             said = noise_sentence(w, self._known_as, self.associations)

@@ -43,7 +43,7 @@ def misfit_sentence(
         known_as: how the noise is known, "stated" or "estimated".
         associations: what the residuals are associated with, the strongest first.
     """
-    size, goes = size_words(white.scale, times), _goes_with(associations)
+    size, goes = error_size_words(white.scale, times), _goes_with(associations)
     end = f"; {goes}" if goes else ""
     if white.structured:
         return f"The model misses something: {size} and correlated between neighbouring rows{end}."
@@ -61,7 +61,7 @@ def misfit_sentence(
     )
 
 
-def size_words(scale: float, times: Mapping[str, float]) -> str:
+def error_size_words(scale: float, times: Mapping[str, float]) -> str:
     """How large errors are; which kinds of reading, if others are at their noise."""
     far = {kind: value for kind, value in times.items() if value > _AT_NOISE}
     near = [kind for kind in times if kind not in far]

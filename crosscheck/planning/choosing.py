@@ -140,7 +140,8 @@ def _usable(
 ) -> Planned | None:
     """The plan of those poses at which the plain robot rests, stiff and within the limits.
 
-    Those with slack cables are left out, if there are ``rows`` others.
+    Where a lowest tension is asked for, those with slack cables are left out, if there are ``rows``
+    others.
     """
     if len(poses) == 0:
         return None
@@ -148,7 +149,7 @@ def _usable(
     tensions = every.base.state.prediction.tensions
     good = trustworthy(every, every) if every.problem.use.any() else every.problem.use
     good = good & (tensions <= limits[1]).all(axis=1) & (tensions >= limits[0]).all(axis=1)
-    kept = np.flatnonzero(taut_first(every, good, rows))
+    kept = np.flatnonzero(taut_first(every, good, rows, limits))
     if len(kept) == 0:
         return None
     # a selection spread over all of them, as they are in the order of the grid

@@ -116,7 +116,10 @@ def _loose_words(loose: Sequence[tuple[int, tuple[str, ...]]], plan: Planned) ->
         return []
     lines = [f"line {line} ({' '.join(cables)})" for line, cables in loose]
     rows = counted(int(plan.problem.use.sum()), "pose")
-    return [f"cables are slack at {len(loose)} of {rows}: {some(lines, _MOST_LINES)}"]
+    return [
+        f"cables are slack at {len(loose)} of {rows}: {some(lines, _MOST_LINES)}; a lowest tension "
+        "above zero leaves such poses out of what is chosen or proposed"
+    ]
 
 
 def _unsolved(plan: Planned) -> list[str]:

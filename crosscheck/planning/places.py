@@ -31,8 +31,9 @@ def more_poses(
 ) -> Extension | None:
     """Poses in and around the planned region, some tilted, at which the robot can hold still.
 
-    Tensions that balance the load are not those that commanded lengths bring about: of the poses,
-    those are left out at which these leave a cable slack, if enough others are left.
+    Tensions that balance the load are not those that commanded lengths bring about. Where a lowest
+    tension is asked for, poses at which these leave a cable slack are left out, if enough others
+    are left; elsewhere they may be what tells effects apart.
 
     Args:
         plan: what is planned. limits: lowest and highest tension [N].
@@ -46,7 +47,7 @@ def more_poses(
     if len(poses) == 0:
         return None
     tried = like(plan, commands_at(plan.problem, poses))
-    poses = poses[taut_first(tried, trustworthy(tried, plan), MORE_POSES)]
+    poses = poses[taut_first(tried, trustworthy(tried, plan), MORE_POSES, limits)]
     if len(poses) == 0:
         return None
     found = like(plan, commands_at(plan.problem, poses))
@@ -68,8 +69,12 @@ def trustworthy(candidates: Planned, plan: Planned) -> np.ndarray:
     return np.asarray(good)
 
 
-def taut_first(candidates: Planned, good: NDArray[np.bool_], enough: int) -> NDArray[np.bool_]:
-    """(n,) the good ones at which no cable is slack, if they are enough; else all good ones."""
+def taut_first(
+    candidates: Planned, good: NDArray[np.bool_], enough: int, limits: Limits
+) -> NDArray[np.bool_]:
+    """(n,) the good ones; if cables are to pull, those without a slack one, if they are enough."""
+    if limits[0] <= 0.0:
+        return good
     taut = good & ~slack_at(candidates).any(axis=1)
     return taut if taut.sum() >= enough else good
 

@@ -25,9 +25,6 @@ F = TypeVar("F", bound=Callable[..., Any])
 _NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?(:.*)?")
 
 
-# Quaternions turn by so much [deg] as they are, and by less than this with the scalar last, if they
-# were meant so; an axis with such a component is that of the base frame.
-_TURNED, _UNTURNED, _ALONG = 90.0, 45.0, 1.0 - 1e-6
 _LEAST_EA, _MOST_EA = 1e-3, 1e12  # [N]: a steel rope as thick as an arm has 1e9
 _MOST_POSES = 10_000_000  # of a grid or line; more would take days, and all memory
 
@@ -189,6 +186,7 @@ def notes_of(
     from seecr import Commands
     from seecr.effects.unfed import unfed
     from seecr.equilibrium.strained import strained, strained_rows
+    from seecr.report.scalar_last import scalar_last
 
     robot = solution.robot
     much = (*strained(robot), *strained_rows(solution))
@@ -213,35 +211,6 @@ def outside(robot: Robot, commands: NDArray[np.float64]) -> tuple[str, ...]:
     return (
         f"{out} of {counted(len(away), 'command')} outside the frame: up to {away.max():.3g} m "
         f"from the reference position, and the frame is {robot.reach:.3g} m across",
-    )
-
-
-def scalar_last(robot: Robot, turns: ArrayLike) -> tuple[str, ...]:
-    """That quaternions (n, 4) seem to have their scalar last, where all of them do.
-
-    As they are they turn the platform by more than a right angle from its reference pose, and would
-    by less than half of one.
-    """
-    import numpy as np
-
-    from seecr.counted import figures
-    from seecr.pose import quat_conjugate, quat_multiply, rotvec_from_quat
-
-    given, home = np.reshape(turns, (-1, 4)), quat_conjugate(robot.reference_pose[3:])
-    here, there = (
-        np.degrees(rotvec_from_quat(quat_multiply(quat, np.tile(home, (len(quat), 1)))))
-        for quat in (given, np.roll(given, 1, axis=1))
-    )
-    sizes, others = (np.linalg.norm(turn, axis=1) for turn in (here, there))
-    if not len(given) or not (sizes.min() > _TURNED and others.max() < _UNTURNED):
-        return ()
-    first, axis = " ".join(figures(q, ".4g") for q in given[0]), here[0] / sizes[0]
-    along = np.flatnonzero(np.abs(axis) > _ALONG)
-    about = f" about {'xyz'[along[0]]}" if len(along) else ""
-    last = " ".join(figures(q, ".4g") for q in np.roll(given[0], 1))
-    return (
-        f"quaternions are scalar first: {first} turns the platform by {sizes[0]:.4g} deg{about} "
-        f"from its reference pose; if the scalar is last there, write {last}",
     )
 
 

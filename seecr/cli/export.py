@@ -12,7 +12,6 @@ from seecr.cli.arguments import (
     pose_of,
     robot_at,
     robot_options,
-    scalar_last,
 )
 from seecr.cli.following import following
 from seecr.cli.options import FILE, Number, json_option, made_by
@@ -74,6 +73,8 @@ def command(
     out.parent.mkdir(parents=True, exist_ok=True)
     files = {out: found.text} | ({beside: found.mujoco_text} if found.mujoco_text else {})
     write_texts(files, "cannot write the MJCF")
+    from seecr.report.scalar_last import scalar_last
+
     slip = scalar_last(machine, coordinates[3:])
     notes = [*machine.notes, *(own.notes if own else ()), *slip]
     if beside not in files and beside.is_file():

@@ -17,7 +17,6 @@ from seecr.cli.arguments import (
     picture_options,
     robot_at,
     robot_options,
-    scalar_last,
     turned_option,
 )
 from seecr.cli.following import following
@@ -122,6 +121,7 @@ def command(
     from seecr.files import json_text, staged, write_text
     from seecr.report.map_slices import map_figure
     from seecr.report.maps import beyond_line, write_arrays
+    from seecr.report.scalar_last import scalar_last
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)

@@ -13,7 +13,7 @@ from seecr.pose import Array, pose_difference
 from seecr.report.commanded import load_columns, toml_beside
 from seecr.result import COORDINATES
 
-__all__ = ["chance_lines", "corrected_csv", "corrected_toml", "joint_lines"]
+__all__ = ["chance_lines", "corrected_csv", "corrected_toml", "joint_lines", "turned_words"]
 
 _WANT = [f"want_{name}" for name in COORDINATES]
 # A probability below this deserves attention.

@@ -12,7 +12,7 @@ from crosscheck.comparison.associations import Association
 from crosscheck.comparison.coloured import _too_small
 from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.comparison.residuals import compare
-from crosscheck.comparison.sentence import misfit_sentence, noise_sentence, size_words
+from crosscheck.comparison.sentence import error_size_words, misfit_sentence, noise_sentence
 from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.measurements.data import Sigma
 from seecr.pose import quat_from_rotvec, quat_multiply, rotvec_from_quat
@@ -53,11 +53,11 @@ def test_gross_errors_are_not_many_small_effects() -> None:
 
 
 def test_kinds_of_readings_are_told_apart_if_only_some_are_off() -> None:
-    assert size_words(3.0, {"position": 4.0, "orientation": 2.0}) == (
+    assert error_size_words(3.0, {"position": 4.0, "orientation": 2.0}) == (
         "the errors are 3 times the noise"
     )
-    assert size_words(1.2, {"position": 1.3}) == "the errors are 1.2 times the noise"
-    assert size_words(9.0, {"position": 4.0, "orientation": 1.0, "tension": 15.0}) == (
+    assert error_size_words(1.2, {"position": 1.3}) == "the errors are 1.2 times the noise"
+    assert error_size_words(9.0, {"position": 4.0, "orientation": 1.0, "tension": 15.0}) == (
         "the errors of position and tension are 4 and 15 times the noise (those of orientation are "
         "noise)"
     )

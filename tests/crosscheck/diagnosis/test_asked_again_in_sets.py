@@ -205,6 +205,7 @@ def test_the_steps_vouch_for_what_sets_leave_beside_something_unknown(
     data = SimpleNamespace(data=SimpleNamespace(sigma=None))
     ready: Any = SimpleNamespace(problem=data, terms=None)
     monkeypatch.setattr(verdict, "by_steps", lambda *_: (steps, ()))
+    monkeypatch.setattr(verdict, "pairs_instead", lambda _steps: [])
     monkeypatch.setattr(verdict, "search_sets", lambda *_: sought)
     monkeypatch.setattr(verdict, "beside_imitated", lambda *given: (given, vouched))
     monkeypatch.setattr(verdict, "explained", lambda shown, _notes: shown)

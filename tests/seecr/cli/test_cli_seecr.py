@@ -14,13 +14,14 @@ import pytest
 from click.testing import CliRunner, Result
 
 from seecr.cli import COMMANDS, main
-from seecr.cli.arguments import robot_at, scalar_last
+from seecr.cli.arguments import robot_at
 from seecr.columns.command_file import read_commands
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.equilibrium.solving import solve
 from seecr.planar import midline_point
 from seecr.pose import transform_points
+from seecr.report.scalar_last import scalar_last
 
 PLACE = ["0.17", "0.25", "0.1"]
 
