@@ -5,7 +5,7 @@ tensions together (Carricato and Merlet 2013), by the method of Levenberg and Ma
 on the tensions: it also goes on where the linearised equations have no solution within the limits.
 The balance is that of straight cables, :mod:`seecr.compiled.straight`; a cable law is needed only
 for the stability. Derivatives are exact for free platforms, else by finite differences along the
-few rotations.
+few rotations, in each of which the joints keep the platform's origin.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from seecr.compiled.columns import (
     EA,
 )
 from seecr.compiled.jit import jit_allocating, jit_inner
-from seecr.compiled.joints import place_joints
+from seecr.compiled.placing import bring, make_placing_space, turning_basis
 from seecr.compiled.steps import advance
 from seecr.compiled.straight import (
     balance_straight,
@@ -52,7 +52,7 @@ _RAISE, _FINEST, _RAISES = 0.25, 2e-3, 24
 @jit_inner
 def _beside(number, by, row, state, length, space, tension, left):
     """Residual (d,) after a step ``by`` [m] along one coordinate."""
-    (cables, load, pose, screws, _), (place, values) = row, state
+    (cables, load, pose, screws), (place, values) = row, state
     step, trial, trial_values = space[6:9]
     step[:] = 0.0
     step[number] = by
@@ -64,7 +64,7 @@ def _beside(number, by, row, state, length, space, tension, left):
 @jit_inner
 def _is_firm(row, state, length, space, tension):
     """Whether the platform is stable there with plain elastic cables."""
-    (cables, load, pose, screws, _), (place, values) = row, state
+    (cables, load, pose, screws), (place, values) = row, state
     left, other, hessian, factor = space[9:13]
     d, by = left.shape[0], _DIFFERENCE * length
     for k in range(d):
@@ -127,37 +127,58 @@ def _step(turns, damping, space):
 
 
 @jit_inner
-def _onto_hinges(move, hinges, length, step):
+def _onto_turns(move, turns, length, basis, step):
     """From rotations [rad] to a step (d,) of all coordinates [m]."""
-    number = 0
+    on_joints = basis.shape[1] > 0
     for k in range(step.shape[0]):
         step[k] = 0.0
-        if hinges[k]:
-            step[k] = move[number] * length
-            number += 1
+        if on_joints:
+            for a in range(turns):
+                step[k] += move[a] * length * basis[a, k]
+        elif k >= step.shape[0] - turns:
+            step[k] = move[k - step.shape[0] + turns] * length
 
 
 @jit_inner
-def _rotate_all(row, state, length, scale, tension, space):
-    """Fill the rates, space[13], of the residual by rotations and tensions [loads per one]."""
-    hinges, left, other, rates = row[4], space[9], space[10], space[13]
-    number, by = 0, _DIFFERENCE * length
-    copy_rows(space[3], rates[rates.shape[0] - tension.shape[0] :])
-    if row[3].shape[0] == 0:  # not on joints
-        rates_of_rotations(row[1], length, scale, tension, space)
+def _turned(row, state, step, length, space, placing):
+    """The trial state, space[7:9], after a step that turns the platform about its origin."""
+    (_cables, _load, pose, screws), (place, values), (trial, trial_values) = row, state, space[7:9]
+    if screws.shape[0] == 0:
+        advance(place, values, step, length, screws, pose, trial, trial_values, space[0])
         return
-    for k in range(left.shape[0]):
-        if hinges[k]:
-            _beside(k, by, row, state, length, space, tension, other)
-            for j in range(left.shape[0]):
-                rates[number, j] = (other[j] - left[j]) / by * length / scale
-            number += 1
+    for k in range(step.shape[0]):
+        trial_values[k] = values[k] + step[k]
+    bring(screws, trial_values, length, pose, 0.0, 0.0, 0.0, trial, placing)
 
 
 @jit_inner
-def _solve(row, state, length, scale, low, high, tension, space):
+def _rotate_all(row, state, length, scale, tension, space, placing):
+    """Fill the rates, space[13], of the residual by rotations and tensions [loads per one].
+
+    The state is the one whose balance was computed last.
+    """
+    cables, load, pose, screws = row
+    left, other, rates, step, basis = space[9], space[10], space[13], space[6], placing[2]
+    by, turns = _DIFFERENCE * length, rates.shape[0] - tension.shape[0]
+    copy_rows(space[3], rates[turns:])
+    if screws.shape[0] == 0:  # not on joints
+        rates_of_rotations(load, length, scale, tension, space)
+        return
+    turning_basis(placing)
+    for a in range(turns):
+        for k in range(step.shape[0]):
+            step[k] = by * basis[a, k]
+        _turned(row, state, step, length, space, placing)
+        balance_straight(cables, load, pose, space[7], length, space)
+        left_of(space, tension, other)
+        for j in range(left.shape[0]):
+            rates[a, j] = (other[j] - left[j]) / by * length / scale
+
+
+@jit_inner
+def _solve(row, state, length, scale, low, high, tension, space, placing):
     """Balance a platform from a state, in place; returns whether that succeeded."""
-    (cables, load, pose, screws, hinges), (place, values) = row, state
+    (cables, load, pose, screws), (place, values) = row, state
     left, other, right, move, tried = space[9], space[10], space[16], space[17], space[18]
     m = tension.shape[0]
     turns = right.shape[0] - m
@@ -170,15 +191,15 @@ def _solve(row, state, length, scale, low, high, tension, space):
     for _ in range(_STEPS):
         if size <= _EXACT:
             return True
-        _rotate_all(row, state, length, scale, tension, space)
+        _rotate_all(row, state, length, scale, tension, space, placing)
         _normal_equations(turns, scale, low, high, tension, left, space)
         better = False
         while not better and damping <= _MOST:
             _step(turns, damping, space)
-            _onto_hinges(move, hinges, length, step)
+            _onto_turns(move, turns, length, placing[2], step)
             for i in range(m):
                 tried[i] = min(max(tension[i] + move[turns + i] * scale, low[i]), high[i])
-            advance(place, values, step, length, screws, pose, trial, trial_values, space[0])
+            _turned(row, state, step, length, space, placing)
             balance_straight(cables, load, pose, trial, length, space)
             new = left_of(space, tried, other) / scale
             better = new < size
@@ -211,7 +232,7 @@ def _inside(low, high, tension):
 
 
 @jit_inner
-def _raise(row, state, other, length, scale, low, high, space):
+def _raise(row, state, other, length, scale, low, high, space, placing):
     """Turn a platform that is held to where the tensions are farther inside; returns how far."""
     narrow_low, narrow_high, tension, pulls = space[19:23]
     m = tension.shape[0]
@@ -227,7 +248,7 @@ def _raise(row, state, other, length, scale, low, high, space):
             pulls[i] = min(max(tension[i], narrow_low[i]), narrow_high[i])
         copy_vector(state[0], other[0])
         copy_vector(state[1], other[1])
-        held = _solve(row, other, length, scale, narrow_low, narrow_high, pulls, space)
+        held = _solve(row, other, length, scale, narrow_low, narrow_high, pulls, space, placing)
         if held and _is_firm(row, other, length, space, pulls):
             copy_vector(other[0], state[0])
             copy_vector(other[1], state[1])
@@ -241,40 +262,42 @@ def _raise(row, state, other, length, scale, low, high, space):
 
 @jit_allocating
 def turn_batch(
-    cables, load, poses, screws, hinges, length, scale, low, high, starts, start_values, farther,
+    cables, load, poses, screws, turns, length, scale, low, high, starts, start_values, farther,
     best, best_values, margins,
 ):  # fmt: skip
     """Orientations that hold n platforms, from k starts each; better ones replace those known.
 
     Args:
         cables: (n, m, N_COLUMNS). load: (n, N_LOAD). poses: (n, 7). screws: (n, d or 0, 7).
-        hinges: (d,) coordinates that are rotations. length: [m]. scale: (n,) [N].
+        turns: independent rotations about the origin. length: [m]. scale: (n,) [N].
         low, high: (n, m) [N] limits.
-        starts: (n, k, 7) deviations. start_values: (n, k, d) joint values, hinges times length.
+        starts: (n, k, 7) deviations. start_values: (n, k, d) joint values, hinges times length; on
+            joints only their rotations count.
         farther: try all starts, and turn on to where tensions are farther inside; otherwise the
             first orientation that holds will do.
         best: (n, 7), best_values: (n, d), margins: (n,) [N] the best so far, updated; minus
             infinity where there is none.
     """
-    m, d, turns = cables.shape[1], hinges.shape[0], np.count_nonzero(hinges)
+    m, d = cables.shape[1], start_values.shape[2]
     space = make_turning_space(m, d, screws.shape[1], turns)
+    placing = make_placing_space(space[0], space[1], turns)
     state, other = (np.empty(7), np.zeros(d)), (np.empty(7), np.zeros(d))
     tension = space[21]
     for r in range(poses.shape[0]):
-        row, least, most = (cables[r], load[r], poses[r], screws[r], hinges), low[r], high[r]
+        row, least, most = (cables[r], load[r], poses[r], screws[r]), low[r], high[r]
         for k in range(starts.shape[1]):
             copy_vector(starts[r, k], state[0])
             copy_vector(start_values[r, k], state[1])
-            if screws.shape[1] > 0:
-                place_joints(screws[r], state[1], length, poses[r], state[0], space[0])
+            if not bring(screws[r], state[1], length, poses[r], 0.0, 0.0, 0.0, state[0], placing):
+                continue
             for i in range(m):
                 tension[i] = min(max(scale[r] / m, least[i]), most[i])
-            held = _solve(row, state, length, scale[r], least, most, tension, space)
+            held = _solve(row, state, length, scale[r], least, most, tension, space, placing)
             if not held or not _is_firm(row, state, length, space, tension):
                 continue
             margin = _inside(least, most, tension)
             if farther and turns + m > d:
-                margin = _raise(row, state, other, length, scale[r], least, most, space)
+                margin = _raise(row, state, other, length, scale[r], least, most, space, placing)
             if margin > margins[r]:
                 margins[r] = margin
                 copy_vector(state[0], best[r])

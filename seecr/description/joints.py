@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +24,8 @@ _OFF_MANIFOLD = 1e-6
 _EXACT = 1e-15
 # Changes of a pose below this are rounding [m or robot's length, rad]; so many values show them.
 _ROUNDING, _TRIES = 1e-12, 8
+# Motions of joints are independent if one is not this near to a combination of the others.
+_INDEPENDENT = 1e-9
 
 
 def pose_of_values(robot: Robot, values: Array) -> tuple[Array, Array]:
@@ -61,6 +65,28 @@ def locked(robot: Robot) -> NDArray[np.bool_]:
     off = np.abs(pose_difference(pose, np.tile(robot.reference_pose, (_TRIES, 1))))
     size = np.repeat([max(robot.length, 1.0), 1.0], 3)
     return np.asarray(np.all(off <= _ROUNDING * size, axis=0))
+
+
+@lru_cache(maxsize=16)
+def freedoms(robot: Robot) -> tuple[int, int, int]:
+    """Independent motions of the platform: all, rotations that keep its origin, all rotations.
+
+    They are 6, 3 and 3 for a free platform. A hinge beside the origin needs slides to keep it.
+    """
+    if not robot.joints:
+        return 6, 3, 3
+    # almost anywhere, joints move the platform in as many ways as they ever do
+    values = np.random.default_rng(0).uniform(-1.0, 1.0, (_TRIES, len(robot.joints)))
+    values = values * np.where(robot.hinges, 1.0, robot.length)
+    poses, screws = pose_of_values(robot, values)
+    columns = motion_columns(screws, poses[:, :3])
+    columns = columns / np.where(robot.hinges, robot.length, 1.0)
+    columns[:, 3:] *= robot.length
+    whole, moving, turning = (
+        int(np.linalg.matrix_rank(part, rtol=_INDEPENDENT).max())
+        for part in (columns, columns[:, :3], columns[:, 3:])
+    )
+    return whole, whole - moving, turning
 
 
 def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:

@@ -36,6 +36,7 @@ def part_of(problem: Reaching, rows: Rows) -> Reaching:
         balance=lambda poses, some, about=None: problem.balance(poses, rows[some], about),
         stays=lambda poses, some: problem.stays(poses, rows[some]),
         least=problem.least[rows], most=problem.most[rows], scale=problem.scale[rows],
+        motion=problem.motion.part(rows),
         straight=None if problem.straight is None else take(problem.straight, rows),
     )  # fmt: skip
 
@@ -61,13 +62,14 @@ def _out_to(problem: Reaching, firm: Candidates, ends: Array) -> Candidates:
     """Firm poses on straight lines from ends (n, d) to the reference and the nearest firm poses."""
     n, near = len(ends), ends.copy()
     home = problem.to(np.tile(problem.home, (n, 1)), np.arange(n))
-    best, rows = nearest_of(firm)
+    best, rows = nearest_of(problem, firm)
     near[rows] = best
     twice = np.tile(ends, (2, 1))
-    ways = problem.allowed(np.concatenate([home, near]) - twice)
-    many = twice[:, None] + _PARTS[:, None] * ways[:, None]
-    each = np.repeat(np.tile(np.arange(n), 2), len(_PARTS))
-    return _firm_of(problem, Candidates(many.reshape(len(each), -1), each))
+    own = np.tile(np.arange(n), 2)
+    ways = problem.motion.allowed(np.concatenate([home, near]), own) - twice
+    many, each = twice[:, None] + _PARTS[:, None] * ways[:, None], np.repeat(own, len(_PARTS))
+    away = problem.motion.allowed(many.reshape(len(each), -1), each)
+    return _firm_of(problem, Candidates(away, each))
 
 
 def _firm_of(problem: Reaching, some: Candidates) -> Candidates:
@@ -76,9 +78,9 @@ def _firm_of(problem: Reaching, some: Candidates) -> Candidates:
     return Candidates(some.away[firm], some.rows[firm])
 
 
-def nearest_of(some: Candidates) -> tuple[Array, Rows]:
+def nearest_of(problem: Reaching, some: Candidates) -> tuple[Array, Rows]:
     """The nearest candidate (k, d) of each row that has any, and those rows (k,)."""
-    order = np.lexsort((np.linalg.norm(some.away, axis=1), some.rows))
+    order = np.lexsort((problem.motion.far(some.away, some.rows), some.rows))
     rows, place = np.unique(some.rows[order], return_index=True)
     return some.away[order[place]], rows
 
@@ -89,15 +91,19 @@ def at_random(problem: Reaching, away: Array, rows: Rows) -> Array:
     Each round takes the nearest of some random draws about the best; rounds that gain widen the
     spread, others narrow it.
     """
-    random, best = np.random.default_rng(5), away.copy()
+    random, best, motion = np.random.default_rng(5), away.copy(), problem.motion
     wide, shape = np.full((len(rows), 1, 1), _SPREAD), (len(rows), _TRIES)
+    each = np.repeat(rows, _TRIES)
     for _ in range(_ROUNDS):
-        size = np.linalg.norm(best, axis=1)[:, None]
+        size = motion.far(best, rows)[:, None]
+        basis = motion.directions(best, rows).basis
         drawn = random.normal(size=(*shape, best.shape[1])) / np.sqrt(best.shape[1])
         inward_by = _PULL * wide * random.random((*shape, 1))
+        if basis is not None:
+            drawn = drawn @ basis.swapaxes(1, 2)
         tries = (1.0 - inward_by) * best[:, None] + wide * size[..., None] * drawn
-        tries = problem.allowed(tries)
-        far = np.linalg.norm(tries, axis=2)
+        tries = motion.allowed(tries.reshape(len(each), -1), each)
+        far, tries = motion.far(tries, each).reshape(shape), tries.reshape(*shape, -1)
         k, j = np.nonzero(far < size)
         firm = problem.firm(tries[k, j], rows[k])
         nearer = np.full(shape, np.inf)

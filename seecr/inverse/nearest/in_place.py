@@ -38,10 +38,10 @@ def poses_in_place(
     if not np.any(tables.cables[..., [RADIUS, WEIGHT, LIFT]]):
         return turned.poses, turned.found
     best, rows = Best.none(problem), np.arange(len(problem.wanted))
-    _try_all(best, np.zeros((len(rows), len(problem.free))), rows)
+    _try_all(best, np.zeros((len(rows), problem.robot.n_dof)), rows)
     # those of straight cables without pulleys are near
     some = rows[turned.found & ~best.firm]
-    _try_all(best, problem.allowed(problem.to(problem.coordinates(turned.poses[some]), some)), some)
+    _try_all(best, problem.to(problem.coordinates(turned.poses[some]), some), some)
     left, fresh = ~best.firm, np.flatnonzero(best.firm)
     while left.any():
         if len(fresh):
@@ -57,7 +57,8 @@ def poses_in_place(
 
 
 def _try_all(best: Best, away: Array, rows: Rows) -> None:
-    """Keep what reaches balance from displacements (k, d) of rows."""
+    """Keep what reaches balance from displacements (k, d) of rows, without those of positions."""
+    away = best.problem.motion.allowed(away, rows)
     best.keep(tightened(best.problem, best.problem.start(away, rows)))
 
 
@@ -75,5 +76,5 @@ def _from_neighbours(best: Best, rows: Rows, fresh: Rows) -> Rows:
     near = near.reshape(len(rows), -1)
     each, of = np.repeat(rows, near.shape[1]), fresh[near.ravel()]
     turned = problem.to(problem.moved(best.away[of], of), each)
-    _try_all(best, problem.allowed(turned), each)
+    _try_all(best, turned, each)
     return rows[best.firm[rows]]

@@ -67,7 +67,7 @@ class _Race:
 
     @classmethod
     def begun(cls, problem: Reaching, start: Spots) -> _Race:
-        k, size = len(start.rows), start.size()
+        k, size = len(start.rows), problem.size(start)
         # the balance curves more over a longer distance
         damping = np.maximum(_FIRST, 0.5 * size / problem.robot.length)
         return cls(
@@ -84,8 +84,8 @@ class _Race:
         to, price, possible = goal(problem, at, here, self.damping[still])
         new, total = _back(problem, at, to)
         price = 2.0 * np.abs(price).max(axis=1)
-        before = 0.5 * here.size() ** 2 + price * np.abs(at.left).sum(axis=1)
-        after = 0.5 * new.size() ** 2 + price * total
+        before = 0.5 * problem.size(here) ** 2 + price * np.abs(at.left).sum(axis=1)
+        after = 0.5 * problem.size(new) ** 2 + price * total
         better = possible & (after < before) & (new.left <= _LOOSE)
         here.left[:] = np.abs(at.left).max(axis=1) / scale
         moved = np.linalg.norm(new.away - here.away, axis=1)
@@ -94,10 +94,11 @@ class _Race:
         self._damp(better)
         self._mark()
         here = self.now.only(still)
-        tight = (here.left <= TIGHT) & (here.size() < self.held.size()[still])
+        size = problem.size(here)
+        tight = (here.left <= TIGHT) & (size < problem.size(self.held.only(still)))
         self.held.put(still[tight], here.only(tight))
         enough = ENOUGH * problem.robot.length
-        done = (moved <= enough) & (here.left <= TIGHT) | (here.size() <= enough)
+        done = (moved <= enough) & (here.left <= TIGHT) | (size <= enough)
         damping = self.damping[still]
         done |= (damping > _MOST) | ((self.idle[still] >= _PATIENCE) & (damping > 0.0))
         self.still = still[~done]
@@ -111,22 +112,23 @@ class _Race:
         self.damping[some], self.rose[some] = np.where(new < _NONE, 0.0, new), ~better
 
     def _mark(self) -> None:
-        some, size = self.still, self.now.only(self.still).size()
+        some, size = self.still, self.problem.size(self.now.only(self.still))
         gained = size < (1.0 - _GAIN) * self.mark[some]
         self.mark[some] = np.where(gained, size, self.mark[some])
         self.idle[some] = np.where(gained, 0, self.idle[some] + 1)
 
     def drop(self, most: float) -> None:
         """End searches that are so much farther away than the best of their row."""
-        size, best = self.now.size(), np.full(len(self.problem.wanted), np.inf)
+        size, best = self.problem.size(self.now), np.full(len(self.problem.wanted), np.inf)
         np.minimum.at(best, self.now.rows, size)
         self.still = self.still[(size <= most * best[self.now.rows])[self.still]]
 
     def ended(self) -> Spots:
         """The last points in balance, or the current ones if they can be balanced."""
-        loose = np.flatnonzero((self.now.left > TIGHT) & (self.now.size() < self.held.size()))
+        size, held = self.problem.size(self.now), self.problem.size(self.held)
+        loose = np.flatnonzero((self.now.left > TIGHT) & (size < held))
         back = restored(self.problem, self.now.only(loose))
-        better = (back.left <= TIGHT) & (back.size() < self.held.size()[loose])
+        better = (back.left <= TIGHT) & (self.problem.size(back) < held[loose])
         self.held.put(loose[better], back.only(better))
         return self.held
 
@@ -134,9 +136,11 @@ class _Race:
 def _back(problem: Reaching, at: Curved, start: Spots) -> tuple[Spots, Array]:
     """Points balanced again with the derivatives ``at`` the start, and residuals (k,) [N]."""
     away, pulls, rows = start.away, start.tensions, start.rows
+    none = np.zeros_like(away)
     for _ in range(_RESTORED):
         matrix, load = problem.at(away, rows, pulls)
-        new, taut, ok = problem.project(matrix, load, at.turn, away, (away, pulls), rows)
+        step, taut, ok = problem.project(matrix, load, at.turn, (none, pulls), rows)
+        new = problem.motion.stepped(away, rows, at.along.basis, step)
         away, pulls = np.where(ok[:, None], new, away), np.where(ok[:, None], taut, pulls)
     matrix, load = problem.at(away, rows, pulls)
     left = np.abs(np.einsum("ndm,nm->nd", matrix, pulls) - load)
@@ -170,13 +174,13 @@ def restored(problem: Reaching, start: Spots, enough: float = 0.1 * TIGHT) -> Sp
         here = out.only(still)
         at = Curved.about(problem, here.away, here.tensions, here.rows)
         here.left[:] = np.abs(at.left).max(axis=1) / problem.scale[here.rows]
-        near = (here.away, here.tensions)
-        to, taut, ok = problem.project(at.matrix, at.load, at.turn, here.away, near, here.rows)
-        step = to - here.away
+        near = (np.zeros_like(here.away), here.tensions)
+        step, taut, ok = problem.project(at.matrix, at.load, at.turn, near, here.rows)
         size = np.maximum(np.linalg.norm(step, axis=1), 1e-300)
         part = np.minimum(1.0, _LONGEST * problem.robot.length / size)[:, None]
         go = ok & (here.left > enough)
-        here.away[go] += (part * step)[go]
+        to = problem.motion.stepped(here.away, here.rows, at.along.basis, part * step)
+        here.away[go] = to[go]
         here.tensions[go] += (part * (taut - here.tensions))[go]
         out.put(still, here)
         still = still[go]

@@ -14,6 +14,7 @@ from seecr.description.robot import Robot
 from seecr.holding.balance import straight_balance
 from seecr.holding.distribution import balanced, distribute, nearly_balanced
 from seecr.holding.inside import can_balance
+from seecr.inverse.nearest.motion import Directions, PlatformMotion
 from seecr.pose import Array, pose_add, pose_difference
 from seecr.statics.tables import Tables
 
@@ -50,8 +51,8 @@ _DIFFERENCE = 1e-4
 class Reaching:
     """The search for the poses nearest to wanted ones (n, 7) that can be held.
 
-    ``away`` (k, d) is the displacement of poses from the wanted ones [m]; ``rows`` (k,) says which
-    wanted pose each of them belongs to. A row may occur several times.
+    ``away`` (k, d) is the displacement of poses from the wanted ones along the coordinates [m];
+    ``rows`` (k,) says which wanted pose each of them belongs to. A row may occur several times.
     """
 
     robot: Robot
@@ -62,7 +63,7 @@ class Reaching:
     least: Array  # (n, m) [N]
     most: Array  # (n, m) [N]
     scale: Array  # (n,) [N] load
-    free: Array  # (d,) how far each coordinate may go from its wanted value: 0 or infinity
+    motion: PlatformMotion  # from the wanted poses
     straight: Tables | None = None  # (n,) of the wanted poses; None if cables are not straight
     holds: Holds | None = None  # None if the balance is linear
 
@@ -93,16 +94,18 @@ class Reaching:
         inside = _INSIDE * scale[:, None]
         least = np.minimum(low + inside, 0.5 * (low + np.minimum(high, 1e300)))
         most = np.maximum(high - inside, least)
-        values = values_of_pose(robot, wanted)[0] if robot.joints else None
-        free = np.full(robot.n_dof, np.inf)
-        if fix_position:
-            free[~robot.hinges] = 0.0
-        return cls(robot, wanted, values, balance, stays, least, most, scale, free, straight, holds)
+        values, screws = None, np.zeros((len(wanted), 0, 7))
+        if robot.joints:
+            values, screws = values_of_pose(robot, wanted)
+        motion = PlatformMotion.about(robot, wanted, screws, fix_position)
+        return cls(
+            robot, wanted, values, balance, stays, least, most, scale, motion, straight, holds
+        )
 
     @property
     def is_in_place(self) -> bool:
         """Whether positions are kept."""
-        return not np.all(self.robot.hinges | (self.free > 0.0))
+        return self.motion.is_in_place
 
     @property
     def home(self) -> Array:
@@ -110,7 +113,7 @@ class Reaching:
         return (
             self.robot.reference_pose[None]
             if self.values is None
-            else np.zeros_like(self.free)[None]
+            else np.zeros((1, self.robot.n_dof))
         )
 
     def coordinates(self, poses: Array) -> Array:
@@ -150,7 +153,8 @@ class Reaching:
         if len(rows) == 0:
             return np.zeros(0, dtype=bool)
         limits = self.least[rows], self.most[rows]
-        return can_balance(*self.at(away, rows), *limits, self.scale[rows])
+        held = can_balance(*self.at(away, rows), *limits, self.scale[rows])
+        return np.asarray(held & self.motion.are_allowed(away, rows))
 
     def held(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
         """Whether the poses with these displacements can be held."""
@@ -182,9 +186,9 @@ class Reaching:
         left = np.abs(np.einsum("ndm,nm->nd", matrix, tensions) - load).max(axis=1)
         return left / self.scale[rows], held
 
-    def allowed(self, away: Array) -> Array:
-        """Displacements with zeros for coordinates that may not change."""
-        return np.where(self.free > 0.0, away, 0.0)
+    def size(self, spots: Spots) -> Array:
+        """(k,) [m] distance from the wanted poses."""
+        return self.motion.far(spots.away, spots.rows)
 
     def start(self, away: Array, rows: Rows) -> Spots:
         """Starting points, held or not, with the tensions that come nearest to balance."""
@@ -209,27 +213,26 @@ class Reaching:
         matrix: Array,
         load: Array,
         turn: Array,
-        away: Array,
         near: tuple[Array, Array],
         rows: Rows,
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Tensions and displacements nearest to ``near`` in balance as linearised about ``away``.
+        """The step and tensions nearest to ``near``, (k, d) and (k, m), in linearised balance.
 
         Args:
-            matrix: (k, d, m), load: (k, d) there. turn: (k, d, d) [N/m] derivative of the residual
-                with respect to the displacement.
+            matrix: (k, d, m), load: (k, d) where the step begins. turn: (k, d, d) [N/m] derivative
+                of the residual by steps along the :class:`PlatformMotion`'s directions.
 
         Returns:
-            Displacements (k, d), tensions (k, m), and (k,) whether there are any.
+            Steps (k, d), tensions (k, m), and (k,) whether there are any.
         """
         unit, m = self.unit(rows), matrix.shape[2]
         whole = np.concatenate([matrix / unit[:, None], turn], axis=2)
-        ends = np.broadcast_to(self.free, away.shape)
+        ends = np.broadcast_to(self.motion.free, near[0].shape)
         low = np.concatenate([self.least[rows] * unit, -ends], axis=1)
         high = np.concatenate([self.most[rows] * unit, ends], axis=1)
-        goal = np.concatenate([near[1] * unit, near[0] - away], axis=1)
+        goal = np.concatenate([near[1] * unit, near[0]], axis=1)
         answer, possible = distribute(whole, load, goal, low, high)
-        return away + answer[:, m:], answer[:, :m] / unit, possible
+        return answer[:, m:], answer[:, :m] / unit, possible
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,10 +247,6 @@ class Spots:
     rows: Rows
     tensions: Array
     left: Array
-
-    def size(self) -> Array:
-        """(k,) [m] distance from the wanted poses."""
-        return np.asarray(np.linalg.norm(self.away, axis=1))
 
     def only(self, some: NDArray[np.intp] | NDArray[np.bool_]) -> Spots:
         return Spots(self.away[some], self.rows[some], self.tensions[some], self.left[some])
@@ -275,48 +274,68 @@ class Spots:
 
 @dataclass(frozen=True, eq=False)
 class Curved:
-    """The balance about k poses to second order, at the tensions of a search.
+    """The balance and the distance about k poses to second order, at the tensions of a search.
+
+    All derivatives are by steps along the directions of the :class:`PlatformMotion`.
 
     Attributes:
         matrix: (k, d, m). load, left: (k, d) [N]; left is the residual.
-        turn: (k, d, d) [N/m] derivative of the residual with respect to the displacement.
+        turn: (k, d, d) [N/m] derivative of the residual.
+        along: the directions.
+        bend: (k, d, d) second derivative of half the squared distance, less one along each.
     """
 
     matrix: Array
     load: Array
     left: Array
     turn: Array
+    along: Directions
+    bend: Array
     _all: Array
     _matrices: Array
     _step: float
 
     @classmethod
     def about(cls, problem: Reaching, away: Array, tensions: Array, rows: Rows) -> Curved:
-        """By finite differences: central along each coordinate, and one step along each pair."""
+        """By finite differences: central along each direction, and one step along each pair."""
         (k, d), step = away.shape, _DIFFERENCE * problem.robot.length
+        along = problem.motion.directions(away, rows)
         eye, (i, j) = np.eye(d), np.triu_indices(d, 1)
         sides = step * np.concatenate([np.zeros((1, d)), eye, -eye, eye[i] + eye[j]])
-        moved = (away[:, None] + sides).reshape(-1, d)
         count = len(sides)
-        pulls = np.repeat(tensions, count, axis=0)
-        matrix, load = problem.at(moved, np.repeat(rows, count), pulls)
-        matrix = matrix.reshape(k, len(sides), d, -1)
-        load = load.reshape(k, len(sides), d)
-        left = np.einsum("nsdm,nm->nsd", matrix, tensions) - load
+        each, pulls = np.repeat(rows, count), np.repeat(tensions, count, axis=0)
+        moved = problem.motion.stepped(
+            np.repeat(away, count, axis=0), each,
+            None if along.basis is None else np.repeat(along.basis, count, axis=0),
+            np.tile(sides, (k, 1)),
+        )  # fmt: skip
+        matrix, load = problem.at(moved, each, pulls)
+        every, load = matrix.reshape(k, count, d, -1), load.reshape(k, count, d)
+        left = np.einsum("nsdm,nm->nsd", every, tensions) - load
         plus, minus = left[:, 1 : 1 + d], left[:, 1 + d : 1 + 2 * d]
         turn = np.swapaxes(plus - minus, 1, 2) / (2.0 * step)
-        return cls(matrix[:, 0], load[:, 0], left[:, 0], turn, left, matrix, step)
+        bend = np.zeros_like(turn)
+        if along.squares is not None:
+            half = 0.5 * (problem.motion.far(moved, each) ** 2).reshape(k, count)
+            bend = _second_differences(half, d) / step**2 - along.squares
+        first = every[:, 0], load[:, 0], left[:, 0]
+        return cls(*first, turn, along, bend, left, every, step)
 
     def bends(self, dual: Array) -> tuple[Array, Array]:
         """Second derivatives of dual . left: (k, d, d) and, mixed with tensions, (k, d, m)."""
         d = self.load.shape[1]
         value = np.einsum("nsd,nd->ns", self._all, dual)
-        first, plus, minus = value[:, :1], value[:, 1 : 1 + d], value[:, 1 + d : 1 + 2 * d]
-        i, j = np.triu_indices(d, 1)
-        own = np.zeros((len(dual), d, d))
-        own[:, i, j] = value[:, 1 + 2 * d :] - plus[:, i] - plus[:, j] + first
-        own += np.swapaxes(own, 1, 2)
-        own[:, np.arange(d), np.arange(d)] = plus + minus - 2.0 * first
         sides = self._matrices[:, 1 : 1 + d] - self._matrices[:, 1 + d : 1 + 2 * d]
         by_tension = np.einsum("nsdm,nd->nsm", sides, dual) / (2.0 * self._step)
-        return own / self._step**2, by_tension
+        return _second_differences(value, d) / self._step**2, by_tension
+
+
+def _second_differences(value: Array, d: int) -> Array:
+    """(k, d, d) of values (k, s) at no step, steps along each of d directions, back, and pairs."""
+    first, plus, minus = value[:, :1], value[:, 1 : 1 + d], value[:, 1 + d : 1 + 2 * d]
+    i, j = np.triu_indices(d, 1)
+    own = np.zeros((len(value), d, d))
+    own[:, i, j] = value[:, 1 + 2 * d :] - plus[:, i] - plus[:, j] + first
+    own += np.swapaxes(own, 1, 2)
+    own[:, np.arange(d), np.arange(d)] = plus + minus - 2.0 * first
+    return own

@@ -77,18 +77,19 @@ def toward(
     """As far on straight lines to the wanted poses as is fine; half of them keep their rotation."""
     inner, outer = np.zeros(len(rows)), np.ones(len(rows))
     turned = np.random.default_rng(4).random(len(rows)) < 0.5
-    keeps = turned[:, None] & problem.robot.hinges & ~problem.robot.hinges.all()
-    way = np.where(keeps, 0.0, away)
+    motion, way = problem.motion, away.copy()
+    if motion.turns < away.shape[1]:
+        way[turned] -= motion.brought(away[turned], rows[turned], np.zeros((turned.sum(), 3)))
     for number in range(_HALVINGS):
         if number in _FEWER:
-            size = np.linalg.norm(away - inner[:, None] * way, axis=1)
+            size = motion.far(motion.allowed(away - inner[:, None] * way, rows), rows)
             few = _nearer_half(size, rows, len(problem.wanted))
             away, way, rows = away[few], way[few], rows[few]
             inner, outer = inner[few], outer[few]
         middle = 0.5 * (inner + outer)
-        ok = fine(away - middle[:, None] * way, rows)
+        ok = fine(motion.allowed(away - middle[:, None] * way, rows), rows)
         inner, outer = np.where(ok, middle, inner), np.where(ok, outer, middle)
-    return away - inner[:, None] * way, rows
+    return motion.allowed(away - inner[:, None] * way, rows), rows
 
 
 def _nearer_half(size: Array, rows: Rows, n: int) -> Rows:
@@ -101,14 +102,13 @@ def _nearer_half(size: Array, rows: Rows, n: int) -> Rows:
 
 def spread(problem: Reaching, away: Array, rows: Rows, most: int) -> list[int]:
     """The nearest points of each row that differ in rotation from those before."""
-    chosen, size = [], np.linalg.norm(away, axis=1)
-    hinges, length = problem.robot.hinges, problem.robot.length
+    chosen, size = [], problem.motion.far(away, rows)
+    turned, length = problem.motion.turned(away, rows), problem.robot.length
     order = np.lexsort((size, rows))
     for mine in np.split(order, np.searchsorted(rows[order], np.arange(1, len(problem.wanted)))):
         # a platform that cannot turn is compared by position
         least = 1e-9 * length + size[mine[:1]].sum()
-        unit = min(length, least) if hinges.any() else least
-        place = (away[mine][:, hinges] if hinges.any() else away[mine]) / unit
+        place = turned[mine] / (min(length, least) if problem.robot.turns else least)
         far = np.full(len(mine), np.inf)
         taken: list[int] = []
         for gap in _APART:

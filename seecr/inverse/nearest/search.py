@@ -56,7 +56,7 @@ def nearest(problem: Reaching) -> Nearest:
             the tensions, which is not exact for heavy cables.
     """
     best, rows = Best.none(problem), np.arange(len(problem.wanted))
-    start = problem.start(np.zeros((len(rows), len(problem.free))), rows)
+    start = problem.start(np.zeros((len(rows), problem.robot.n_dof)), rows)
     best.keep(inward(problem, tightened(problem, start)))
     places = sample(problem)
     first = from_sample(problem, places).and_more(about_wanted(problem))
@@ -102,33 +102,42 @@ class Best:
     @classmethod
     def none(cls, problem: Reaching) -> Best:
         n = len(problem.wanted)
-        away, tensions = np.zeros((n, len(problem.free))), np.zeros(problem.least.shape)
+        away, tensions = np.zeros((n, problem.robot.n_dof)), np.zeros(problem.least.shape)
         loose = np.full(away.shape, np.inf)
         return cls(problem, away, tensions, np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), loose)
 
     def search(self, candidates: Candidates, most: int) -> None:
         """Search from the best candidates, ``most`` of each row."""
         spots = screened(self.problem, candidates, most)
-        if spots.tensions.shape[1] < len(self.problem.free):
+        if spots.tensions.shape[1] < self.problem.robot.n_dof:
             # few poses are held at all, and from stable ones searches may go on to unstable ones
             self.keep(spots)
         self.keep(inward(self.problem, spots))
 
     def keep(self, other: Spots) -> None:
         """Take results that are nearer, and stable ones rather than unstable ones."""
+        motion = self.problem.motion
         other = to_rounding(self.problem, other.only_tight(TIGHT))
+        other = other.only(motion.are_allowed(other.away, other.rows))
         if len(other.rows) == 0:
             return
         firm = self.problem.rests(other.away, other.rows)
-        size = other.size()
+        size, own, loose = self.problem.size(other), self._far(self.away), self._far(self.loose)
         for i in np.argsort(size):
             row = other.rows[i]
-            nearer = not self.found[row] or size[i] < np.linalg.norm(self.away[row])
+            nearer = not self.found[row] or size[i] < own[row]
             if firm[i] > self.firm[row] or (firm[i] == self.firm[row] and nearer):
                 self.away[row], self.tensions[row] = other.away[i], other.tensions[i]
-                self.found[row], self.firm[row] = True, firm[i]
-            if not firm[i] and size[i] < np.linalg.norm(self.loose[row]):
-                self.loose[row] = other.away[i]
+                self.found[row], self.firm[row], own[row] = True, firm[i], size[i]
+            if not firm[i] and size[i] < loose[row]:
+                self.loose[row], loose[row] = other.away[i], size[i]
+
+    def _far(self, away: Array) -> Array:
+        """(n,) [m] distances of displacements (n, d), infinite where these are."""
+        out = np.full(len(away), np.inf)
+        known: Rows = np.flatnonzero(np.isfinite(away).all(axis=1))
+        out[known] = self.problem.motion.far(away[known], known)
+        return out
 
     def take(self, rows: Rows, other: Best) -> None:
         """Copy the results of another search, which is for these rows only."""
@@ -141,18 +150,18 @@ class Best:
         Args:
             places: (k, 7) or (k, d) coordinates of a sample of poses that can be held.
         """
-        size = np.where(self.firm, np.linalg.norm(self.away, axis=1), np.inf)
-        end = np.linalg.norm(self.loose, axis=1)
+        size = np.where(self.firm, self._far(self.away), np.inf)
+        end = self._far(self.loose)
         rows = np.flatnonzero(self.found & (end < (1.0 - _NEARER) * size))
         if len(rows) == 0:
             return
         part = part_of(self.problem, rows)
-        away, some = nearest_of(firm_ends(part, places, self.loose[rows]))
+        away, some = nearest_of(part, firm_ends(part, places, self.loose[rows]))
         if len(some) == 0:
             return
         away = at_random(part, away, some)
         start = part.start(away, some)
-        better = np.linalg.norm(away, axis=1) < size[rows[some]]
+        better = part.motion.far(away, some) < size[rows[some]]
         to = rows[some[better]]
         self.away[to], self.tensions[to] = away[better], start.tensions[better]
         self.firm[to] = True
@@ -165,9 +174,9 @@ class Best:
         rows: Rows = np.flatnonzero(self.found)
         away, pulls, out = self.away[rows], self.tensions[rows], self.found.copy()
         at = Curved.about(self.problem, away, pulls, rows)
-        near = ((1.0 - _PART) * away, pulls)
-        to, _, possible = self.problem.project(at.matrix, at.load, at.turn, away, near, rows)
-        size = np.linalg.norm(away, axis=1)
-        gain = np.linalg.norm(to - away, axis=1) <= _FLAT * _PART * size
+        near = (-_PART * at.along.slope, pulls)
+        step, _, possible = self.problem.project(at.matrix, at.load, at.turn, near, rows)
+        size = self.problem.motion.far(away, rows)
+        gain = np.linalg.norm(step, axis=1) <= _FLAT * _PART * size
         out[rows] = (possible & gain) | (size <= ENOUGH * self.problem.robot.length)
         return out

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from seecr.description.joints import pose_of_values
 from seecr.description.robot import Robot
+from seecr.inverse.nearest.motion import PlatformMotion
 from seecr.inverse.nearest.problem import Reaching, Rows
 from seecr.pose import Array, quat_from_rotvec
 
@@ -69,14 +71,26 @@ def _turned(robot: Robot, random: np.random.Generator) -> Array:
 
 
 def _on_joints(robot: Robot, random: np.random.Generator) -> Array:
-    """Values of a platform's joints: slides over the box, hinges at all angles."""
+    """Values of a platform's joints: the origin over the box, hinges at all angles.
+
+    Slides are drawn as if the platform did not turn, and then follow it where it does.
+    """
     values, box = np.zeros((_SAMPLE, robot.n_dof)), _box(robot) - robot.reference_pose[:3]
     for i, joint in enumerate(robot.joints):
         along = box @ joint.axis
         slides = joint.kind == "slide"
         low, high = (along.min(), along.max()) if slides else (-np.pi, np.pi)
         values[:, i] = random.uniform(low, high, _SAMPLE)
-    return values
+    sliding, metre = ~robot.hinges, np.where(robot.hinges, robot.length, 1.0)
+    axes = np.array([joint.axis for joint in robot.joints])
+    at_home = PlatformMotion.about(robot, *_home_of(robot), False)
+    rows, places = np.zeros(_SAMPLE, dtype=np.intp), values[:, sliding] @ axes[sliding]
+    return at_home.brought(values * metre, rows, places) / metre
+
+
+def _home_of(robot: Robot) -> tuple[Array, Array]:
+    """The reference pose (1, 7), and the joints there (1, d, 7)."""
+    return pose_of_values(robot, np.zeros((1, robot.n_dof)))
 
 
 def from_sample(problem: Reaching, places: Array) -> Candidates:
@@ -87,11 +101,12 @@ def from_sample(problem: Reaching, places: Array) -> Candidates:
         mine = np.full(len(places), row)
         every = _in_place(problem, row) if in_place else problem.to(places, mine)
         some = min(_NEAR, len(every))
-        near = np.argsort(np.linalg.norm(every, axis=1))[:some]
+        near = np.argsort(problem.motion.far(every, np.full(len(every), row)))[:some]
         pick = np.concatenate([[0], near, random.choice(len(every), some, replace=False)])
         out.append(every[pick])
         rows.append(np.full(len(pick), row))
-    return Candidates(problem.allowed(np.concatenate(out)), np.concatenate(rows))
+    each = np.concatenate(rows)
+    return Candidates(problem.motion.allowed(np.concatenate(out), each), each)
 
 
 def _in_place(problem: Reaching, row: int) -> Array:
@@ -108,8 +123,9 @@ def _in_place(problem: Reaching, row: int) -> Array:
         every = problem.to(poses, rows)
     else:
         every = robot.length * random.uniform(-np.pi, np.pi, (_IN_PLACE, robot.n_dof))
+        every[:, ~robot.hinges] = 0.0
     home = problem.to(problem.home, rows[:1])
-    every = problem.allowed(np.concatenate([home, every]))
+    every = problem.motion.allowed(np.concatenate([home, every]), np.append(rows[:1], rows))
     lack, held = problem.lack(every[1:], rows)
     best = np.argsort(np.where(held, 0.0, lack))[: held.sum() + _NEARLY]
     return np.asarray(np.concatenate([every[:1], every[1:][best]]))
@@ -129,15 +145,17 @@ def about_wanted(problem: Reaching) -> Candidates:
 def about_answers(problem: Reaching, away: Array, rows: Rows) -> Candidates:
     """For some rows: their own solutions (n, d), rotated, and the nearest of other rows."""
     places, count = problem.moved(away[rows], rows), min(_ABOUT, len(rows))
-    far = np.linalg.norm(away[rows], axis=1) / problem.robot.length
+    far = problem.motion.far(away[rows], rows) / problem.robot.length
     widest = np.minimum(_WIDEST * far, np.pi)
     own = _about(problem, away[rows], rows, widest, _ABOUT, np.random.default_rng(3))
     others = np.empty((len(rows), count, away.shape[1]))
     for k, row in enumerate(rows):
         there = problem.to(places, np.full(len(places), row))
-        others[k] = there[np.argsort(np.linalg.norm(there, axis=1))[:count]]
-    shared = Candidates(problem.allowed(others.reshape(-1, away.shape[1])), np.repeat(rows, count))
-    return own.and_more(shared)
+        size = problem.motion.far(there, np.full(len(there), row))
+        others[k] = there[np.argsort(size)[:count]]
+    each = np.repeat(rows, count)
+    shared = problem.motion.allowed(others.reshape(-1, away.shape[1]), each)
+    return own.and_more(Candidates(shared, each))
 
 
 def _about(
@@ -153,15 +171,17 @@ def _about(
     Small rotations are more frequent than large ones. Two more keep the position, one of them with
     the reference orientation.
     """
-    robot, hinges = problem.robot, problem.robot.hinges
+    robot, hinges, motion = problem.robot, problem.robot.hinges, problem.motion
     home = problem.to(np.tile(problem.home, (len(rows), 1)), rows)
+    place, inner = (motion.apart(there, rows)[:, None, :3] for there in (middle, home))
     out = np.repeat(middle[:, None], count, axis=1)
     turn = random.normal(size=(*out.shape[:2], int(hinges.sum())))
     angle = widest[:, None, None] * robot.length * random.random((*out.shape[:2], 1)) ** 2
     out[..., hinges] += angle * turn / np.maximum(np.linalg.norm(turn, axis=2, keepdims=True), 1e-9)
     part = np.maximum(_INWARD * (2.0 * random.random((*out.shape[:2], 1)) - 1.0), 0.0)
-    out = np.where(hinges, out, out + part * (home[:, None] - out))
     level = np.where(hinges, home, middle)
     every = np.concatenate([out, level[:, None], middle[:, None]], axis=1)
-    away = problem.allowed(every.reshape(-1, every.shape[2]))
-    return Candidates(away, np.repeat(rows, every.shape[1]))
+    to = np.concatenate([place + part * (inner - place), place, place], axis=1)
+    each = np.repeat(rows, every.shape[1])
+    away = motion.brought(every.reshape(len(each), -1), each, to.reshape(len(each), 3))
+    return Candidates(motion.allowed(away, each), each)

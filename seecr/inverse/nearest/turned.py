@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.description.joints import freedoms
 from seecr.description.robot import Robot
 from seecr.pose import Array, quat_conjugate, quat_from_rotvec, quat_multiply
 from seecr.statics import batch
@@ -72,12 +73,12 @@ class Turned:
             tables.scale[rows], self.low[rows], self.high[rows],
         )  # fmt: skip
         first, first_values = (np.array(one, order="C") for one in starts)
-        hinges = np.array(self.robot.hinges)
+        turns = freedoms(self.robot)[1]
 
         def run(some: slice) -> None:
             cables, load, poses, screws, scale, low, high = (one[some] for one in given)
             turn_batch(
-                cables, load, poses, screws, hinges, tables.length, scale, low, high, first[some],
+                cables, load, poses, screws, turns, tables.length, scale, low, high, first[some],
                 first_values[some], farther, *(one[some] for one in part),
             )  # fmt: skip
 
@@ -88,7 +89,7 @@ class Turned:
 def turned_in_place(robot: Robot, tables: Tables, low: Array, high: Array) -> Turned:
     """Orientations that hold the positions of tables with tensions within limits (n, m) [N].
 
-    Positions are those of the tables' poses; a platform on joints keeps its slides.
+    Positions are those of the tables' poses.
     """
     n, home = len(tables), batch.Evaluation.empty(len(tables), robot.n_cables, robot.n_dof)
     out = Turned(robot, tables, low, high, home.deviation, home.values, np.full(n, -np.inf))
@@ -98,7 +99,7 @@ def turned_in_place(robot: Robot, tables: Tables, low: Array, high: Array) -> Tu
     _search_all(out, near, np.ones(n, dtype=bool), _STARTS)
     _improve(out, near[:, :0])
     _spread(out, near, np.flatnonzero(out.found))  # again, from farther inside
-    if robot.n_cables + int(robot.hinges.sum()) > robot.n_dof + 1:
+    if robot.n_cables + freedoms(robot)[1] > robot.n_dof + 1:
         # each orientation is one of many, and some of these are cut off by the limits
         _search_all(out, near, np.any(out.found[near], axis=1), _MORE)
     _improve(out, near)
@@ -160,11 +161,10 @@ def _improve(out: Turned, near: Rows) -> None:
 def _starts_of(out: Turned, others: Rows, rows: Rows) -> tuple[Array, Array]:
     """The orientations of other rows (k, s) as deviations and joint values for rows (k,)."""
     deviation = np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (*others.shape, 1))
-    values = np.zeros((*others.shape, out.values.shape[1]))
-    hinges, tables = out.robot.hinges, out.tables
+    tables = out.tables
     if out.robot.joints:
-        values[..., hinges] = out.values[others][..., hinges]
-        return deviation, values
+        return deviation, out.values[others]
+    values = np.zeros((*others.shape, out.values.shape[1]))
     turn = quat_multiply(out.deviation[others, 3:], tables.poses[others, 3:])
     back = np.broadcast_to(quat_conjugate(tables.poses[rows, 3:])[:, None], turn.shape)
     deviation[..., 3:] = quat_multiply(turn, back)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from from_python import from_python
 from random_robots import random_poses, random_robot
+from rejointed import WAYS, rejointed
 
 from seecr.commands.data import Commands
 from seecr.compiled.straight import (
@@ -19,7 +20,7 @@ from seecr.compiled.straight import (
 )
 from seecr.description.joints import pose_of_values
 from seecr.description.mjcf import load_robot
-from seecr.description.robot import Robot
+from seecr.description.robot import Joint, Robot
 from seecr.effects.load import ExternalWrench
 from seecr.holding.balance import balance_of, straight_balance
 from seecr.inverse.nearest.turned import Turned, turned_in_place
@@ -142,3 +143,30 @@ def test_four_cables_balance_a_platform_in_space_and_margins_are_those_of_their_
             if rests:
                 assert margin == pytest.approx(np.minimum(tension, HIGH - tension).min(), rel=1e-8)
                 assert margin > 0.0
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_position_is_that_of_the_origin_whatever_the_joints(way: str) -> None:
+    """Slides were kept instead: with the hinge beside the origin it left the position asked for."""
+    robot = load_robot("planar_two_cable")
+    places = np.tile(robot.reference_pose[:3], (12, 1))
+    places[:, 0] += np.linspace(-0.3, 0.3, 12)
+    found, other = turned(robot, places), turned(rejointed(robot, way), places)
+    assert found.found.all() and other.found.all()
+    np.testing.assert_allclose(other.poses, found.poses, atol=1e-9)
+    np.testing.assert_allclose(other.margins, found.margins, rtol=1e-7)
+
+
+def test_a_platform_on_hinges_alone_turns_about_its_origin_by_all_of_them() -> None:
+    """Three cables hold it where it is asked to be, with tensions farther inside than untilted."""
+    robot = load_robot("planar_vertical")
+    home, y = robot.reference_pose[:3], np.array([0.0, 1.0, 0.0])
+    ends = home + np.array([[-0.5, 0.0, -0.2], [-0.2, 0.0, 0.2], [0.05, 0.0, 0.02]])
+    arm = replace(
+        robot, joints=tuple(Joint("hinge", f"h{k}", y, end) for k, end in enumerate(ends))
+    )
+    places = home + np.array([[0.04, 0.0, 0.02], [0.0, 0.0, 0.05]])
+    found, other = turned(robot, places, 60.0), turned(arm, places, 60.0)
+    assert found.found.all() and other.found.all()
+    np.testing.assert_allclose(other.poses[:, :3], places, atol=1e-9)
+    np.testing.assert_allclose(other.margins, found.margins, rtol=2e-2)

@@ -14,6 +14,7 @@ from seecr.effects.terms import Term
 from seecr.errors import InputError
 from seecr.inverse.correction import correct
 from seecr.inverse.nearest import search
+from seecr.inverse.nearest.motion import PlatformMotion
 from seecr.inverse.nearest.problem import Curved, Reaching
 from seecr.inverse.nearest.screen import spread
 from seecr.planar import bar_equilibria
@@ -172,9 +173,10 @@ def test_a_turn_about_a_hinge_is_as_far_as_its_shorter_way() -> None:
     values = np.array([[-0.26, 0.151, 2.588], [-0.251, 0.156, 3.326]])
     want, there = pose_of_values(robot, values)[0]
     none = np.zeros((1, 4))
+    motion = PlatformMotion.about(robot, want[None], values_of_pose(robot, want[None])[1], False)
     problem = Reaching(
         robot, want[None], values[:1], lambda poses, *_: balance_equations(robot, poses),
-        lambda _, rows: np.ones(len(rows), dtype=bool), none, none, np.ones(1), np.ones(3),
+        lambda _, rows: np.ones(len(rows), dtype=bool), none, none, np.ones(1), motion,
     )  # fmt: skip
     (away,) = problem.to(problem.coordinates(there[None]), np.zeros(1, dtype=np.intp))
     assert away == pytest.approx((values[1] - values[0]) * [1.0, 1.0, robot.length])
@@ -183,9 +185,11 @@ def test_a_turn_about_a_hinge_is_as_far_as_its_shorter_way() -> None:
 def test_balance_bends_as_its_rates_change() -> None:
     robot = load_robot(model_path("ipanema"))
     none = np.zeros((1, 8))
+    want = robot.reference_pose[None]
+    motion = PlatformMotion.about(robot, want, np.zeros((1, 0, 7)), False)
     problem = Reaching(
-        robot, robot.reference_pose[None], None, lambda poses, *_: balance_equations(robot, poses),
-        lambda _, rows: np.ones(len(rows), dtype=bool), none, none, np.array([200.0]), np.ones(6),
+        robot, want, None, lambda poses, *_: balance_equations(robot, poses),
+        lambda _, rows: np.ones(len(rows), dtype=bool), none, none, np.array([200.0]), motion,
     )  # fmt: skip
     random, row = np.random.default_rng(0), np.zeros(1, dtype=np.intp)
     away, pulls = 0.3 * random.normal(size=(1, 6)), random.uniform(50.0, 900.0, (1, 8))

@@ -18,7 +18,7 @@ BORDER = 0.1
 
 def test_the_nearest_of_each_row_that_has_any() -> None:
     some = Candidates(np.array([[3.0, 0], [0, 1.0], [0.5, 0], [2.0, 0]]), np.array([2, 0, 2, 0]))
-    away, rows = nearest_of(some)
+    away, rows = nearest_of(slab([0.0, 0.0, 0.0]), some)
     assert rows.tolist() == [0, 2] and away.tolist() == [[0, 1.0], [0.5, 0]]
 
 

@@ -93,9 +93,7 @@ def test_others_start_from_the_results_of_their_nearest() -> None:
     problem, _tables = problem_of(poses, turned=2.5)
     best, some = Best.none(problem), np.array([1, 4, 7])
     left = np.setdiff1d(np.arange(9), some)
-    in_place._try_all(
-        best, problem.allowed(problem.to(problem.coordinates(poses[some]), some)), some
-    )
+    in_place._try_all(best, problem.to(problem.coordinates(poses[some]), some), some)
     assert np.flatnonzero(best.firm).tolist() == some.tolist()
     assert in_place._from_neighbours(best, left, some).tolist() == left.tolist()
     np.testing.assert_allclose(problem.placed(best.away, np.arange(9)), poses, atol=1e-9)

@@ -31,7 +31,7 @@ def test_a_search_ends_where_the_slab_ends_and_at_the_wanted_height() -> None:
 
 def test_a_wanted_pose_that_can_be_held_is_found_itself() -> None:
     problem = slab([0.2])
-    assert inward(problem, begun(problem, [-0.5])).size()[0] < 1e-6
+    assert problem.size(inward(problem, begun(problem, [-0.5])))[0] < 1e-6
 
 
 def test_one_step_without_damping_solves_a_linear_balance() -> None:
