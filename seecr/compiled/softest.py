@@ -19,6 +19,9 @@ from seecr.compiled.jit import jit_allocating, jit_inner
 # For matrices whose largest entry is 1: the rounding of zero, and how far below the smallest
 # eigenvalue the first shift for a Cholesky factor is.
 _ROUNDING, _BELOW = 2e-16, 1e-15
+# Squared motion that is added, relative to the largest, where joints can be moved without the
+# platform.
+_IDLE = 1e-14
 # Entries this close to the largest count as equal to it; the first of them is made positive.
 _AS_LARGE = 1.0 - 1e-6
 
@@ -163,3 +166,87 @@ def softest_batch(matrices, values, directions):
     scaled, factor, work = np.empty((d, d)), np.empty((d, d)), np.empty((4, d))
     for k in range(len(matrices)):
         values[k] = _softest(matrices[k], scaled, factor, work, directions[k])
+
+
+@jit_inner
+def _factor_motion(columns, square, factor):
+    """Cholesky factor of the products of motions; joints that move nothing count as hardly any."""
+    d, top = columns.shape[0], 0.0
+    for i in range(d):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(6):
+                total += columns[i, k] * columns[j, k]
+            square[i, j] = total
+        top = max(top, square[i, i])
+    shift = 0.0
+    while not cholesky(square, shift, factor):
+        shift = 10.0 * shift + _IDLE * top + 1e-300
+
+
+@jit_inner
+def _onto_motion(matrix, factor, out):
+    """Fill out = L^-1 matrix L^-T, from the lower triangle of the matrix."""
+    d = matrix.shape[0]
+    for i in range(d):
+        for j in range(d):
+            total = matrix[i, j] if j <= i else matrix[j, i]
+            for k in range(j):
+                total -= out[i, k] * factor[j, k]
+            out[i, j] = total / factor[j, j]
+    for j in range(d):
+        for i in range(d):
+            total = out[i, j]
+            for k in range(i):
+                total -= factor[i, k] * out[k, j]
+            out[i, j] = total / factor[i, i]
+
+
+@jit_inner
+def _motion_of(direction, factor, columns, motion):
+    """The motion (6,) of steps L^-T direction, with a positive largest component."""
+    d = direction.shape[0]
+    for back in range(d):
+        i = d - 1 - back
+        for k in range(i + 1, d):
+            direction[i] -= factor[k, i] * direction[k]
+        direction[i] /= factor[i, i]
+    largest, first = 0.0, 0
+    for k in range(6):
+        motion[k] = 0.0
+        for i in range(d):
+            motion[k] += direction[i] * columns[i, k]
+        largest = max(largest, abs(motion[k]))
+    while first < 5 and abs(motion[first]) < _AS_LARGE * largest:
+        first += 1
+    if motion[first] < 0.0:
+        for k in range(6):
+            motion[k] = -motion[k]
+
+
+@jit_allocating
+def softest_motions(matrices, columns, values, motions):
+    """The same on joints, as motions of the platform: of K v = value M v, M their products.
+
+    Unlike eigenvalues of K itself they do not depend on the order and places of joints.
+
+    Args:
+        matrices: (n, d, d) K by steps of the joints, only read.
+        columns: (n, d, 6) motion of the platform per step of each joint.
+        values: (n,), filled; nan if an entry is not finite.
+        motions: (n, 6), filled: of unit length, with a positive largest component.
+    """
+    d = matrices.shape[1]
+    scaled, factor, work = np.empty((d, d)), np.empty((d, d)), np.empty((4, d))
+    own, reduced, direction = np.empty((d, d)), np.empty((d, d)), np.empty(d)
+    for k in range(len(matrices)):
+        values[k] = math.nan
+        for i in range(6):
+            motions[k, i] = math.nan
+        if not np.isfinite(columns[k]).all():
+            continue
+        _factor_motion(columns[k], reduced, own)
+        _onto_motion(matrices[k], own, reduced)
+        values[k] = _softest(reduced, scaled, factor, work, direction)
+        if math.isfinite(values[k]):
+            _motion_of(direction, own, columns[k], motions[k])

@@ -190,19 +190,11 @@ class Elastic:
     def _softest(self) -> Iterator[tuple[str, Array, colours.Rgba]]:
         """Arrows of the softest direction: the motion, and the axis of the rotation."""
         found, robot = self.found, self.found.robot
-        metre = np.where(robot.hinges, robot.length, 1.0)
-        whole = (found.softest * metre).reshape(-1, robot.n_dof).astype(float)
+        whole = found.softest.reshape(-1, 6).astype(float) * np.repeat([1.0, robot.length], 3)
         long = (_LONG * self._step or 0.05 * robot.length) * whole
-        if robot.joints:
-            axes = np.stack([joint.axis for joint in robot.joints])
-        else:
-            axes = np.tile(np.eye(3), (2, 1))
-        for name, some, shade in (
-            ("moves", ~robot.hinges, colours.SKY), ("turns", robot.hinges, colours.ORANGE),
-        ):  # fmt: skip
-            if name == "turns" and not robot.turns:
-                continue
-            yield f"{_ELASTIC}/softest/{name}", long[:, some] @ axes[some], shade
+        yield f"{_ELASTIC}/softest/moves", long[:, :3], colours.SKY
+        if robot.turns:
+            yield f"{_ELASTIC}/softest/turns", long[:, 3:], colours.ORANGE
 
     def tabs(self, low: Array, high: Array) -> list[rrb.Container]:
         """The tabs of the layout: the quantities beside each other, and the softest direction."""

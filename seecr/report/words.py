@@ -173,7 +173,7 @@ def stiffness_lines(solution: Solution) -> Iterator[str]:
     frequencies, shapes = (part[0] for part in solution.modes)
     known = [significant(value, 4) for value in frequencies if np.isfinite(value)]
     if known:
-        first = direction_words(solution.robot, shapes[:, 0])
+        first = direction_words(solution.robot, solution.motion(0, shapes[:, 0]))
         yield f"natural frequencies without damping: {', '.join(known)} Hz; lowest mode: {first}"
         yield from _massless_lines(solution)
 
@@ -197,17 +197,12 @@ def _nudged(solution: Solution) -> str:
     if robot.weight == 0.0 or not soft > 0.0:
         return ""
     step = _NUDGE * robot.weight / soft * solution.softest_direction[0]
-    whole = np.linalg.norm(step * _metre(robot))
-    moved = float(np.linalg.norm(step[~robot.hinges]))
-    turned = float(np.linalg.norm(step[robot.hinges]))
+    moved, turned = float(np.linalg.norm(step[:3])), float(np.linalg.norm(step[3:]))
+    whole = np.hypot(moved, turned * robot.length)
     parts = [millimetres(moved, 3)] if moved > _PART * whole else []
     if turned * robot.length > _PART * whole:
         parts.append(f"{np.degrees(turned):.3g} deg")
     return f"; 1 % of the weight moves it by {' and '.join(parts)}"
-
-
-def _metre(robot: Robot) -> Array:
-    return np.where(robot.hinges, robot.length, 1.0)
 
 
 def softest_words(solution: Solution) -> str:
@@ -216,32 +211,32 @@ def softest_words(solution: Solution) -> str:
 
 
 def direction_words(robot: Robot, direction: Array) -> str:
-    """A direction (d,) [m, rad] in words, such as "turn about y"."""
-    direction = direction / np.linalg.norm(direction * _metre(robot))
-    if not np.isfinite(direction).all():
+    """A motion of the platform (6,) [m, rad] in words, such as "turn about y".
+
+    Where that is along the axis of a joint that is none of the base frame's, by the joint's name.
+    """
+    scaled = direction * np.repeat([1.0, robot.length], 3)
+    scaled = scaled / np.linalg.norm(scaled)
+    if not np.isfinite(scaled).all():
         return "no direction"
-    if robot.joints:
-        return _joint_words(robot, direction)
     words = []
-    for verb, part in (("move along", direction[:3]), ("turn about", robot.length * direction[3:])):
+    parts = (("move along", "slide", scaled[:3]), ("turn about", "hinge", scaled[3:]))
+    for verb, kind, part in parts:
         size = float(np.linalg.norm(part))
         if size > _PART:
-            axes = [a for a, v in zip("xyz", part / size, strict=True) if abs(v) > 2 * _PART]
-            words.append(f"{verb} {' and '.join(axes)}")
+            joints = [joint for joint in robot.joints if joint.kind == kind]
+            words.append(f"{verb} {_axis_words(part / size, joints)}")
     return ", ".join(words)
 
 
-def _joint_words(robot: Robot, direction: Array) -> str:
-    """The same for a platform on joints: along slides, about hinges."""
-    words = []
-    for verb, kind, metre in (("move along", "slide", 1.0), ("turn about", "hinge", robot.length)):
-        names = [
-            _axis_name(joint)
-            for joint, part in zip(robot.joints, direction, strict=True)
-            if joint.kind == kind and metre * abs(part) > _PART
-        ]
-        words += [f"{verb} {' and '.join(names)}"] if names else []
-    return ", ".join(words)
+def _axis_words(axis: Array, joints: Sequence[Joint]) -> str:
+    """The letters of a unit vector, or the name of the joint whose axis it is."""
+    letters = [a for a, v in zip("xyz", axis, strict=True) if abs(v) > 2 * _PART]
+    if len(letters) > 1:
+        for joint in joints:
+            if np.linalg.norm(np.cross(joint.axis, axis)) < _PART:
+                return joint.name
+    return " and ".join(letters)
 
 
 def _axis_name(joint: Joint) -> str:

@@ -140,6 +140,28 @@ def _refuse_no_length(tables: Tables, found: Evaluation) -> None:
     found.outcome[np.any(tables.cables[..., REST] <= 0.0, axis=1)] = NO_LENGTH
 
 
+def motions(tables: Tables, at: Evaluation) -> Array:
+    """The platform's motion (n, d, 6) per step along each coordinate, at the states of ``at``.
+
+    Translation of its origin, and rotation vector times the robot's length, base axes.
+    """
+    n = len(tables)
+    if tables.screws.shape[1] == 0:
+        return np.broadcast_to(np.eye(6), (n, 6, 6))
+    from seecr.compiled.apart import apart_batch  # takes a while to import
+
+    apart, out, rows = np.empty((n, 6)), np.empty((n, tables.n_dof, 6)), np.arange(n)
+
+    def run(part: slice) -> None:
+        apart_batch(
+            tables.screws, tables.poses, rows[part], at.values[part], tables.length, apart[part],
+            out[part],
+        )  # fmt: skip
+
+    in_parts(run, n)
+    return out
+
+
 def evaluate(tables: Tables, at: Evaluation, threads: int | None = 1) -> Evaluation:
     """Wrench, stiffness and energy at the deviations of ``at``; nothing is solved."""
     n, m = tables.cables.shape[:2]

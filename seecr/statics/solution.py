@@ -209,31 +209,50 @@ class Solution(Result):
 
     @cached_property
     def _softest(self) -> tuple[Array, Array]:
-        """Smallest eigenvalue of the scaled stiffness (n,), and its eigenvector (n, d)."""
-        from seecr.compiled.softest import softest_batch  # takes a while to import
+        """Smallest eigenvalue of the scaled stiffness (n,), and the motion (n, 6) [m] along it."""
+        from seecr.compiled.softest import softest_batch, softest_motions  # take a while to import
 
         hessian = self._softer_side.hessian
-        values, directions = np.empty(len(hessian)), np.empty(hessian.shape[:2])
+        values, directions = np.empty(len(hessian)), np.empty((len(hessian), 6))
+        columns = batch.motions(self.tables, self.evaluation) if self.robot.joints else None
 
         def run(part: slice) -> None:
-            softest_batch(hessian[part], values[part], directions[part])
+            if columns is None:
+                softest_batch(hessian[part], values[part], directions[part])
+            else:
+                softest_motions(hessian[part], columns[part], values[part], directions[part])
 
         in_parts(run, len(hessian))
         return values, directions
 
     @property
     def smallest_eigenvalue(self) -> Array:
-        """Smallest eigenvalue of the stiffness, (n,) [N/m], rotations times the robot's length."""
+        """Smallest eigenvalue of the stiffness, (n,) [N/m], rotations times the robot's length.
+
+        It is of the platform's motions, translations of its origin and rotations, that its joints
+        allow, whatever these are.
+        """
         return self._softest[0]
 
     @property
     def softest_direction(self) -> Array:
-        """Eigenvector of the smallest eigenvalue, (n, d) [m, rad].
+        """The platform's motion of the smallest eigenvalue, (n, 6) [m, rad], base axes.
 
-        It has unit length and a positive largest component, with rotations times the robot's
-        length. NaN if the stiffness is not known.
+        Translation of its origin, then rotation vector. It has unit length and a positive largest
+        component, with rotations times the robot's length. NaN if the stiffness is not known.
         """
-        return self._softest[1] / self._units()
+        return np.asarray(self._softest[1] / np.repeat([1.0, self.robot.length], 3))
+
+    def motion(self, i: int, coordinates: Array) -> Array:
+        """The platform's motion (6,) [m, rad] along coordinates (d,) of :attr:`stiffness`, pose i.
+
+        Translation of its origin, then rotation vector, base axes.
+        """
+        rows = np.array([i])
+        at = batch.take_evaluation(self.evaluation, rows)
+        columns = batch.motions(take(self.tables, rows), at)[0]
+        whole = (coordinates * self._units()) @ columns
+        return np.asarray(whole / np.repeat([1.0, self.robot.length], 3))
 
     def _units(self) -> Array:
         """The robot's length for rotations, 1 for translations, (d,)."""
@@ -323,8 +342,7 @@ class Solution(Result):
         status = self.status[i]
         if status not in (Status.SINGULAR, Status.UNSTABLE):
             return str(status.value)
-        names = [joint.name for joint in self.robot.joints] or ["x", "y", "z", "rx", "ry", "rz"]
-        vector = self._softest[1][i]
+        names, vector = ("x", "y", "z", "rx", "ry", "rz"), self._softest[1][i]
         parts = [
             f"{value:+.2f} {name}"
             for value, name in zip(vector, names, strict=True)

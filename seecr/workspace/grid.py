@@ -50,7 +50,7 @@ class Workspace(Result):
         rotation: (..., 3) [rad] likewise.
         slack: number of slack cables; -1 where it does not come to rest or is free to move.
         stiffness: [N/m] smallest eigenvalue, with rotations times the robot's length.
-        softest: (..., d) [m, rad] its direction, :attr:`Solution.softest_direction`; float32.
+        softest: (..., 6) [m, rad] its direction, :attr:`Solution.softest_direction`; float32.
         chance: the probability that the pose can be held, given the uncertainty of the model;
             float32; None if it was not asked for.
         elastic: whether the equilibria of the elastic robot were computed.
@@ -231,10 +231,7 @@ class Workspace(Result):
             **{f"d{a}_m": self.deviation[..., k].ravel() for k, a in enumerate("xyz")},
             **{f"r{a}_rad": self.rotation[..., k].ravel() for k, a in enumerate("xyz")},
             "smallest_eigenvalue_N_per_m": self.stiffness.ravel(),
-            **{
-                f"softest_{name}": self.softest[..., k].ravel()
-                for k, name in enumerate([j.name for j in self.robot.joints] or _FREEDOMS)
-            },
+            **{f"softest_{name}": self.softest[..., k].ravel() for k, name in enumerate(_FREEDOMS)},
         }
         listed = {name: values.tolist() for name, values in columns.items()}
         return [dict(zip(listed, row, strict=True)) for row in zip(*listed.values(), strict=True)]

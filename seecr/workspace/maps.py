@@ -148,7 +148,7 @@ def workspace_map(
     margin, slack = np.empty(n), np.full(n, NEVER, dtype=np.int8)
     likely = np.empty(n, np.float32) if chance else None
     moved, stiffness = np.full((n, 6), np.nan, np.float32), np.full(n, np.nan, np.float32)
-    softest = np.full((n, robot.n_dof), np.nan, np.float32)
+    softest = np.full((n, 6), np.nan, np.float32)
     status = np.empty(n, np.int8) if elastic else None
 
     def fill(part: slice) -> None:

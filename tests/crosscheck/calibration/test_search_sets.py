@@ -227,7 +227,7 @@ def assert_shown_as_many(found: SetSearch) -> None:
     """As it is told where only one of the two effects carries enough to be sure of."""
     many = Judgement(DiagnosisVerdict.MANY_EFFECTS, ("gravity_tilt",), 0.0)
     said = explained(replace(found, judgement=many), [])
-    assert said.sentence.startswith("No few effects explain the error, but all ")
+    assert said.sentence.startswith("No few effects explain the error, but 7 effects together do: ")
     assert said.sentence.endswith("Certain among them: gravity_tilt.")
     (listed,) = said.missing
     # beside all that are probable

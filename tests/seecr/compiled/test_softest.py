@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
-from seecr.compiled.softest import softest_batch
+from seecr.compiled.softest import softest_batch, softest_motions
 from seecr.pose import Array
 
 # Parts of the largest entry: a few roundings of six unknowns. LAPACK leaves a quarter of that.
@@ -110,3 +111,28 @@ def test_the_sign_is_that_of_the_largest_part() -> None:
     np.testing.assert_allclose(found, -direction, atol=1e-14)
     level = np.full((1, 2, 2), [[1.0, 0.5], [0.5, 1.0]])
     np.testing.assert_allclose(softest(level)[1][0], [np.sqrt(0.5), -np.sqrt(0.5)], atol=1e-15)
+
+
+@pytest.mark.parametrize("d", [1, 2, 3, 5, 6])
+def test_on_joints_it_is_the_generalised_problem_of_the_platforms_motions(d: int) -> None:
+    random = np.random.default_rng(10 + d)
+    half, mix = random.normal(size=(200, d, d)), np.eye(d) + 0.2 * random.normal(size=(200, d, d))
+    columns = mix @ np.linalg.qr(random.normal(size=(200, 6, 6)))[0][:, :d]
+    matrices = half + half.swapaxes(1, 2)
+    values, motions = np.empty(200), np.empty((200, 6))
+    softest_motions(matrices, columns, values, motions)
+    for matrix, column, value, motion in zip(matrices, columns, values, motions, strict=True):
+        expected, vectors = eigh(matrix, column @ column.T)
+        assert value == pytest.approx(expected[0], rel=1e-8, abs=1e-10)
+        np.testing.assert_allclose(np.abs(motion), np.abs(vectors[:, 0] @ column), atol=1e-6)
+        assert np.linalg.norm(motion) == pytest.approx(1.0)
+        assert motion.max() >= np.abs(motion).max() * (1.0 - 2e-6)
+
+
+def test_on_joints_not_a_number_is_none() -> None:
+    values, motions = np.empty(2), np.empty((2, 6))
+    columns = np.tile(np.eye(6)[:3], (2, 1, 1))
+    matrices = np.tile(np.eye(3), (2, 1, 1))
+    columns[0, 0, 0] = matrices[1, 2, 2] = np.nan
+    softest_motions(matrices, columns, values, motions)
+    assert np.isnan(values).all() and np.isnan(motions).all()

@@ -474,7 +474,7 @@ def test_a_balanced_but_unstable_pose_is_said_to_be_so(method: str) -> None:
                  centre_of_mass=[0.0, 0, 0.2], rest_lengths=[0.9])  # fmt: skip
     answer = solve(robot, HERE, method=method)
     assert answer.status[0] is Status.UNSTABLE and not answer.converged[0]
-    assert answer.sentence(0).endswith("(direction +1.00 turn)")
+    assert answer.sentence(0).endswith("(direction +1.00 ry)")
     assert answer.smallest_eigenvalue[0] < 0
 
 

@@ -94,12 +94,15 @@ def test_joints_move_along_slides_and_turn_about_hinges() -> None:
     unnamed = replace(robot, joints=tuple(
         replace(joint, name=f"joint{k}") for k, joint in enumerate((*slides, *hinges))
     ))  # fmt: skip
-    both = np.array([1.0, 0.0, 1.0 / robot.length])
+    both = np.array([1.0, 0.0, 0.0, 0.0, 1.0 / robot.length, 0.0])
     assert direction_words(unnamed, both) == "move along x, turn about y"
-    assert direction_words(unnamed, np.array([1.0, 1.0, 0.0])) == "move along x and z"
+    sloping = np.array([1.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    assert direction_words(unnamed, sloping) == "move along x and z"
     askew = replace(slides[0], axis=np.array([0.6, 0.0, 0.8]), name="ramp")
     ramp = replace(robot, joints=(askew, *robot.joints[1:]))
-    assert direction_words(ramp, np.array([1.0, 0.0, 0.0])) == "move along ramp"
+    up = np.array([-0.6, 0.0, -0.8, 0.0, 0.0, 0.0])
+    assert direction_words(ramp, up) == "move along ramp"
+    assert direction_words(ramp, sloping) == "move along x and z"
 
 
 def test_other_equilibria_are_told_apart() -> None:
