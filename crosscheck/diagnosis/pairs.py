@@ -31,6 +31,8 @@ _AS_MUCH = 25.0
 # It is fitted if straight lines promise as much, or nearly all of what the listed effect explains:
 # they are far off where a frame is out of level by degrees.
 _NEARLY = 0.02
+# On a robot that moves in a plane, no more than three of a pose's values are seen.
+_POSE = 6
 # Most pairs that are fitted in place of one effect.
 _FITTED = 3
 
@@ -64,9 +66,10 @@ def pairs_instead(found: Search) -> list[Terms]:
     """
     fit, trials = found.last.fit, found.trials
     some = {name: _seen(fit, name) for name in found.found}
-    if max(some.values(), default=0) < 2:
+    largest = max(some.values(), default=0)
+    if largest < 2:
         return []
-    others = list(_others(trials, fit))
+    others = list(_others(trials, fit, max(largest, _POSE)))
     return [pair for name, most in some.items() if most > 1
             for pair in _pairs(trials, fit, name, most, others)]  # fmt: skip
 
@@ -77,11 +80,12 @@ def _seen(fit: Fit, name: str) -> int:
     return int(np.sum(np.max(np.abs(fit.jacobian[:, own]), axis=0, initial=0.0) > UNSEEN))
 
 
-def _others(trials: Trials, fit: Fit) -> Iterator[_Columns]:
-    """The effects that the model does not have, each at its first shape."""
+def _others(trials: Trials, fit: Fit, most: int) -> Iterator[_Columns]:
+    """The effects of up to so many values that the model does not have, at their first shapes."""
     for one in trials.candidates(trials.problem):
         layout = one.layout
-        if one.why_not is not None or layout.name in fit.terms:
+        absent = one.why_not is None and layout.name not in fit.terms
+        if not absent or np.sum(~layout.shape) > most:
             continue
         for shape in layout.effect.shapes(fit.state.prediction.setup)[:1]:
             null = layout.start(shape)
