@@ -247,7 +247,7 @@ def _not_listed(
             why = Why.CARRIES_LITTLE if p > PROBABLE else Why.NOT_NEEDED_BESIDE
             return Reason(why, p=p, by=listed)
         if p <= PROBABLE:
-            return Reason(Why.IMPROBABLE, p=p)
+            return Reason(Why.OPEN if c.name in undecided else Why.IMPROBABLE, p=p)
         if c.name in said.replaceable:
             return Reason(Why.REPLACEABLE, p=p)
         is_small = listed and c.name not in undecided

@@ -10,11 +10,13 @@ import pytest
 from made_data import measured, term
 from made_diagnoses import POINTS, diagnose_with, pulleys, robot
 
+from crosscheck.calibration.judgement.verdict import Judgement
 from crosscheck.diagnosis.averaged import spread_by_others
+from crosscheck.diagnosis.explained import _not_listed
 from crosscheck.diagnosis.pairs import pairs_instead
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.fit.effects.systematic import moves_by_effect
-from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.fit.reasons import DiagnosisVerdict, Why
 from crosscheck.measurements.data import Sigma
 from crosscheck.planning.deciding import telling_models_apart
 from crosscheck.planning.extensions import extensions
@@ -43,6 +45,17 @@ def test_what_two_effects_do_is_not_called_a_hose_for_sure() -> None:
     assert found.verdict is DiagnosisVerdict.MANY_EFFECTS and not found.missing
     assert "it is external_wrench, or gravity_tilt + " in found.sentence
     assert "gravity_tilt + stiffness" in found.sentence
+
+
+def test_what_one_of_the_sets_has_is_open_and_not_too_little() -> None:
+    """A force at 40 %, of which the sentence said that it may be it, "explains too little"."""
+    found = soft_and_tilted()
+    assert found.search is not None and found.chances is not None
+    chances = replace(found.chances, effect=dict.fromkeys(found.chances.effect, 0.4))
+    many = Judgement(DiagnosisVerdict.MANY_EFFECTS, (), 0.0)
+    rows = _not_listed(found.search, chances, many, frozenset({"external_wrench"}))
+    why = {row.effect: row.why_not.why for row in rows}
+    assert why["external_wrench"] is Why.OPEN and why["drum_gain"] is Why.IMPROBABLE
 
 
 def test_a_payload_that_tells_them_apart_is_proposed_first() -> None:
