@@ -29,7 +29,7 @@ def spread_by_others(problem: Problem, fit: Fit, chances: Chances) -> Array:
     likely = {
         members[0]: p
         for members, p in chances.classes
-        if p > _MATTERS and fit.terms.names and not set(members) & set(fit.terms.names)
+        if p > _MATTERS and not set(members) & set(fit.terms.names)
     }
     moves = moves_by_effect(problem, fit, likely) if likely else {}
     square = [likely[name] * move**2 for name, (_fall, move) in moves.items()]

@@ -14,6 +14,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from crosscheck.calibration.sets.equals import BY_CHANCE
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.effects.candidates import Trials
 from crosscheck.fit.effects.gauss_newton import PRIOR_SIZES, Fit
@@ -26,8 +27,8 @@ from seecr.effects.base import Layout
 from seecr.errors import InputError
 from seecr.pose import Array
 
-# A pair explains as much if its chi2 is larger by no more than that which is owed a name.
-_AS_MUCH = 25.0
+# A pair explains as much if its chi2 is larger by no more than chance may bring.
+_AS_MUCH = 2.0 * BY_CHANCE
 # It is fitted if straight lines promise as much, or nearly all of what the listed effect explains:
 # they are far off where a frame is out of level by degrees.
 _NEARLY = 0.02

@@ -13,12 +13,12 @@ from crosscheck.calibration.search import search_sets
 from crosscheck.diagnosis.chances import PROBABLE
 from crosscheck.diagnosis.contradicted import contradicted_values
 from crosscheck.diagnosis.explained import explained
-from crosscheck.diagnosis.found import found_effects
 from crosscheck.diagnosis.importance import weighed
 from crosscheck.diagnosis.kept import Diagnosed
 from crosscheck.diagnosis.pairs import pairs_instead
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.settled import settled
+from crosscheck.diagnosis.steps import shown_stages
 from crosscheck.diagnosis.stepwise import by_steps
 from crosscheck.diagnosis.unexplained import beside_imitated, unexplained
 from crosscheck.diagnosis.words import size_notes
@@ -98,7 +98,7 @@ def diagnose(
             without = no_verdict(ready.problem, base, found.notes, rows)
             return replace(without, sight=found.sight, of=of)
         others = thin.note_on_others(found.search.last.fit.terms, found.search.problem.sigma)
-        against = contradictions(one.term for one in found_effects(found))
+        against = contradictions(shown_stages(found)[1].step.fit.terms)
         doubts = contradicted_values(found)
         return replace(found, notes=(*against, *doubts, *found.notes, *others))
 

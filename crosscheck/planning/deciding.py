@@ -8,11 +8,8 @@ from itertools import combinations
 from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.planning.adding import Adding, Extension
 from crosscheck.planning.planned import Planned
-from crosscheck.planning.proposer import NEEDED, Gain, Suggestion
+from crosscheck.planning.proposer import GAINS, NEEDED, Gain, Suggestion
 from seecr.effects import Terms
-
-# Repeating everything doubles a signal; a proposal must multiply it by more than that.
-_GAINS = 2.5
 
 
 def telling_models_apart(
@@ -30,7 +27,7 @@ def telling_models_apart(
     now, out = _least_signal(plan, models), []
     for option in options:
         then = _least_signal(option.plan, models) if option.kind is not Adding.POSES else 0.0
-        if then >= max(NEEDED, _GAINS * now):
+        if then >= max(NEEDED, GAINS * now):
             out.append(Suggestion(option.kind, option.words, (Gain("", "", now, then, NEEDED),)))
     return sorted(out, key=lambda one: -one.gains[0].then)
 

@@ -27,9 +27,9 @@ from seecr.pose import Array, rotvec_from_quat
 
 # Squared signal, in units of the noise, that tells two effects apart (docs/diagnosis.md).
 NEEDED = 15.0
-# Repeating everything doubles each signal. A proposal must multiply it by more than _GAINS, and
+# Repeating everything doubles each signal. A proposal must multiply it by more than GAINS, and
 # bring it to this part of what is needed.
-_GAINS, _NEAR = 2.5, 0.1
+GAINS, _NEAR = 2.5, 0.1
 # Kinds of measurements that are added at the same poses.
 _SENSORS = (Adding.TENSIONS, Adding.POSE)
 
@@ -145,7 +145,7 @@ def _gains(own: Signals, there: Signals, wanted: Sequence[Wanted]) -> tuple[Gain
     for want in wanted:
         g = both[want.effect]
         then = signal_left(g, both[want.other]) if want.other else g.power
-        if then > _GAINS * want.now and then > _NEAR * want.needed:
+        if then > GAINS * want.now and then > _NEAR * want.needed:
             gains.append(Gain(want.effect, want.other, want.now, then, want.needed))
     return tuple(sorted(gains, key=lambda g: (not g.enough, -g.then / g.needed)))
 

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 from made_data import measured, term
-from made_diagnoses import POINTS, diagnose_with, pulleys, robot
+from made_diagnoses import POINTS, SLOW, diagnose_with, pulleys, robot
 
 from crosscheck.calibration.judgement.verdict import Judgement
 from crosscheck.diagnosis.averaged import spread_by_others
@@ -22,6 +22,7 @@ from crosscheck.planning.deciding import telling_models_apart
 from crosscheck.planning.extensions import extensions
 from crosscheck.planning.planned import Planned, Reads
 from seecr.description.mjcf import load_robot
+from seecr.effects import Terms
 
 SIGMA, WHOLE = Sigma(position_m=1e-4), Sigma(position_m=1e-4, orientation_rad=3.5e-4)
 SOME = ("external_wrench", "stiffness", "platform_mass", "gravity_tilt", "drum_gain")
@@ -36,7 +37,7 @@ def soft_and_tilted() -> Diagnosis:
         term(camera, "gravity_tilt", tilt_x_rad=0.03, tilt_y_rad=0.01),
     ]
     data = measured(camera, hidden, points=4, sigma=replace(SIGMA, orientation_rad=1e-4))
-    return diagnose_with(camera, replace(data, quat_wxyz=None, sigma=SIGMA), only=SOME)
+    return diagnose_with(camera, replace(data, quat_wxyz=None, sigma=SIGMA), exclude=SLOW)
 
 
 def test_what_two_effects_do_is_not_called_a_hose_for_sure() -> None:
@@ -85,8 +86,11 @@ def test_nothing_tells_a_model_from_itself() -> None:
     search = pulleys().search
     assert search is not None
     plan = Planned(search.problem, search.last.fit, search.factor, Reads.of(search.problem.data))
-    same = [search.last.fit.terms] * 2
-    assert telling_models_apart(plan, list(extensions(plan)), same) == []
+    fitted, options = search.last.fit.terms, list(extensions(plan))
+    other = Terms([term(robot(), "stiffness", factor=0.5)])
+    assert telling_models_apart(plan, options, [fitted, fitted]) == []
+    # nor is anything proposed that tells all but two of several apart
+    assert telling_models_apart(plan, options, [fitted, other, fitted]) == []
 
 
 @pytest.mark.parametrize(("p", "matters"), [(0.3, True), (0.04, False)])
