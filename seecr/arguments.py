@@ -32,11 +32,11 @@ def numbers(values: ArrayLike, name: str) -> Array:
         InputError: it is something else.
     """
     try:
-        if isinstance(values, np.ma.MaskedArray):  # what is masked is no number
-            values = np.ma.filled(values.astype(float), np.nan)
         array = np.asarray(values)
         if array.dtype.kind == "c":  # NumPy would drop the imaginary part
             raise TypeError
+        if isinstance(values, np.ma.MaskedArray):  # what is masked is no number
+            return np.asarray(np.ma.filled(values.astype(float), np.nan))
         return np.asarray(array, dtype=float)
     except (OverflowError, TypeError, ValueError):
         got = repr(values) if isinstance(values, str) else f"a {type(values).__name__}"

@@ -48,7 +48,6 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
     problem, outliers = ready.problem, _outliers_of(ready)
     # nothing is cross-validated here, so that the note about its blocks is left out
     notes = [*said, *contradictions(terms), *ready.notes]
-    notes += [str(ready.refusal)] if ready.refusal else []
     terms = ready.terms
     plain = problem.experiment.predict(terms.effects)
     factor = problem.noise(plain)

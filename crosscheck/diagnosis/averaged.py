@@ -20,7 +20,7 @@ _MATTERS = 0.05
 
 
 def spread_by_others(problem: Problem, fit: Fit, chances: Chances) -> Array:
-    """Standard deviation (p,) of values between models with and without each further effect.
+    """How far values (p,) are, rms, from those of models with a further effect, by its probability.
 
     Args:
         problem: the data. fit: the model with the listed effects.

@@ -5,7 +5,6 @@ A wrong value that no fit may change is a missing effect in disguise: others are
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -28,20 +27,22 @@ _SOMETHING = (
 )
 
 
-def contradicted_values(found: Diagnosis) -> Iterator[str]:
-    """A note for each effect of the model whose known values explain less than others would.
+def contradicted_values(found: Diagnosis) -> dict[str, str]:
+    """Notes, by effect of the model, where known values explain less than others would.
 
     Others explain more if fitting them, alone, has far more evidence than what was found has.
     """
     if found.search is None or found.verdict not in _SOMETHING:
-        return
+        return {}
     trials, base = found.search.trials, found.search.steps[0].fit
     best = max(trials.evidence(one).log for one in (base, found.search.last.fit))
+    out = {}
     for term in base.terms:
         freed = _freed(trials, base, term) if term.knowledge.any else None
         least = best + _of_readings(term) + LEAST_GAIN
         if freed is not None and trials.evidence(freed).log > least:
-            yield _note(found, term, freed)
+            out[term.name] = _note(found, term, freed)
+    return out
 
 
 def _of_readings(term: Term) -> float:

@@ -98,9 +98,10 @@ def diagnose(
             without = no_verdict(ready.problem, base, found.notes, rows)
             return replace(without, sight=found.sight, of=of)
         others = thin.note_on_others(found.search.last.fit.terms, found.search.problem.sigma)
-        against = contradictions(shown_stages(found)[1].step.fit.terms)
         doubts = contradicted_values(found)
-        return replace(found, notes=(*against, *doubts, *found.notes, *others))
+        shown = shown_stages(found)[1].step.fit.terms
+        against = contradictions(term for term in shown if term.name not in doubts)
+        return replace(found, notes=(*against, *doubts.values(), *found.notes, *others))
 
 
 def _may_be_noise(found: Diagnosis, problem: Problem) -> bool:

@@ -176,8 +176,16 @@ def _limit(stream: Stream, speed: Array, half: int, step: float) -> float:
 
 def sample_noise(stream: Stream) -> float:
     """[m] Usual distance of single samples from their mean, by second differences of positions."""
-    bend = stream.position[2:] - 2.0 * stream.position[1:-1] + stream.position[:-2]
-    return float(np.nanmedian(np.linalg.norm(bend, axis=1))) / float(np.sqrt(6.0))
+    size = _bends(stream.position)
+    if not np.isfinite(size).any():  # never seen three times in a row
+        size = _bends(stream.position[stream.seen])
+    return float(np.nanmedian(size)) / float(np.sqrt(6.0))
+
+
+def _bends(position: Array) -> Array:
+    """Sizes (n - 2,) of second differences of positions (n, 3)."""
+    bend = position[2:] - 2.0 * position[1:-1] + position[:-2]
+    return np.asarray(np.linalg.norm(bend, axis=1))
 
 
 def _pieces(t_s: Array, still: NDArray[np.bool_], breaks: Array) -> list[tuple[int, int]]:

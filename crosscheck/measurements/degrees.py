@@ -26,18 +26,18 @@ _LEAST_ROWS = 4
 def refuse_followed_in_degrees(columns: Columns, robot: Robot, data: Measurements) -> None:
     """Refuse radians that scatter about the commands, and as degrees follow them.
 
-    How the body is turned on the platform does not matter. Robots that hang on fewer cables than
-    their degrees of freedom may tilt by so much.
+    How the body is turned on the platform does not matter, and commanded lengths say nothing.
+    Robots that hang on fewer cables than their degrees of freedom may tilt by so much.
 
     Raises:
         InputFileError: with the column that scatters most.
     """
     column = {k: columns.known.get(f"meas_{angle}") for k, angle in enumerate(ANGLES)}
     mine = [k for k, one in column.items() if one is not None and one.unit.suffix == "rad"]
-    if not mine or robot.n_cables < robot.n_dof:
+    # lengths do not say how the platform is to turn: as degrees any angles are small
+    if not mine or robot.n_cables < robot.n_dof or data.command_pose is None:
         return
-    home = np.tile(robot.reference_pose, (data.n_rows, 1))
-    told = (home if data.command_pose is None else data.command_pose)[:, 3:]
+    told = data.command_pose[:, 3:]
     read = rxyz_from_quat(told)
     for k, one in column.items():
         if one is not None:

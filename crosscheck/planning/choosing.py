@@ -15,7 +15,7 @@ from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.planning.adding import NO_LIMITS, Limits
 from crosscheck.planning.arguments import box_given, limits_given
 from crosscheck.planning.greedy import Wanted, chosen_poses
-from crosscheck.planning.places import held_within, taut_first, tilted_grid, trustworthy
+from crosscheck.planning.places import held_within, taut_first, tilted_grid, trustworthy, within_box
 from crosscheck.planning.planned import Planned, Reads, expected_sigma, kinds_of, planned
 from crosscheck.planning.sight import all_visible
 from crosscheck.planning.upright import upright
@@ -116,7 +116,8 @@ def _candidates(robot: Robot, box: Array | None) -> Array:
         home = robot.reference_pose[:3] @ frame
         middle = np.where(slides, axes @ (0.5 * (low + high) - home), 0.0)
         random = np.random.default_rng(0).uniform(-1.0, 1.0, (_JOINT_POSES, len(reach)))
-        return np.asarray(pose_of_values(robot, middle + reach * random)[0])
+        poses = pose_of_values(robot, middle + reach * random)[0]
+        return poses if box is None else within_box(poses, box)
     return tilted_grid(robot, low, high, _GRID, frame)
 
 

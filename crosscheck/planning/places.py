@@ -42,7 +42,7 @@ def more_poses(
     robot = plan.problem.robot
     poses = _jointed(plan) if robot.joints else _grid(plan, box)
     if box is not None:
-        poses = poses[np.all((poses[:, :3] >= box[0]) & (poses[:, :3] <= box[1]), axis=1)]
+        poses = within_box(poses, box)
     poses = held_within(robot, poses, limits)
     if len(poses) == 0:
         return None
@@ -52,6 +52,11 @@ def more_poses(
         return None
     found = like(plan, commands_at(plan.problem, poses))
     return Extension(Adding.POSES, "add poses", found, poses)
+
+
+def within_box(poses: Array, box: Array) -> Array:
+    """The poses (n, 7) whose positions are within a box (2, 3) [m]: lowest and highest."""
+    return poses[np.all((poses[:, :3] >= box[0]) & (poses[:, :3] <= box[1]), axis=1)]
 
 
 def held_within(robot: Robot, poses: Array, limits: Limits = NO_LIMITS) -> Array:

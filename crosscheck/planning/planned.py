@@ -194,7 +194,7 @@ def _as_read(commands: Measurements, readings: Readings, reads: Reads) -> Measur
 
 def slack_at(plan: Planned) -> NDArray[np.bool_]:
     """(n, m) bool which cables are slack where the model rests."""
-    return np.asarray(plan.base.state.prediction.solution().slack)
+    return plan.base.state.prediction.slack
 
 
 def near_slack(plan: Planned) -> list[tuple[int, int]]:

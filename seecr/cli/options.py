@@ -48,6 +48,10 @@ class Number(click.FloatRange):
         except click.BadParameter:
             self.fail(f"expected a number{_within(self)}, got {value!r}.", param, ctx)
 
+    def _describe_range(self) -> str:
+        """The range in the help; click describes one without ends as x<=None."""
+        return "" if self.min is None and self.max is None else super()._describe_range()
+
 
 def _within(numbers: click.IntRange | click.FloatRange) -> str:
     """A range in words, with a space before; nothing if there is none."""

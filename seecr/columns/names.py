@@ -68,11 +68,17 @@ def numbered(name: str, cables: Sequence[str]) -> str:
     if match is None:
         return name
     prefix, rest = match[1], match[2]
-    for number, cable in enumerate(cables, start=1):
-        unit = rest.removeprefix(cable)
-        if rest.startswith(cable) and not cable.isdigit() and re.fullmatch(r"(_[^_]*)?", unit):
-            return f"{prefix}_{number}{unit}"
-    return name
+    meant = [
+        (number, rest.removeprefix(cable))
+        for number, cable in enumerate(cables, start=1)
+        if rest.startswith(cable) and not cable.isdigit()
+    ]
+    fits = [one for one in meant if re.fullmatch(r"(_[^_]*)?", one[1])]
+    if not fits:
+        return name
+    # of cables a and a_m the first is meant where that leaves a unit, else the longer name
+    number, unit = min(fits, key=lambda one: (not one[1], len(one[1])))
+    return f"{prefix}_{number}{unit}"
 
 
 def of_no_cable(unused: Sequence[str]) -> list[str]:

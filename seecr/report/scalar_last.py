@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seecr.counted import figures
+from seecr.description.joints import off_joints
 from seecr.description.robot import Robot
 from seecr.pose import quat_conjugate, quat_multiply, rotvec_from_quat
 
@@ -29,6 +30,10 @@ def scalar_last(robot: Robot, turns: ArrayLike) -> tuple[str, ...]:
     )
     sizes, others = (np.linalg.norm(turn, axis=1) for turn in (here, there))
     if not len(given) or not (sizes.min() > _TURNED and others.max() < _UNTURNED):
+        return ()
+    home_at = np.tile(robot.reference_pose[:3], (len(given), 1))
+    meant = np.concatenate([home_at, np.roll(given, 1, axis=1)], axis=1)
+    if off_joints(robot, meant) is not None:  # nor could the robot take what it would be
         return ()
     first, axis = " ".join(figures(q, ".4g") for q in given[0]), here[0] / sizes[0]
     along = np.flatnonzero(np.abs(axis) > _ALONG)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import seecr
+from seecr.arguments import numbers
 from seecr.errors import InputError
 
 ROBOT = seecr.load_robot("planar_vertical")
@@ -49,6 +50,12 @@ def test_it_is_told_in_one_line(call: Callable[[], Any], words: str) -> None:
     with pytest.raises(InputError, match=words) as told:
         call()
     assert "\n" not in str(told.value)
+
+
+def test_complex_numbers_are_refused_masked_or_not() -> None:
+    for values in (np.array([1 + 2j, 2.0]), np.ma.masked_array([1 + 2j, 2.0], mask=False)):
+        with pytest.raises(seecr.InputError, match="x: expected numbers"):
+            numbers(values, "x")
 
 
 def test_masked_arrays_without_anything_masked_are_numbers() -> None:

@@ -31,5 +31,5 @@ def _contradiction(term: Term) -> str:
     verb = "is" if len(names) == 1 else "are up to"
     return (
         f"{term.name}: {some(names)} {verb} {off[against].max():.3g} standard errors from "
-        "what was measured independently: check that measurement, and the values that are fixed"
+        "what was measured independently: check that measurement, and what else was taken for known"
     )

@@ -35,7 +35,8 @@ from seecr.pose import (
 _NEARER, _RATHER_NEARER = 2.0, 1.5
 # One that makes quite other rotations also brings them nearer to the commands: a platform that the
 # model takes for heavier on the wrong side tilts the other way, without any convention.
-_NEARER_TO_COMMANDS = 2.0
+# On a platform that rests far from its commands it need only be so many times nearer than a tilt.
+_NEARER_TO_COMMANDS, _FAR_NEARER = 2.0, 10.0
 _PART = 0.8
 # What is off by less [rad], or by less than so many times the stated noise, is not worth a word.
 _LEAST, _NOISE = np.radians(0.01), 3.0
@@ -186,12 +187,23 @@ def _of_rows(
     if here < _RATHER_NEARER * _most(near):
         return []
     told = _told(problem)[rows]
-    if best not in _ALIKE:
-        from_told = _most(_angles(by[best], told))
-        if _most(_angles(read, told)) < _NEARER_TO_COMMANDS * from_told:
-            return []
+    if best not in _ALIKE and not _is_no_tilt(read, expected, told, by[best]):
+        return []
     certain = here >= _NEARER * _most(near)
     return [Misread(best, file, float(np.median(apart)), float(np.median(near)), certain)]
+
+
+def _is_no_tilt(read: Array, expected: Array, told: Array, meant: Array) -> bool:
+    """Whether what a convention makes of rotations is more than a tilt to the other side.
+
+    It is if it is nearer to the commands, or far nearer to what is expected than that would be
+    which tilts from the commands to the other side by as much.
+    """
+    if _most(_angles(read, told)) >= _NEARER_TO_COMMANDS * _most(_angles(meant, told)):
+        return True
+    back = quat_multiply(told, quat_multiply(quat_conjugate(expected), told))
+    least = min(_most(_angles(read, back)), _most(_angles(read, expected)))
+    return least > _FAR_NEARER * _most(_angles(meant, expected))
 
 
 def _mounted(read: Array, expected: Array) -> Iterator[Array]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any, cast
 
+import made_diagnoses as made
 import numpy as np
 import pytest
 from made_data import COGIRO, measured, term
@@ -56,9 +57,25 @@ def test_fixed_values_that_the_data_contradict_are_doubted() -> None:
 def test_only_values_that_are_known_are_doubted(known: bool) -> None:
     """What was measured to 0.1 mm is doubted, where the data say 15 mm; what is free is fitted."""
     model = WRONG.measured(shift_x_m=(0.005, 1e-4)) if known else WRONG
-    notes = list(contradicted_values(diagnose(ROBOT, DATA, Terms([model]))))
-    assert len(notes) == known
-    assert not known or ("shift_x = 20.0" in notes[0] and "shift_y" not in notes[0])
+    found = diagnose(ROBOT, DATA, Terms([model]))
+    notes = contradicted_values(found)
+    assert list(notes) == ["centre_of_mass"] * known
+    told = " ".join(notes.values())
+    assert not known or ("shift_x = 20.0" in told and "shift_y" not in told)
+    # and that it is far from what was measured is not said a second time
+    assert not any("standard errors from what was" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(("measured_m", "told"), [(0.0102, True), (0.01006, False)])
+def test_readings_that_data_outweigh_are_said_where_nothing_is_missing(
+    measured_m: float, told: bool
+) -> None:
+    """Sixty standard errors from a caliper, a diagnosis had nothing to say of it."""
+    wheels = term(made.robot(), "pulley_radius", radius_m=measured_m)
+    model = Terms([wheels.measured(radius_m=(measured_m, 2e-5))])
+    found = diagnose(made.robot(), made.readings(radius_m=0.01), model, only=["stiffness"])
+    assert found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
+    assert found.notes[0].startswith("pulley_radius: radius_m is 8.7") == told
 
 
 def test_readings_of_values_count_in_the_evidence_beside_them() -> None:

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from crosscheck.importing.choices import ImportChoices
-from crosscheck.importing.dwells import find_dwells
+from crosscheck.importing.dwells import find_dwells, sample_noise
 from crosscheck.importing.logged import Logged, Stream
 from crosscheck.importing.still import refuse_still
 from crosscheck.measurements.data import Measurements
@@ -66,3 +66,11 @@ def test_a_reading_that_never_changes_is_a_rest() -> None:
     line = np.arange(len(T_S))
     dwells = find_dwells(Stream(Path("a"), T_S, line, np.tile(HERE, (len(T_S), 1))), np.zeros(0))
     assert len(dwells) == 1 and dwells.samples.tolist() == [len(T_S)]
+
+
+def test_noise_is_known_where_no_three_samples_follow_each_other() -> None:
+    """It was NaN, with a warning, and nothing moved."""
+    place = NOISE.copy()
+    place[1::2] = np.nan
+    found = sample_noise(Stream(Path("take.csv"), T_S, np.arange(len(T_S)), place))
+    assert found == pytest.approx(1e-4 * np.sqrt(3.0), rel=0.3)

@@ -93,3 +93,13 @@ def test_a_body_turned_on_the_platform_reads_radians_all_the_same(turn: list[flo
     told = quat_from_rxyz(np.radians(TILTS))
     read = quat_multiply(told, np.tile(quat_from_rxyz(np.array(turn)), (4, 1)))
     assert read_as(rxyz_from_quat(read), told) == ""
+
+
+def test_commanded_lengths_do_not_say_that_angles_are_degrees(tmp_path: Path) -> None:
+    """A platform told to turn by 1.2 rad had its true angles refused: as degrees all are small."""
+    robot = load_robot("planar_horizontal")
+    lengths = robot.rest_lengths
+    header = ",".join([*(f"length_{k}_m" for k in range(1, len(lengths) + 1)), "meas_ry_rad"])
+    rows = [",".join(f"{one:.6f}" for one in (*lengths, angle)) for angle in (1.2, -1.1, 0.7, -0.9)]
+    path = file_of(tmp_path, header, *rows)
+    assert load_measurements(path, robot).n_rows == 4

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rejointed import WAYS, rejointed
 from turned import turned
 
 from crosscheck.planning.choosing import _candidates
@@ -58,3 +59,13 @@ def test_candidates_are_as_far_below_and_above_home_whichever_way_that_is(
         for robot in (COGIRO, other)
     ]
     np.testing.assert_allclose(*(np.unique(some.round(9)) for some in heights), atol=1e-9)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_poses_of_robots_on_joints_stay_in_the_box_that_was_asked_for(way: str) -> None:
+    """A hinge beside the origin, or before the slides, carried half of them out of it."""
+    planar = load_robot("planar_vertical")
+    middle, half = planar.reference_pose[:3], np.array([0.02, 1.0, 0.02])
+    box = np.array([middle - half, middle + half])
+    place = _candidates(rejointed(planar, way), box)[:, :3]
+    assert len(place) > 30 and np.all((place >= box[0]) & (place <= box[1]))

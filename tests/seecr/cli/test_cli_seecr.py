@@ -217,6 +217,7 @@ def test_every_command_has_help_with_examples() -> None:
     for name, (_, line) in COMMANDS.items():
         assert f"  {name} " in text and line in " ".join(text.split())
         assert f"seecr {name} " in run(name, "--help").stdout
+        assert "None" not in run(name, "--help").stdout  # of a number without ends: x<=None
 
 
 def test_pose_prints_and_writes(tmp_path: Path) -> None:
@@ -638,3 +639,6 @@ def test_scalars_are_last_where_that_turns_less_than_a_right_angle_and_in_all_ro
     half = [0.0, 0.0, np.sin(0.4), np.cos(0.4)]  # 46 degrees
     assert scalar_last(robot, [half]) == scalar_last(robot, [tilted, [1.0, 0.0, 0.0, 0.0]]) == ()
     assert scalar_last(robot, [[0.0, 1.0, 0.0, 0.0]]) == scalar_last(robot, []) == ()
+    # a turn about x is none that the hinge of a planar robot can make
+    planar = load_robot(model_path("planar_horizontal"))
+    assert scalar_last(planar, [[0.05, 0.0, 0.0, 0.998749]]) == ()

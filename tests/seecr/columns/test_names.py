@@ -93,3 +93,13 @@ def test_what_is_of_no_cable_is_said_with_those_there_are() -> None:
         "Columns length_a_m, length_b_m are not used: "
     )
     assert no_cable_note([], ("left",)) == []
+
+
+@pytest.mark.parametrize("cables", [("a_m", "a"), ("a", "a_m")])
+def test_a_cable_named_like_another_with_a_unit_is_meant_by_its_whole_name(
+    cables: tuple[str, str],
+) -> None:
+    """Which was meant depended on their order."""
+    first, second = cables.index("a") + 1, cables.index("a_m") + 1
+    assert numbered("length_a_m", cables) == f"length_{first}_m"
+    assert numbered("length_a_m_m", cables) == f"length_{second}_m"
