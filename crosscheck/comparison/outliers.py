@@ -3,8 +3,8 @@
 What a model lacks moves readings by many times the noise, and farther where the platform is soft,
 so that a row far off zero need not be an outlier, and two outliers may hide the rest. All effects
 are therefore fitted together with weights against outliers, as a diagnosis does; the fit serves for
-nothing else. Weights of a fit that leaves more than noise follow what it misses: then, and for any
-row, what counts is that it is far off all others.
+nothing else. Weights of a fit that leaves more than noise follow what it misses, so a row also has
+to be far off all others.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from crosscheck.calibration.joint_fit.joining import layouts
 from crosscheck.calibration.joint_fit.joint import Setting, tempered
-from crosscheck.calibration.joint_fit.stages import poor, start_of, with_noise
+from crosscheck.calibration.joint_fit.stages import start_of, with_noise
 from crosscheck.calibration.linear_evidence.priors import widths_of
 from crosscheck.calibration.noise.colour import chain_of
 from crosscheck.calibration.noise.robust import outliers
@@ -51,7 +51,7 @@ def rows_far_off(problem: Problem, terms: Terms) -> NDArray[np.bool_]:
     if not start.valid:
         return outlying_rows(problem, state)
     joint = with_noise(setting, tempered(setting, start, widths_of(start.terms, setting.free)))
-    if poor(joint) or outliers_cluster(setting, joint):
+    if outliers_cluster(setting, joint):
         return outlying_rows(problem, joint.state)
     far = outlying_rows(problem, joint.state, 1.0, every)
     return far & outliers(setting.chain, joint.weight, every)
