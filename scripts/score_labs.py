@@ -1,131 +1,154 @@
-"""Calibrate the labelled cases of a folder and say what the models are worth elsewhere.
+"""Diagnose the labelled laboratories by the command line, and predict their other trajectory.
 
-    python scripts/score_labs.py ../shared/data/labs            all cases
-    python scripts/score_labs.py ../shared/data/labs B13 B16    some
-    python scripts/score_labs.py --sets ../shared/data/twins    which effects are needed, too
+    python scripts/score_labs.py ../shared/data/labs               all cases
+    python scripts/score_labs.py ../shared/data/labs B13 B16       some
+    python scripts/score_labs.py ../shared/data/labs --markdown    as docs/diagnosis.md has them
 
-Each case is fitted on measured.csv and predicts validation.csv, another trajectory of the same
-robot. Its errors there are printed in units of the noise: 1 is a perfect model.
+``diagnose --model-out`` finds a model on measured.csv; where its verdict is many_effects,
+``calibrate`` does. ``compare`` tries it on validation.csv, another trajectory of the same robot,
+and the true model too, made of the values in answers.json. A line is a case: what was hidden,
+the verdict, the names, and the model's errors there over those of the true model.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import tempfile
 import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from click.testing import CliRunner
+from true_models import as_toml, is_known, true_terms
 
-from crosscheck.calibration.joint_fit.all_effects import Calibration, fit_all_effects
-from crosscheck.calibration.search import SetSearch, search_sets
-from crosscheck.fit.least_squares.problem import Problem, kinds_read, rms_by_kind
-from crosscheck.fit.least_squares.state import State, evaluate
-from crosscheck.fit.preparation.prepare import prepare
-from crosscheck.measurements.read import load_measurements
+from crosscheck.cli import main as crosscheck
 from seecr.description.mjcf import load_robot
-from seecr.description.robot import Robot
-from seecr.effects import Terms
+
+# A command's arguments, and what it prints as JSON.
+Command = Callable[..., dict[str, Any]]
 
 
-def predicted(robot: Robot, path: Path, terms: Terms) -> tuple[Problem, State]:
-    """A model on measurements that it was not fitted to."""
-    data = load_measurements(path, robot)
-    problem = Problem(robot, data, data.sigma, np.ones(data.n_rows, dtype=bool))
-    factor = problem.noise(problem.experiment.predict(terms.effects))
-    return problem, evaluate(problem, terms, factor)
+def command(*arguments: object) -> dict[str, Any]:
+    """A command of ``crosscheck``, which must succeed."""
+    done = CliRunner().invoke(crosscheck, [*map(str, arguments), "--json"])
+    if done.exit_code:
+        raise RuntimeError(f"crosscheck {' '.join(map(str, arguments))}: {done.output}")
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
 
 
-def shares(problem: Problem, state: State, noise: dict[str, float]) -> dict[str, float]:
-    """Errors by kind of reading, in units of the noise."""
-    rms = rms_by_kind(problem, state.raw)
-    stated = {kind.key: getattr(problem.sigma, kind.sigma) for kind in kinds_read(problem)}
-    return {
-        key: float(rms[key] or 0.0) / (noise.get(key) or sigma)
-        for key, sigma in stated.items()
-        if sigma
-    }
+@dataclass(frozen=True)
+class Lab:
+    """What the commands said of one case.
+
+    Attributes:
+        diagnosis: diagnosis.json.
+        ratio: rms errors on validation.csv over those of the true model, by kind of reading;
+            empty where something is hidden that no catalogue holds.
+        plain: the same without any effect.
+        rows: of measured.csv.
+        seconds: of processor for the diagnosis, with its page.
+    """
+
+    name: str
+    answer: dict[str, Any]
+    diagnosis: dict[str, Any]
+    rows: int
+    seconds: float
+    ratio: dict[str, float] = field(default_factory=dict)
+    plain: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def verdict(self) -> str:
+        return str(self.diagnosis["verdict"])
+
+    @property
+    def named(self) -> list[list[str]]:
+        """Each listed effect with what cannot be told from it."""
+        return [[m["effect"], *m["indistinguishable"]] for m in self.diagnosis["missing"]]
+
+    @property
+    def worst(self) -> float:
+        return max(self.ratio.values())
 
 
-def noise_in(answer: dict[str, Any]) -> dict[str, float]:
-    """The noise that was really put on, as far as the answer says."""
-    return {
-        "position_rms_m": answer["noise_pos_m"],
-        "orientation_rms_rad": answer["noise_rot_rad"],
-    }
-
-
-def line(name: str, answer: dict[str, Any], found: Calibration, folder: Path, spent: float) -> str:
-    """One case in a line."""
-    robot = found.setting.problem.robot
-    problem, state = predicted(robot, folder / "validation.csv", found.terms)
-    errors = shares(problem, state, noise_in(answer))
-    text = ", ".join(f"{key.split('_')[0]} {share:.3f}" for key, share in errors.items())
-    scale, rho = found.colour.scale, found.colour.rho
-    late = [
-        t.name for t in found.terms
-        if t.name in ("hysteresis", "creep", "backlash", "exit_friction", "cable_weight")
-        or t.layout.shape.any()
-    ]  # fmt: skip
-    left_out = float(np.max(found.held_out.surprise))
-    fitted = found.joint.state.chi2 / len(found.joint.weight)
-    return (
-        f"{name} {answer['robot']} {'+'.join(answer['hidden'])} {answer['options']}: {text} "
-        f"x noise, chi2/N {state.chi2 / len(state.white):.3f}; fitted {fitted:.3f}, worst run "
-        f"left out {left_out:.2f}, noise x {scale.round(2)} rho {rho.round(2)}, "
-        f"outliers {int(found.outliers.sum())}, later {late}, {spent:.1f} s"
+def asked(folder: Path, out: Path, name: str) -> Lab:
+    """One case by its commands, which write into ``out``."""
+    case = folder / name
+    robot, data = case / "robot.xml", case / "measured.csv"
+    answer = json.loads((folder / "answers.json").read_text(encoding="utf-8"))[name]
+    model = out / "model.toml"
+    start = time.process_time()
+    found = command(
+        "diagnose", robot, data, "--out", out / "diagnosis", "--no-recording", "--model-out", model
     )
+    spent = time.process_time() - start
+    if found["verdict"] == "many_effects":
+        model.unlink(missing_ok=True)
+        command("calibrate", robot, data, "--model", model)
+    rows = len(data.read_text(encoding="utf-8").splitlines()) - 1
+    lab = Lab(name, answer, found, rows, spent)
+    if not is_known(answer["values"]):
+        return lab
+    true = out / "true.toml"
+    terms = true_terms(answer["values"], load_robot(robot))
+    true.write_text(as_toml(terms), encoding="utf-8")
+    there = [_elsewhere(case, out, one) for one in (true, model, None)]
+    return Lab(name, answer, found, rows, spent, *(_over(one, there[0]) for one in there[1:]))
 
 
-def verdict_line(
-    name: str, answer: dict[str, Any], sought: SetSearch, folder: Path, spent: float
-) -> str:
-    """What is said to be missing, beside what was hidden."""
-    said = sought.judgement
-    probable = [
-        f"{'/'.join(members)} {p:.2f}"
-        for members, p in zip(sought.classes.members, sought.classes.probability, strict=True)
-        if p > 0.05
-    ]
-    best = sought.found.best
-    text = ""
-    if (folder / "validation.csv").exists():
-        robot = sought.calibration.setting.problem.robot
-        problem, state = predicted(robot, folder / "validation.csv", best.joint.terms)
-        errors = shares(problem, state, noise_in(answer))
-        text = "; best set " + ", ".join(f"{k.split('_')[0]} {v:.3f}" for k, v in errors.items())
-    return (
-        f"    {name} hidden {'+'.join(answer['hidden'])}: {said.verdict.value}, sure "
-        f"{', '.join(said.sure) or 'none'}; best {', '.join(sorted(best.names)) or 'none'}; field "
-        f"{sought.field_odds:+.1f}, open {said.undecided:.2f}; {', '.join(probable)}{text}; "
-        f"{len(sought.found.refits)} sets, {spent:.1f} s"
-    )
+def _elsewhere(case: Path, out: Path, model: Path | None) -> dict[str, float]:
+    """Rms errors on the other trajectory, with a model if there is one."""
+    arguments = ["--model", model] if model is not None and model.exists() else []
+    files = (case / "robot.xml", case / "validation.csv")
+    found = command("compare", *files, *arguments, "--no-recording", "--out", out / "comparison")
+    return {key: value for key, value in found["rms"].items() if value is not None}
+
+
+def _over(errors: dict[str, float], true: dict[str, float]) -> dict[str, float]:
+    return {key.split("_")[0]: errors[key] / true[key] for key in true}
+
+
+def line(lab: Lab) -> str:
+    """A case as a line of the terminal."""
+    return f"{lab.name}: " + "; ".join(filter(None, (*_cells(lab), f"{lab.seconds:.1f} s")))
+
+
+def row(lab: Lab) -> str:
+    """A case as a row of a table."""
+    return f"| {lab.name} | {' | '.join(_cells(lab))} | {lab.seconds:.0f} s |"
+
+
+def _cells(lab: Lab) -> tuple[str, ...]:
+    hidden = ", ".join(lab.answer["hidden"])
+    options = ", ".join(f"{key} {value}" for key, value in lab.answer["options"].items())
+    named = ", ".join(" or ".join(names) for names in lab.named) or "none"
+    plain = ", ".join(f"{value:.2f}" for value in lab.plain.values())
+    ratio = ", ".join(f"{value:.2f}" for value in lab.ratio.values())
+    return hidden, options, f"`{lab.verdict}`", named, plain, ratio
+
+
+HEADER = (
+    "| case | hidden | options | verdict | named | ratio without effects | with the model | time |"
+)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("cases", nargs="*")
-    parser.add_argument("--sets", action="store_true", help="which effects are needed, too")
+    parser.add_argument("--markdown", action="store_true", help="print a table")
     chosen = parser.parse_args()
-    answers = json.loads((chosen.folder / "answers.json").read_text())
+    answers = json.loads((chosen.folder / "answers.json").read_text(encoding="utf-8"))
+    if chosen.markdown:
+        print(HEADER, "|---" * HEADER.count(" | ") + "|---|", sep="\n")
     for name in chosen.cases or sorted(answers):
-        folder = chosen.folder / name
-        start = time.process_time()
-        robot = load_robot(folder / "robot.xml")
-        data = load_measurements(folder / "measured.csv", robot)
-        ready = prepare(robot, data, Terms())
-        if ready.refusal:
-            print(f"{name}: {ready.refusal}", flush=True)
-            continue
-        sought = search_sets(ready.problem, data.sigma) if chosen.sets else None
-        found = fit_all_effects(ready.problem) if sought is None else sought.calibration
-        spent = time.process_time() - start
-        if (folder / "validation.csv").exists():
-            print(line(name, answers[name], found, folder, spent), flush=True)
-        if sought is not None:
-            print(verdict_line(name, answers[name], sought, folder, spent), flush=True)
+        with tempfile.TemporaryDirectory() as out:
+            lab = asked(chosen.folder, Path(out), name)
+        print(row(lab) if chosen.markdown else line(lab), flush=True)
 
 
 if __name__ == "__main__":
