@@ -22,8 +22,8 @@ from seecr.pose import (
 _WORSE, _NOISE = 3.0, 10.0
 _LEAST_ROWS = 4
 # Rotations are in doubt where they change so many times less than the model expects, if it expects
-# at least so much [rad]; or where they fit so many times better when taken backwards.
-_OTHER_TURN, _LEAST_TURN, _BACKWARDS = 20.0, np.radians(0.1), 3.0
+# at least so much [rad].
+_OTHER_TURN, _LEAST_TURN = 20.0, np.radians(0.1)
 
 
 def another_robot_doubts(problem: Problem, readings: Readings) -> list[str]:
@@ -39,11 +39,7 @@ def another_robot_doubts(problem: Problem, readings: Readings) -> list[str]:
         for k in np.unique(data.file)
         for note in _worse_than_commands(problem, raw, data.file == k)
     ]
-    return [
-        *said,
-        *_other_turns(problem, readings),
-        *_backwards(problem, readings, raw),
-    ]
+    return [*said, *_other_turns(problem, readings)]
 
 
 def _worse_than_commands(problem: Problem, raw: Array, rows: NDArray[np.bool_]) -> list[str]:
@@ -98,23 +94,3 @@ def _other_turns(problem: Problem, readings: Readings) -> list[str]:
 def _turned(quat: Array, robot: Robot) -> Array:
     """Rotation vectors (n, 3) [rad] from the reference pose."""
     return rotvec_from_quat(quat_multiply(quat, quat_conjugate(robot.reference_pose[3:])))
-
-
-def _backwards(problem: Problem, readings: Readings, raw: Array) -> list[str]:
-    """Whether quaternions describe the base as the platform sees it, and not the platform."""
-    quat, columns = problem.data.quat_wxyz, BY_NAME["orientation"].columns
-    rows = problem.counted[:, columns].all(axis=1)
-    if quat is None or rows.sum() < _LEAST_ROWS:
-        return []
-    inverse = quat_multiply(quat_conjugate(quat[rows]), quat_conjugate(readings.quat_wxyz[rows]))
-    there = float(np.median(np.linalg.norm(rotvec_from_quat(inverse), axis=1)))
-    off = np.linalg.norm(raw[rows][:, columns], axis=1)
-    here = float(np.median(off))
-    noise = float(np.median(problem.reading_sigma[rows][:, columns]))
-    if here < max(_BACKWARDS * there, _NOISE * noise, _LEAST_TURN):
-        return []
-    return [
-        f"Orientations are {short(np.degrees(here))} deg from those that the model expects, and "
-        f"only {short(np.degrees(there))} deg if every rotation is inverted: does the tracker "
-        "report how the base is turned as seen from the platform?"
-    ]

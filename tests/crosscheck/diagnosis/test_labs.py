@@ -32,7 +32,7 @@ CASES = [pytest.param(name, marks=[] if name in IN_CI else [pytest.mark.sweep]) 
 WORTH, IN_MEDIAN = 1.5, 1.15
 FEW_ROWS = 100
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("unpaged")]
 
 
 @cache

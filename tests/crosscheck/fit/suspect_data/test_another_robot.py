@@ -19,7 +19,7 @@ from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Terms
 from seecr.errors import InputFileError
-from seecr.pose import quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
+from seecr.pose import quat_from_rotvec, quat_multiply, rotvec_from_quat
 
 COGIRO, PLANAR = soft_cogiro(), load_robot(model_path("planar_vertical"))
 
@@ -127,11 +127,3 @@ def test_rotations_in_radians_that_are_called_degrees(cogiro):
     level = cogiro.rows(cogiro.run != "loop")
     assert "Rotations change" not in notes(still, replace(level, position=level.command_pose[:, :3],
         quat_wxyz=np.tile([1.0, 0.0, 0.0, 0.0], (level.n_rows, 1)), tensions=None))  # fmt: skip
-
-
-def test_rotations_of_the_base_as_seen_from_the_platform(cogiro):
-    assert "every rotation is inverted" not in notes(COGIRO, cogiro)
-    data = replace(cogiro, quat_wxyz=quat_conjugate(cogiro.quat_wxyz), tensions=None)
-    assert "if every rotation is inverted: does the tracker report how the base" in notes(
-        COGIRO, data
-    )
