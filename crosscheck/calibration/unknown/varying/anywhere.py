@@ -2,9 +2,9 @@
 
 A hose pulls differently at each place. A few numbers describe such a force, but known effects can
 imitate what it does to all readings. So besides cubics of the readings, the candidates are a force
-and cable lengths that change linearly with the position, a spring, which pulls towards a point, and
-lengths that are a cubic of how far each winch has turned. Of a lens a few numbers describe all as
-well.
+and cable lengths that change linearly with the position, a spring, which pulls towards a point, one
+cable's length, as over an edge, and lengths that are a cubic of how far each winch has turned, or
+go with how far others have. Of a lens a few numbers describe all as well.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ from crosscheck.fit.least_squares.problem import KINDS, POSITION
 from crosscheck.fit.noise.smooth import monomials
 from seecr.pose import Array
 
+# Of more cables than these, pairs have no numbers of their own: they would be hundreds.
+_MOST_CABLES = 12
 _ALONE = {
     "position": Varying.POSITION, "orientation": Varying.ORIENTATION, "tension": Varying.TENSION,
 }  # fmt: skip
@@ -118,19 +120,35 @@ def _of_robot(setting: Setting, joint: JointFit) -> Iterator[tuple[Varying, Arra
     )
     lengths = rates_by(setting, joint, "cable_length_offset")
     yield Varying.LENGTHS, in_units_of_noise(products(lengths, linear))
-    every = _of_turns(setting, joint, lengths)
+    bent = monomials(place, 2)[setting.problem.row_of, 1:]
+    for k in range(lengths.shape[1]):
+        yield Varying.ONE_CABLE, in_units_of_noise(products(lengths[:, [k]], bent))
+    turned = _turned(setting, joint)
+    every = lengths[:, :, None] * np.stack([turned, turned**2, turned**3], axis=-1)
     # alike for all winches, and for each by itself
     yield Varying.WINCHES, in_units_of_noise(every.sum(axis=1))
     yield Varying.WINCHES, in_units_of_noise(every.reshape(len(every), -1))
+    for columns in _by_others(lengths, turned):
+        yield Varying.COUPLED, columns
 
 
-def _of_turns(setting: Setting, joint: JointFit, lengths: Array) -> Array:
-    """(N, m, 3) derivatives by what is linear, quadratic and cubic in each winch's own turning.
+def _by_others(lengths: Array, turned: Array) -> Iterator[Array]:
+    """Each cable's length by how far others have turned: its neighbours alike, and every other.
 
     Args:
-        lengths: (N, m) derivatives by each cable's length.
+        lengths: (N, m) derivatives by each cable's length. turned: (N, m) how far each has turned.
     """
+    others = [np.roll(turned, k, axis=1) for k in range(1, turned.shape[1])]
+    if not others:
+        return
+    alike = [np.sum(lengths * other, axis=1) for other in (others[0], others[-1])]
+    yield in_units_of_noise(np.stack(alike, axis=1))
+    if turned.shape[1] <= _MOST_CABLES:
+        yield in_units_of_noise(np.hstack([lengths * other for other in others]))
+
+
+def _turned(setting: Setting, joint: JointFit) -> Array:
+    """(N, m) how far each winch has turned for each reading, at most one."""
     turned = joint.state.prediction.setup.commanded_change
     turned = turned / max(float(np.abs(turned).max(initial=0.0)), 1e-300)
-    powers = np.stack([turned, turned**2, turned**3], axis=-1)[setting.problem.row_of]
-    return np.asarray(lengths[:, :, None] * powers)
+    return np.asarray(turned[setting.problem.row_of])

@@ -71,6 +71,15 @@ class Varying(StrEnum):
         "measure what each winch pays out turn by turn, over all of its travel",
     )
 
+    ONE_CABLE = (
+        "the length of one cable that changes with the position, as over an edge",
+        "see whether a cable touches anything on its way, on all sides of the workspace",
+    )
+    COUPLED = (
+        "cable lengths that change with how far other winches have turned",
+        "turn one winch at a time, and see whether any other cable moves",
+    )
+
     advice: str
 
     def __new__(cls, word: str, advice: str) -> Varying:

@@ -209,6 +209,31 @@ def test_rope_in_layers_shows_over_the_turns_of_the_winches(fit: tuple[Setting, 
     assert unexplained(each, signal) > 0.05
 
 
+def test_winches_that_turn_with_their_neighbours(fit: tuple[Setting, JointFit]) -> None:
+    setting, joint = fit
+    change = joint.state.prediction.setup.commanded_change
+    alike, each = [c for what, c in varying(setting, joint) if what is Varying.COUPLED]
+    assert alike.shape[1] == 2 and each.shape[1] == ROBOT.n_cables * (ROBOT.n_cables - 1)
+    signal = lengthened(setting, joint, LITTLE * np.roll(change, 1, axis=1))
+    assert unexplained(alike, signal) < 1e-3 and unexplained(each, signal) < 1e-3
+    # with one that is no neighbour
+    signal = lengthened(setting, joint, LITTLE * change[:, ::-1])
+    assert unexplained(each, signal) < 1e-3 < 0.1 < unexplained(alike, signal)
+    # by their own turning: drums that are all of another size
+    assert unexplained(alike, lengthened(setting, joint, LITTLE * change)) > 0.05
+
+
+def test_a_cable_that_touches_an_edge_is_too_short_somewhere(fit: tuple[Setting, JointFit]) -> None:
+    setting, joint = fit
+    place = joint.state.prediction.pose[:, 0]
+    by_cable = [c for what, c in varying(setting, joint) if what is Varying.ONE_CABLE]
+    assert len(by_cable) == ROBOT.n_cables
+    bent = np.zeros((len(place), ROBOT.n_cables))
+    bent[:, 2] = LITTLE * np.maximum(place - np.median(place), 0.0) ** 2
+    left = [unexplained(columns, lengthened(setting, joint, bent)) for columns in by_cable]
+    assert left[2] < 0.25 and min(left[:2] + left[3:]) > 0.5
+
+
 def test_a_lens_is_said_with_few_numbers(fit: tuple[Setting, JointFit]) -> None:
     """Wherever its middle is, if the picture widens little from there to here."""
     setting, joint = fit
