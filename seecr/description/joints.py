@@ -78,6 +78,21 @@ def freedoms(robot: Robot) -> tuple[int, int, int]:
     return whole, whole - moving, turning
 
 
+def shifts(robot: Robot) -> Array:
+    """(k, 3) orthonormal directions along which joints move the platform without turning it.
+
+    They are those at the reference pose: three of a free platform, two of a planar one.
+    """
+    if not robot.joints:
+        return np.eye(3)
+    pose, screws = pose_of_values(robot, np.zeros((1, len(robot.joints))))
+    columns = motion_columns(screws, pose[:, :3])[0] / np.where(robot.hinges, robot.length, 1.0)
+    _left, sizes, right = np.linalg.svd(robot.length * columns[3:])
+    still = right[int(np.sum(sizes > _INDEPENDENT)) :]
+    _left, sizes, right = np.linalg.svd(still @ columns[:3].T)
+    return np.asarray(right[: int(np.sum(sizes > _INDEPENDENT))])
+
+
 def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:
     """Joint values (n, d) that bring the platform to poses (n, 7), and the joints there.
 
