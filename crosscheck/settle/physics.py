@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 # in mechanics: it is chosen to give the platform about this mass, as a power of two, so that no
 # digit changes.
 _MASS_IN_MUJOCO = 1e6
+# Products of motions this close to those of independent unit motions are these; and what is added
+# to them, relative to the largest, where joints can be moved without the platform.
+_ALONE, _IDLE = 1e-12, 1e-14
 Index = NDArray[np.int64]
 Together = tuple[Index, Index, Index]
 """Coordinates, and the (rows, columns) of the stiffness that shifting all of them together yields.
@@ -293,6 +296,25 @@ class Physics:
     def move(self, change: Array) -> None:
         """Move by a generalised displacement (d,), with rotations of a free joint in body axes."""
         mujoco.mj_integratePos(self.model, self.data.qpos, change, 1.0)
+
+    def motion_products(self) -> Array | None:
+        """Products (d, d) of what the coordinates do to the platform; None if they are its motions.
+
+        They are of translations of its origin and of rotations times the robot's length, per metre
+        of each coordinate. Those of bodies other than the platform count as they are.
+        """
+        if self.is_free:
+            return None
+        moves, turns = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+        mujoco.mj_jacBody(self.model, self.data, moves, turns, self.body)
+        own = slice(0, self.n_platform)
+        columns = np.concatenate([moves, self.length * turns])[:, own] / self.metre[own]
+        out = np.eye(self.n_dof)
+        out[own, own] = columns.T @ columns
+        if np.allclose(out, np.eye(self.n_dof), rtol=0.0, atol=_ALONE):
+            return None
+        out[own, own] += _IDLE * np.max(np.diag(out)) * np.eye(self.n_platform)
+        return out
 
     def solve(self, stiffness: Array, force: Array, damping: float, neutral: float) -> Array | None:
         """Displacement (d,) [m] that balances a force (d,) [N], rotations times the robot's length.

@@ -70,14 +70,31 @@ def polish(physics: Physics) -> Polished:
 
 
 def _softest(physics: Physics) -> tuple[float, Array]:
-    """Smallest eigenvalue of the stiffness [N/m] and its unit eigenvector (d,).
+    """Smallest eigenvalue of the stiffness [N/m] and its direction (d,), a unit vector.
 
     A cable whose tension is mere rounding resists on one side at most: without it, the platform may
     be free to move to the other. If it would be unstable without them, such cables are included.
     """
     tensions = physics.tensions()
     firm = tensions > 10.0 * physics.rounding() * physics.force_scale
-    values, vectors = np.linalg.eigh(stiffness(physics, firm))
-    if values[0] < -neutral_stiffness(physics) and np.any((tensions > 0.0) & ~firm):
-        values, vectors = np.linalg.eigh(stiffness(physics, tensions > 0.0))
-    return float(values[0]), np.asarray(vectors[:, 0])
+    value, direction = _least(physics, stiffness(physics, firm))
+    if value < -neutral_stiffness(physics) and np.any((tensions > 0.0) & ~firm):
+        value, direction = _least(physics, stiffness(physics, tensions > 0.0))
+    return value, direction
+
+
+def _least(physics: Physics, matrix: Array) -> tuple[float, Array]:
+    """Smallest eigenvalue of a stiffness (d, d) by motions of the platform, and its direction.
+
+    Joints are no measure of these: a hinge beside the platform's origin also moves it. Of K v =
+    value M v, M has the products of the motions of each joint.
+    """
+    products = physics.motion_products()
+    if products is None:
+        values, vectors = np.linalg.eigh(matrix)
+        return float(values[0]), np.asarray(vectors[:, 0])
+    from scipy.linalg import eigh  # takes a while to import
+
+    values, vectors = eigh(matrix, products, subset_by_index=(0, 0))
+    direction = vectors[:, 0] / np.linalg.norm(vectors[:, 0])
+    return float(values[0]), np.asarray(direction)

@@ -285,10 +285,14 @@ def axes_of(texts: Sequence[str], robot: Robot) -> list[NDArray[np.float64]]:
 
     import numpy as np
 
+    from seecr.workspace.extent import own_directions
+
     axes = [_axis_of(text) for text in texts]
     total = math.prod(len(axis) for axis in axes)
     check_count("--grid", total)
-    check_places(np.array([[axis[k] for axis in axes] for k in (0, -1)]), robot)
+    places = np.array([[axis[k] for axis in axes] for k in (0, -1)])
+    directions = own_directions(robot)
+    check_places(places if directions is None else places @ directions, robot)
     return axes
 
 

@@ -47,8 +47,9 @@ Examples:
     "--grid",
     nargs=3,
     metavar="X Y Z",
-    help="Each FIRST:LAST:COUNT or one number [m].  [default: over the exit points, down to as far "
-    "below the reference pose as they are above it, or to the floor of the MJCF]",
+    help="Each FIRST:LAST:COUNT or one number [m]; of a robot in a plane oblique to x, y and z "
+    "along the directions u, v and w that are printed.  [default: over the exit points, down to as "
+    "far below the reference pose as they are above it, or to the floor of the MJCF]",
 )
 @turned_option("all poses")
 @limit_options

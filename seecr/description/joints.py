@@ -13,9 +13,6 @@ from seecr.pose import (
     Array,
     cross,
     pose_difference,
-    quat_from_rotvec,
-    quat_multiply,
-    quat_rotate,
 )
 
 # Allowed distance of a commanded pose from what the joints reach [robot's length, or rad].
@@ -26,6 +23,8 @@ _EXACT = 1e-15
 _ROUNDING, _TRIES = 1e-12, 8
 # Motions of joints are independent if one is not this near to a combination of the others.
 _INDEPENDENT = 1e-9
+# Most that a hinge turns in one of Newton's steps [rad]: longer ones lead anywhere.
+_LONGEST_TURN = 1.0
 
 
 def pose_of_values(robot: Robot, values: Array) -> tuple[Array, Array]:
@@ -34,25 +33,15 @@ def pose_of_values(robot: Robot, values: Array) -> tuple[Array, Array]:
     A joint is a row of kind (0 slide, 1 hinge), axis and point in the base frame. The first joint
     is the outermost, as in MJCF (product of exponentials from the reference pose).
     """
-    values = np.atleast_2d(np.asarray(values, float))
-    n = len(values)
-    turn = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
-    shift = np.zeros((n, 3))  # x -> turn(x - o) + o + shift, with o the reference position
-    origin = robot.reference_pose[:3]
-    screws = np.zeros((n, len(robot.joints), 7))
-    for j, joint in enumerate(robot.joints):
-        axis = quat_rotate(turn, joint.axis)
-        point = quat_rotate(turn, joint.point - origin) + origin + shift
-        screws[:, j, 0] = 1.0 if joint.kind == "hinge" else 0.0
-        screws[:, j, 1:4], screws[:, j, 4:7] = axis, point
-        if joint.kind == "slide":
-            shift = shift + axis * values[:, j : j + 1]
-            continue
-        own = quat_from_rotvec(axis * values[:, j : j + 1])
-        shift = point + quat_rotate(own, origin + shift - point) - origin
-        turn = quat_multiply(own, turn)
-    quat = quat_multiply(turn, robot.reference_pose[3:])
-    return np.concatenate([origin + shift, quat], axis=1), screws
+    from seecr.compiled.joints import N_CURRENT  # takes a while to import
+    from seecr.compiled.reaching import place_home_batch
+
+    values = np.array(np.atleast_2d(values), float, order="C")
+    poses = np.empty((len(values), 7))
+    current = np.empty((*values.shape, N_CURRENT))
+    home = robot.reference_pose.copy()
+    place_home_batch(_home_screws(robot), values, home, poses, current)
+    return poses, current[..., :7].copy()
 
 
 def locked(robot: Robot) -> NDArray[np.bool_]:
@@ -89,6 +78,21 @@ def freedoms(robot: Robot) -> tuple[int, int, int]:
     return whole, whole - moving, turning
 
 
+def shifts(robot: Robot) -> Array:
+    """(k, 3) orthonormal directions along which joints move the platform without turning it.
+
+    They are those at the reference pose: three of a free platform, two of a planar one.
+    """
+    if not robot.joints:
+        return np.eye(3)
+    pose, screws = pose_of_values(robot, np.zeros((1, len(robot.joints))))
+    columns = motion_columns(screws, pose[:, :3])[0] / np.where(robot.hinges, robot.length, 1.0)
+    _left, sizes, right = np.linalg.svd(robot.length * columns[3:])
+    still = right[int(np.sum(sizes > _INDEPENDENT)) :]
+    _left, sizes, right = np.linalg.svd(still @ columns[:3].T)
+    return np.asarray(right[: int(np.sum(sizes > _INDEPENDENT))])
+
+
 def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:
     """Joint values (n, d) that bring the platform to poses (n, 7), and the joints there.
 
@@ -96,8 +100,8 @@ def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:
         InputError: the joints cannot reach a pose.
     """
     poses = np.atleast_2d(np.asarray(poses, float))
-    values, reached, screws = _nearest(robot, poses)
-    off = _off_joints(robot, poses, reached)
+    values, reached, screws, certain = _nearest(robot, poses)
+    off = None if certain else _off_joints(robot, poses, reached)
     if off is not None:
         which = f"commanded pose {off[0]}" if len(poses) > 1 else "the commanded pose"
         raise InputError(
@@ -107,29 +111,98 @@ def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:
     return values, screws
 
 
-def _nearest(robot: Robot, poses: Array) -> tuple[Array, Array, Array]:
-    """Joint values (n, d) that bring the platform nearest to poses (n, 7), by Newton steps.
+def _nearest(robot: Robot, poses: Array) -> tuple[Array, Array, Array, bool]:
+    """Joint values (n, d) that bring the platform nearest to poses (n, 7).
 
-    Also returns the poses that it reaches, and the joints there, as :func:`pose_of_values` does.
+    Also returns the poses that it reaches, and the joints there, as :func:`pose_of_values` does;
+    and whether all are known to be those that were asked for.
     """
-    values, before = np.zeros((len(poses), len(robot.joints))), np.inf
+    values, reached, screws, off = _in_closed_form(robot, poses)
+    left = np.flatnonzero(off > _ROUNDING)
+    if len(left):
+        values[left] = _searched(robot, poses[left], values[left], off[left])
+        reached[left], screws[left] = pose_of_values(robot, values[left])
+    return values, reached, screws, len(left) == 0
+
+
+def _in_closed_form(robot: Robot, poses: Array) -> tuple[Array, Array, Array, Array]:
+    """Values (n, d), poses that they lead to, joints there, and how far off these are (n,).
+
+    The distance is in robot's lengths or rad, and infinite where there is no closed form.
+    """
+    from seecr.compiled.joints import N_CURRENT  # takes a while to import
+    from seecr.compiled.reaching import N_SCRATCH, reach_batch
+
+    home = _home_screws(robot)
+    n, d = len(poses), len(home)
+    values, reached, current = np.empty((n, d)), np.empty((n, 7)), np.empty((n, d, N_CURRENT))
+    off = np.empty(n)
+    reach_batch(
+        home, robot.reference_pose.copy(), np.array(poses, order="C"), max(robot.length, 1.0),
+        _ROUNDING, values, reached, current, off, np.empty((3, N_SCRATCH)),
+    )  # fmt: skip
+    return values, reached, current[..., :7].copy(), off
+
+
+@lru_cache(maxsize=16)
+def _home_screws(robot: Robot) -> Array:
+    """The joints (d, 7) at the reference pose, as :func:`pose_of_values` returns them."""
+    return np.array(
+        [[float(joint.kind == "hinge"), *joint.axis, *joint.point] for joint in robot.joints]
+    ).reshape(-1, 7)
+
+
+def _searched(robot: Robot, poses: Array, values: Array, off: Array) -> Array:
+    """Joint values (n, d) nearest to poses, by Newton's steps from values that are ``off`` (n,).
+
+    If there is no closed form, they begin at the reference pose, and where that does not lead to
+    the pose, at other angles: from some starts they end elsewhere.
+    """
+    unknown = np.isinf(off)
+    best = _by_newton(robot, poses, np.where(unknown[:, None], 0.0, values))
+    least = _far(robot, poses, best)
+    turns = np.random.default_rng(0).uniform(-np.pi, np.pi, (_TRIES, len(robot.joints)))
+    for start in turns * robot.hinges:
+        rows = np.flatnonzero(unknown & (least > _OFF_MANIFOLD) & np.isfinite(poses).all(axis=1))
+        if len(rows) == 0:
+            break
+        found = _by_newton(robot, poses[rows], np.tile(start, (len(rows), 1)))
+        far = _far(robot, poses[rows], found)
+        better = far < least[rows]
+        best[rows[better]], least[rows[better]] = found[better], far[better]
+    return best
+
+
+def _far(robot: Robot, poses: Array, values: Array) -> Array:
+    """How far (n,) [robot's length, rad] joint values are from bringing the platform to poses."""
+    miss = np.abs(pose_difference(poses, pose_of_values(robot, values)[0]))
+    far = (miss / np.repeat([robot.length, 1.0], 3)).max(axis=1)
+    return np.where(np.isnan(far), np.inf, far)
+
+
+def _by_newton(robot: Robot, poses: Array, values: Array) -> Array:
+    """Joint values (n, d) after Newton's steps towards poses (n, 7), as long as these help."""
+    before = np.inf
     exact = _EXACT * np.repeat([max(robot.length, 1.0), 1.0], 3)
     for _ in range(50):
         reached, screws = pose_of_values(robot, values)
         miss = pose_difference(poses, reached)
         if np.all(np.abs(miss) <= exact):
-            return values, reached, screws
+            break
         columns = motion_columns(screws, reached[:, :3])
-        if not (np.isfinite(columns).all() and np.isfinite(miss).all()):
-            break  # so far away that rounding is longer than the robot
+        # some may be so far away that rounding is longer than the robot: they stay there
+        lost = ~(np.isfinite(columns).all(axis=(1, 2)) & np.isfinite(miss).all(axis=1))
+        columns[lost], miss[lost] = 0.0, 0.0
         step = np.einsum("nkd,nd->nk", np.linalg.pinv(columns), miss)
+        turn = np.max(np.abs(step), axis=1, where=robot.hinges, initial=0.0)
+        step /= np.maximum(turn / _LONGEST_TURN, 1.0)[:, None]
         values = values + step
         size = float(np.max(np.abs(step) / (1.0 + np.abs(values)), initial=0.0))
         # this close to convergence, steps that do not shrink are rounding
         if size < 1e-14 or 0.5 * before <= size < 1e-12:
             break
         before = size
-    return values, *pose_of_values(robot, values)
+    return values
 
 
 def reachable(robot: Robot, poses: Array) -> Array:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -206,8 +207,13 @@ class _Followed:
 
     def _along(self, k: int) -> Array:
         """The commanded step (1, d) to waypoint k."""
+        return self._steps[k - 1 : k]
+
+    @cached_property
+    def _steps(self) -> Array:
+        """The commanded steps (N - 1, d) from waypoint to waypoint."""
         poses = self.tables.poses
-        return step_between(self.robot, poses[k : k + 1], poses[k - 1 : k])
+        return step_between(self.robot, poses[1:], poses[:-1])
 
     def _descended(self, trial: Tables, pose: Array, guess: Array) -> batch.Evaluation:
         start, values = start_of(self.robot, trial, pose)

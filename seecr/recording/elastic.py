@@ -16,6 +16,7 @@ from seecr.pose import Array
 from seecr.recording import colours, layout
 from seecr.recording.scene import LEGEND, ROOT, Scene, write_scale
 from seecr.recording.stream import POSE, Recording, opening, place_index
+from seecr.workspace.extent import directions_words
 from seecr.workspace.grid import Workspace
 from seecr.workspace.slices import across_of, colour_end, evenly_picked
 
@@ -99,7 +100,7 @@ class Elastic:
     def index(self) -> rr.TimeColumn | None:
         """The timeline along the slices; None if there is only one, which is then always there."""
         slices, _ = self.picked
-        name, places = "xyz"[self.across], self.found.axes[self.across][slices]
+        name, places = self.found.axis_names[self.across], self.found.axes[self.across][slices]
         if len(slices) == 1:
             return None
         along = place_index(name, places)
@@ -121,10 +122,12 @@ class Elastic:
         """What is shown, and what is not."""
         found, (slices, each) = self.found, self.picked
         count = len(found.axes[self.across])
-        name = "xyz"[self.across]
+        name = found.axis_names[self.across]
         one = f"One slice, at {name} = {1e3 * found.axes[self.across][0]:.4g} mm."
         many = f"Slices normal to {name}: {len(slices)} of {counted(count, 'value')} of {name}."
         yield one if count == 1 else many
+        if found.directions is not None:
+            yield f"The grid has {directions_words(found.directions)}."
         size = found.margin.size // count
         if len(each) < size:
             yield f"Of each slice {len(each)} of {counted(size, 'pose')}, evenly spread."
@@ -144,7 +147,7 @@ class Elastic:
     def write(self, recording: Recording, scene: Scene) -> None:
         """Log slices, arrows, legends and words."""
         rows = [self.number(k) for k in self.picked[0]]
-        places = np.stack(np.meshgrid(*self.found.axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        places = self.found.places.reshape(-1, 3)
         radius = _WIDE * self._step or 0.01 * scene.size
         for layer in self.layers:
             shades = colours.scale_colours(np.nan_to_num(layer.values.ravel()), layer.top)
@@ -232,7 +235,7 @@ class Elastic:
         entities = [f"{ROOT}/{one}" for one in _ALONE]
         contents = [ROOT, *entities, f"{_ELASTIC}/{name}/**"]
         robot = self.found.robot
-        level = abs(robot.up[self.across]) > 0.5
+        level = abs(self.found.along_axes(robot.up)[self.across]) > 0.5
         above = _FROM_ABOVE if level else None
         return layout.scene_view(robot, low, high, title, aspect, contents, above)
 

@@ -38,14 +38,15 @@ def write_map_recording(found: Workspace, path: str | Path, edge: Array | None =
         InputFileError: the file cannot be written.
     """
     robot, name = found.robot, f"{found.robot.name} workspace"
-    places = np.stack(np.meshgrid(*found.axes, indexing="ij"), axis=-1)[found.feasible]
+    places = found.places[found.feasible]
     margins = found.margin[found.feasible]
-    every = 1 + len(places) // _MOST
-    places, margins = places[::every], margins[::every]
+    step = 1 + len(places) // _MOST
+    places, margins = places[::step], margins[::step]
     finite = margins[np.isfinite(margins)]
     top = colours.round_up(float(np.quantile(finite, 0.95)) if len(finite) else 1.0)
     corners = np.tile(robot.reference_pose, (2, 1))
-    corners[:, :3] = [[axis[end] for axis in found.axes] for end in (0, -1)]
+    every = found.places.reshape(-1, 3)
+    corners[:, :3] = every.min(axis=0), every.max(axis=0)
     low, high = shapes.extent(robot, corners)
     contents = ("$origin/**", f"- /{HIDDEN}")
     view = layout.scene_view(robot, low, high, name, 1.9, contents)
@@ -80,6 +81,6 @@ def _unsure(found: Workspace, radius: float) -> rr.Points3D:
     """Positions for which the model leaves open whether they can be held."""
     assert found.chance is not None
     unsure = (found.chance > _SURELY_NOT) & (found.chance < _SURELY)
-    places = np.stack(np.meshgrid(*found.axes, indexing="ij"), axis=-1)[unsure]
+    places = found.places[unsure]
     every = 1 + len(places) // _MOST
     return rr.Points3D(places[::every], radii=1.5 * radius, colors=colours.VERMILION)

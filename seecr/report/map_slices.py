@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.report.drawing import COLOURS, figure
+from seecr.workspace.extent import directions_words
 from seecr.workspace.grid import Workspace
 from seecr.workspace.slices import across_of, colour_end
 
@@ -86,16 +87,16 @@ def map_figure(
                 shown, ax=list(row), panchor=False, **_bar_of(panel, found)
             )
             bar.minorticks_off()
-            row[0].set_ylabel(f"{'xyz'[cut.high]} [{cut.unit}]")
+            row[0].set_ylabel(f"{found.axis_names[cut.high]} [{cut.unit}]")
             if panel not in (_held_panel, _chance_panel):
                 _stripes(cut, row)
         if edge is not None:
             _dots(axes, cut, edge, at_least)
         for k, ax in zip(cut.picked, axes[0], strict=True):
             at = cut.per_metre * found.axes[cut.across][k]
-            ax.set_title(f"{'xyz'[cut.across]} = {at:.4g} {cut.unit}")
+            ax.set_title(f"{found.axis_names[cut.across]} = {at:.4g} {cut.unit}")
         for ax in axes[-1]:
-            ax.set_xlabel(f"{'xyz'[cut.wide]} [{cut.unit}]")
+            ax.set_xlabel(f"{found.axis_names[cut.wide]} [{cut.unit}]")
         words = "; ".join(_words(cut, edge, at_least))
         title = [found.robot.name, *textwrap.wrap(words, int(_LETTERS * size[0]))]
         axes[0, 0].figure.suptitle("\n".join(title), fontsize=9)
@@ -145,8 +146,11 @@ class _Cut:
     def with_dots(self, edge: Array) -> list[NDArray[np.bool_]]:
         """Whether each pose of the edge lies in each slice, that is, between two poses of it."""
         axis = self.found.axes[self.across]
-        near = 1e-9 * max(float(np.ptp(axis)), 1e-9)
-        return [np.abs(edge[:, self.across] - axis[k]) <= near for k in self.picked]
+        # along axes of its own a place has rounding
+        least = 1e-9 if self.found.directions is None else self.found.robot.reach
+        near = 1e-9 * max(float(np.ptp(axis)), least)
+        across = self.found.along_axes(edge[:, :3])[:, self.across]
+        return [np.abs(across - axis[k]) <= near for k in self.picked]
 
 
 def _cut(found: Workspace, most: int) -> _Cut:
@@ -173,7 +177,9 @@ def _words(cut: _Cut, edge: Array | None, at_least: float | None) -> Iterator[st
     """What is not drawn, and the colours and dots that no colour bar explains."""
     shown, whole = len(cut.picked), len(cut.found.axes[cut.across])
     if shown < whole:
-        yield f"{shown} of {whole} values of {'xyz'[cut.across]}"
+        yield f"{shown} of {whole} values of {cut.found.axis_names[cut.across]}"
+    if cut.found.directions is not None:
+        yield directions_words(cut.found.directions)
     yield from _white(cut)
     yield from _without_end(cut)
     if cut.found.rests.any():
@@ -225,7 +231,7 @@ def _yes_or_no(found: Workspace) -> bool:
 def _dots(axes: Any, cut: _Cut, edge: Array, at_least: float | None) -> None:
     """Draw the edge's poses (k, 7) on every panel of their slice."""
     look = {"color": _EDGE, "markersize": 2.5} if at_least is None else _LIKELY
-    places = cut.per_metre * edge[:, [cut.wide, cut.high]]
+    places = cut.per_metre * cut.found.along_axes(edge[:, :3])[:, [cut.wide, cut.high]]
     for row in axes:
         for ax, own in zip(row, cut.with_dots(edge), strict=True):
             ax.plot(*places[own].T, ".", **look)

@@ -42,7 +42,7 @@ def beyond_line(found: Workspace, reach: DataReach | None) -> Iterator[str]:
     """How much of the workspace is far from the data that the model was fitted to."""
     if reach is None:
         return
-    places = np.stack(np.meshgrid(*found.axes, indexing="ij"), axis=-1)[found.feasible]
+    places = found.places[found.feasible]
     away = reach.outside(places, found.robot.length)
     if np.any(away > 0.0):
         yield (
@@ -78,9 +78,12 @@ def edge_line(edge: Array, tolerance: float) -> str:
 def write_arrays(path: Path, found: Workspace, edge: Array | None = None) -> None:
     """``map.npz``: axes, results at the poses, (nx, ny, nz) each, and the edge's poses (k, 7).
 
+    Of a grid with directions of its own the axes are ``u_m``, ``v_m`` and ``w_m``, and positions
+    are ``u, v, w @ directions``.
+
     With an elastic map ``status_names[status]`` says at which poses it has an answer, or why not.
     """
-    x, y, z = found.axes
+    axes = {f"{name}_m": axis for name, axis in zip(found.axis_names, found.axes, strict=True)}
     with written(path) as (part,), part.open("wb") as file:
         more: dict[str, ArrayLike] = {}
         if found.chance is not None:
@@ -90,8 +93,10 @@ def write_arrays(path: Path, found: Workspace, edge: Array | None = None) -> Non
         if found.status is not None:
             more["status"] = found.status
             more["status_names"] = [one.name.lower() for one in STATUSES]
+        if found.directions is not None:
+            more["directions"] = found.directions
         _write_npz(
-            file, **more, x_m=x, y_m=y, z_m=z, orientation=found.orientation,
+            file, **more, **axes, orientation=found.orientation,
             margin_N=found.margin,
             feasible=found.feasible, deviation_m=found.deviation, rotation_rad=found.rotation,
             slack=found.slack, smallest_eigenvalue_N_per_m=found.stiffness,

@@ -15,6 +15,7 @@ from seecr.pose import Array
 from seecr.result import Record, Result
 from seecr.statics.solution import Status
 from seecr.units import millimetres
+from seecr.workspace.extent import directions_words
 from seecr.workspace.margins import is_held
 
 __all__ = ["NEVER", "STATUSES", "Workspace", "codes_of"]
@@ -38,9 +39,12 @@ def codes_of(status: NDArray[np.object_]) -> NDArray[np.int8]:
 class Workspace(Result):
     """The workspace on a grid of positions with one orientation; arrays are (nx, ny, nz).
 
+    Joints may keep the platform in a plane that is oblique to x, y and z, or on such a line. Its
+    grid has axes of its own, u, v and w; all else is by x, y and z, as always.
+
     Attributes:
         robot: as described.
-        axes: the grid's x, y and z [m].
+        axes: the grid's x, y and z [m], or u, v and w.
         orientation: (4,) quaternion of all poses.
         margin: [N] how far inside their limits all tensions can stay; negative if the pose cannot
             be held. For robots with fewer cables than degrees of freedom it is that of the best
@@ -56,6 +60,9 @@ class Workspace(Result):
         elastic: whether the equilibria of the elastic robot were computed.
         status: how each of these solves ended, as codes: an index of ``tuple(seecr.Status)``; int8;
             None without an elastic map.
+        directions: (3, 3) unit vectors u, v and w, in rows, along which the axes count from the
+            base frame's origin; None if they are x, y and z. In a plane u is level, w is the
+            steepest direction and v is normal to both; a line is along w if it climbs, else u.
     """
 
     robot: Robot
@@ -70,6 +77,22 @@ class Workspace(Result):
     chance: NDArray[np.float32] | None = None
     elastic: bool = True
     status: NDArray[np.int8] | None = None
+    directions: Array | None = None
+
+    @property
+    def axis_names(self) -> str:
+        """``xyz``, or ``uvw`` of a grid with directions of its own."""
+        return "xyz" if self.directions is None else "uvw"
+
+    @property
+    def places(self) -> Array:
+        """(nx, ny, nz, 3) positions x, y and z [m] of the grid's poses."""
+        own = np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1)
+        return own if self.directions is None else np.asarray(own @ self.directions)
+
+    def along_axes(self, places: Array) -> Array:
+        """(k, 3) positions x, y and z [m] as values along the grid's axes."""
+        return places if self.directions is None else np.asarray(places @ self.directions.T)
 
     def likely(self, at_least: float) -> NDArray[np.bool_]:
         """The poses that can be held with at least a given probability.
@@ -106,6 +129,7 @@ class Workspace(Result):
         pairs = np.where(inside[pairs[:, :1]], pairs, pairs[:, ::-1])
         index = np.unravel_index(pairs, poses.shape)
         places = np.stack([axis[k] for axis, k in zip(self.axes, index, strict=True)], axis=-1)
+        places = places if self.directions is None else places @ self.directions
         turned = np.broadcast_to(self.orientation, (*pairs.shape, 4))
         both = np.concatenate([places, turned], axis=-1)
         return both[:, 0], both[:, 1]
@@ -135,8 +159,13 @@ class Workspace(Result):
     def place(self, at: tuple[int, ...]) -> str:
         """Where a pose of the grid is, in words; its index is given."""
         # of robots of many metres, too, without an exponent
-        at_mm = [round(1e3 * axis[k], 1) for axis, k in zip(self.axes, at, strict=True)]
+        at_mm = [round(1e3 * float(value), 1) for value in self._at(at)]
         return f"x y z {' '.join(f'{value + 0.0:.7g}' for value in at_mm)} mm"
+
+    def _at(self, index: tuple[int, ...]) -> list[float]:
+        """x, y and z [m] of a pose of the grid."""
+        own = [float(axis[k]) for axis, k in zip(self.axes, index, strict=True)]
+        return own if self.directions is None else (np.array(own) @ self.directions).tolist()
 
     @property
     def cell(self) -> float:
@@ -178,9 +207,10 @@ class Workspace(Result):
     def lines(self) -> list[str]:
         """How much of the grid can be held, and how far off the elastic robot is there."""
         n, held = self.margin.size, int(self.feasible.sum())
+        way = [] if self.directions is None else [f"grid: {directions_words(self.directions)}"]
         size = self.size_words(self.feasible)
         of = f"{self.robot.name}: {held} of {counted(n, 'pose')} can be held"
-        out = [f"{of}, {size}" if size else of]
+        out = [*way, f"{of}, {size}" if size else of]
         half = float(np.median(self.margin[self.feasible])) if held else 0.0
         if half == np.inf:
             out.append("at half of them or more, all cables can be tightened without limit")
@@ -213,14 +243,16 @@ class Workspace(Result):
     def region(self) -> str:
         """Where the grid is, in words; whether its lowest poses stand on the robot's floor."""
         ends = [(float(axis.min()), float(axis.max())) for axis in self.axes]
-        parts = [f"{k} {between(*end)} m" for k, end in zip("xyz", ends, strict=True)]
-        above = ends[2][0] - self.robot.standing_height(self.orientation)
+        parts = [f"{k} {between(*end)} m" for k, end in zip(self.axis_names, ends, strict=True)]
+        lowest = np.array([low for low, _ in ends])
+        z = lowest[2] if self.directions is None else lowest @ self.directions[:, 2]
+        above = float(z) - self.robot.standing_height(self.orientation)
         stands = abs(above) <= 1e-9 * self.robot.length
         return f"region: {', '.join(parts)}{', down to the floor' if stands else ''}"
 
     def records(self) -> list[Record]:
         """One row per pose of the grid."""
-        places = np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        places = self.places.reshape(-1, 3)
         columns = {
             **{f"{axis}_m": places[:, k] for k, axis in enumerate("xyz")},
             "margin_N": self.margin.ravel(),
@@ -266,6 +298,7 @@ class Workspace(Result):
         return {
             "robot": self.robot.name,
             "shape": self.margin.shape,
+            "directions": self.directions,
             "region_m": [[axis.min(), axis.max()] for axis in self.axes],
             "floor_m": self.robot.floor,
             "orientation": self.orientation,
@@ -279,7 +312,7 @@ class Workspace(Result):
                 {
                     "status": status,
                     "poses": poses,
-                    "first_m": [axis[k] for axis, k in zip(self.axes, first, strict=True)],
+                    "first_m": self._at(first),
                     "sentence": status.value,
                 }
                 for status, poses, first in self._unrested()
@@ -290,7 +323,7 @@ class Workspace(Result):
             },
             "softest_where_feasible": at
             and {
-                "pose_m": [axis[k] for axis, k in zip(self.axes, at, strict=True)],
+                "pose_m": self._at(at),
                 "smallest_eigenvalue_N_per_m": self.stiffness[at],
                 "direction": self.softest[at],
             },

@@ -24,7 +24,12 @@ from seecr.prediction.model import GivenEffects
 from seecr.statics.starts import commanded_poses
 from seecr.threads import run_parts
 from seecr.workspace.chances import asked_chance, check_chance
-from seecr.workspace.extent import grid_ends, refuse_oblique, refuse_unreached
+from seecr.workspace.extent import (
+    grid_ends,
+    own_directions,
+    refuse_other_joints,
+    refuse_unreached,
+)
 from seecr.workspace.grid import NEVER, Workspace, codes_of
 from seecr.workspace.margins import margins_at, read_once
 
@@ -46,7 +51,8 @@ def default_axes(
 
     Below and above are along gravity. The grid ends where the platform's lowest anchor point would
     be on the robot's floor, if it has one. Along an axis on which joints keep the platform in place
-    it has one value.
+    it has one value. Where they keep it in a plane or on a line that is oblique to x, y and z, the
+    axes are :attr:`Workspace.directions` instead.
 
     Args:
         robot: as described, or its MJCF.
@@ -55,11 +61,11 @@ def default_axes(
         orientation: (4,) quaternion of all poses; that of the reference pose by default.
 
     Returns:
-        x, y and z of the grid, (nx,), (ny,) and (nz,) [m].
+        x, y and z of the grid, (nx,), (ny,) and (nz,) [m], or u, v and w.
 
     Raises:
         InputError: ``values`` is not a whole number from 1 on, ``orientation`` no quaternion, or
-            the joints keep the platform in a plane that is not along two axes.
+            the joints let the platform move in no way without turning it.
     """
     robot = robot_of(robot)
     if values is None:
@@ -72,7 +78,7 @@ def default_axes(
         evenly(a, b, values) if b - a > 1e-9 * robot.length else np.array([a])
         for a, b in zip(low.tolist(), high.tolist(), strict=True)
     )
-    refuse_oblique(robot, axes)
+    refuse_other_joints(robot, axes)
     return axes  # type: ignore[return-value]
 
 
@@ -114,7 +120,8 @@ def workspace_map(
 
     Args:
         robot: as described, or its MJCF.
-        x, y, z: (nx,), (ny,), (nz,) or numbers [m].
+        x, y, z: (nx,), (ny,), (nz,) or numbers [m]. Of a robot that joints keep in a plane or on a
+            line oblique to these, they are u, v and w, along :attr:`Workspace.directions`.
         orientation: (4,) quaternion of all poses; that of the reference pose by default.
         lowest, highest: (m,) or one [N], limits of the tensions for poses that can be held.
         wrenches: (k, 6) external wrenches [N, N m]; a pose must be held under each of them.
@@ -142,7 +149,8 @@ def workspace_map(
     if elastic or robot.n_cables < robot.n_dof:
         _refuse_memory(robot, effects)
     turned = robot.reference_pose[3:] if orientation is None else _quaternion(orientation)
-    refuse_unreached(robot, axes, turned)
+    directions = own_directions(robot)
+    refuse_unreached(robot, axes, turned, directions)
     shape = (len(axes[0]), len(axes[1]), len(axes[2]))
     n = int(np.prod(shape))
     margin, slack = np.empty(n), np.full(n, NEVER, dtype=np.int8)
@@ -155,6 +163,7 @@ def workspace_map(
         rows = np.arange(part.start, part.stop)
         index = np.unravel_index(rows, shape)
         places = np.column_stack([axis[k] for axis, k in zip(axes, index, strict=True)])
+        places = places if directions is None else places @ directions
         poses = commanded_poses(np.column_stack([places, np.tile(turned, (len(rows), 1))]))
         margin[rows] = margins_at(robot, poses, lowest, highest, wrenches, effects)
         if likely is not None:
@@ -174,7 +183,7 @@ def workspace_map(
         moved[:, :3].reshape(*shape, 3), moved[:, 3:].reshape(*shape, 3),
         slack.reshape(shape), stiffness.reshape(shape), softest.reshape(*shape, -1),
         None if likely is None else likely.reshape(shape), elastic,
-        None if status is None else status.reshape(shape),
+        None if status is None else status.reshape(shape), directions,
     )  # fmt: skip
 
 

@@ -9,6 +9,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from random_robots import write_mjcf
+from rejointed import WAYS, rejointed
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.recording.material import record_motion
@@ -18,6 +20,8 @@ from crosscheck.settle.physics import Physics
 from crosscheck.settle.relax import SettleStatus
 from crosscheck.settle.settler import Settler, settle_batch
 from crosscheck.suite.worst_pose import write_worst_pose_mjcf
+from seecr.description.mjcf import load_robot
+from seecr.equilibrium.solving import solve
 from seecr.errors import InputFileError
 from seecr.pose import pose_difference, quat_from_rotvec, quat_rotate, transform_points
 
@@ -267,6 +271,16 @@ def test_a_planar_robot_on_slides_and_a_hinge_balances_in_its_plane():
     assert np.linalg.norm(force[[0, 2]]) < 1e-9 * 0.4 * G
     assert abs(torque[1]) < 1e-9 * 0.4 * G
     assert abs(np.degrees(2 * np.arcsin(result.pose[5]))) > 1  # it tilts
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_the_smallest_stiffness_is_the_platforms_whatever_its_joints(way, tmp_path):
+    """By joint values it was half of that, or less, and stood beside SEECR's in results.json."""
+    path = write_mjcf(rejointed(load_robot("planar_vertical"), way), tmp_path / "robot.xml")
+    robot, pose = load_robot(path), np.array([0.3, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0])
+    solution = solve(robot, pose)
+    there = Settler(path).settle(pose, solution.rest_lengths[0])
+    assert there.smallest_eigenvalue == pytest.approx(solution.smallest_eigenvalue[0], rel=1e-6)
 
 
 def test_joints_are_placed_at_the_commanded_pose():

@@ -10,7 +10,7 @@ from turned import turned
 
 from seecr.description.mjcf import load_robot
 from seecr.errors import InputError
-from seecr.workspace.extent import grid_ends
+from seecr.workspace.extent import grid_ends, own_directions
 from seecr.workspace.maps import default_axes, workspace_map
 
 COGIRO = replace(load_robot("demobot_cogiro"), floor=None)
@@ -47,11 +47,65 @@ def test_the_grid_of_a_planar_robot_lies_in_its_plane_also_if_exit_points_do_not
     assert [len(axis) for axis in axes] == [3, 1, 3] and axes[1][0] == robot.reference_pose[1]
 
 
-def test_a_plane_that_no_grid_lies_in_is_told() -> None:
+@pytest.mark.parametrize("rotvec", [[0, 0, np.radians(30.0)], [0.4, 0, 0], [0.2, 0.1, 0.5]])
+def test_an_oblique_plane_has_a_grid_of_its_own(rotvec: list[float]) -> None:
+    """It had been refused."""
+    other, turn = turned(PLANAR, rotvec)
+    directions = own_directions(other)
+    assert directions is not None
+    u, v, w = directions
+    assert directions @ directions.T == pytest.approx(np.eye(3)) and np.linalg.det(directions) > 0.0
+    # in the plane, level, and upwards
+    assert abs(v @ turn[:, 1]) == pytest.approx(1.0) and u[2] == 0.0 and u[0] > 0.0 and w[2] > 0.0
+    axes = default_axes(other, 3)
+    assert [len(axis) for axis in axes] == [3, 1, 3]
+    place = directions @ other.reference_pose[:3]
+    assert axes[1][0] == pytest.approx(place[1], abs=1e-12)
+    exits = other.exit_points @ directions.T
+    for k in (0, 2):
+        assert axes[k][0] - 1e-12 <= exits[:, k].min() and exits[:, k].max() <= axes[k][-1] + 1e-12
+
+
+def test_planes_and_lines_along_axes_keep_these() -> None:
+    for robot in (PLANAR, COGIRO, replace(PLANAR, joints=PLANAR.joints[:1])):
+        assert own_directions(robot) is None
+
+
+@pytest.mark.parametrize("climbs", [False, True])
+def test_a_line_has_a_grid_along_itself(climbs: bool) -> None:
+    along = np.array([0.6, 0.0, 0.8]) if climbs else np.array([0.8, 0.6, 0.0])
+    slide = replace(PLANAR.joints[0], axis=along)
+    robot = replace(PLANAR, joints=(slide,))
+    directions = own_directions(robot)
+    assert directions is not None and directions[2 if climbs else 0] == pytest.approx(along)
+    assert [len(axis) for axis in default_axes(robot, 3)] == ([1, 1, 3] if climbs else [3, 1, 1])
+
+
+def test_the_floor_ends_an_oblique_grid_too() -> None:
+    other, _turn = turned(PLANAR, [0.4, 0, 0])
+    other = replace(other, floor=-0.05)
+    directions = own_directions(other)
+    assert directions is not None
+    u, v, w = (axis[0] for axis in default_axes(other, 3))
+    assert (np.array([u, v, w]) @ directions)[2] == pytest.approx(
+        other.standing_height(other.reference_pose[3:])
+    )
+
+
+def test_joints_that_only_turn_have_no_grid() -> None:
+    beside = replace(PLANAR.joints[2], point=PLANAR.reference_pose[:3] + np.array([0.1, 0.0, 0.0]))
+    with pytest.raises(InputError, match="do not reach a grid of one orientation") as told:
+        default_axes(replace(PLANAR, joints=(beside,)))
+    assert "a sweep" in str(told.value)
+
+
+def test_a_grid_beside_an_oblique_plane_says_which_axes_it_has() -> None:
     other, _turn = turned(PLANAR, [0, 0, np.radians(30.0)])
-    with pytest.raises(InputError, match="do not reach a grid along x, y and z") as told:
-        default_axes(other)
-    assert "turn the robot in its MJCF" in str(told.value)
+    with pytest.raises(
+        InputError, match=r"cannot reach u v w 0.[45] 0.2 0.1 m of the grid"
+    ) as told:
+        workspace_map(other, [0.4, 0.5], [0.0, 0.2], [0.1])
+    assert "here with v 0 m (u along (0.866, 0.5, 0), v along" in str(told.value)
 
 
 def test_a_grid_beside_the_plane_says_where_it_leaves_it() -> None:
