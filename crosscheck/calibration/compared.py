@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from crosscheck.calibration.joint_fit.all_effects import Calibration, fit_all_effects
 from crosscheck.calibration.joint_fit.joining import layouts
 from crosscheck.calibration.joint_fit.joint import JointFit, cost
@@ -55,7 +53,7 @@ class FitAndSets:
     @property
     def surprise(self) -> float:
         """chi2 per reading of the worst held-out run over what the fit of all expects."""
-        return _surprise(self.whole)
+        return self.whole.surprise
 
     @property
     def is_unexplained(self) -> bool:
@@ -137,7 +135,7 @@ def _compared(
         return not _louder(fit.colour, kinds) and not is_structure(fit)
 
     unknown = unknown_beside(setting, whole.joint, all_stated(problem, stated))
-    smooth = unknown.is_there or _surprise(whole) > SURPRISE
+    smooth = unknown.is_there or whole.surprise > SURPRISE
     structure_beside_all = is_structure(whole.joint)
     found = sets(structure_beside_all or smooth)
     not_noise = is_structure(found.best.joint)
@@ -159,10 +157,6 @@ def _compared(
         if own.fewer is not None:
             return as_found  # the noise is still another: it says nothing for sure
     return replace(as_found, without=own.without)
-
-
-def _surprise(whole: Calibration) -> float:
-    return float(np.max(whole.held_out.surprise, initial=0.0))
 
 
 def _louder(colour: Colour, stated: Sequence[str]) -> bool:

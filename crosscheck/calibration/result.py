@@ -15,7 +15,7 @@ from crosscheck.errors import CrosscheckError, UnsolvedError
 from crosscheck.fit.effects.contradictions import contradictions
 from crosscheck.fit.preparation.prepare import Progress, prepare
 from crosscheck.fit.preparation.thinned import thinned
-from crosscheck.fit.reasons import Reason, Why
+from crosscheck.fit.reasons import Reason, by_reason
 from crosscheck.fit.words import fitted_records, rms_words
 from crosscheck.given import GivenModel, GivenRobot, basis_of, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
@@ -94,11 +94,7 @@ class Calibrated(Result, JointErrors):
 
     def absent_lines(self) -> list[str]:
         """Lines about effects that are not in the model, those that the user excluded left out."""
-        words: dict[str, list[str]] = {}
-        for name, why in self.absent.items():
-            if why.why is not Why.EXCLUDED:
-                words.setdefault(why.words, []).append(name)
-        return [f"not fitted: {', '.join(names)} ({why})" for why, names in words.items()]
+        return [f"not fitted: {line}" for line in by_reason(self.absent)]
 
     def lines(self) -> list[str]:
         """Errors before and after, the noise, and how many values there are."""

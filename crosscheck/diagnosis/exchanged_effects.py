@@ -40,7 +40,7 @@ def exchanged(found: Search, chances: Chances) -> Search:
         return found
     if node.evidence.log <= found.last.evidence.log:
         return found
-    return replace(found, steps=in_order(found.trials, found.steps[0].node, node, {}))
+    return replace(found, steps=in_order(found.trials, found.steps[0], node, {}))
 
 
 def replaced(found: Search, rivals: Iterable[Rival]) -> Search:
@@ -59,7 +59,7 @@ def replaced(found: Search, rivals: Iterable[Rival]) -> Search:
         node = fitted_to_the_end(found.trials, node_of(found.trials, rival.fit))
         better = node.evidence.log > found.last.evidence.log and node.whiteness.is_noise
         if better and can_be(found.problem.robot, node.fit.terms, stood):
-            return replace(found, steps=in_order(found.trials, found.steps[0].node, node, {}))
+            return replace(found, steps=in_order(found.trials, found.steps[0], node, {}))
     return found
 
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from crosscheck.calibration.judgement.alternatives import alternatives, shared
 from crosscheck.calibration.judgement.verdict import Judgement
 from crosscheck.calibration.noise.robust import outliers
@@ -17,16 +15,13 @@ from crosscheck.calibration.search import SetSearch
 from crosscheck.calibration.sets.equals import EQUAL
 from crosscheck.calibration.sets.exact import Refit
 from crosscheck.calibration.sets.linear_search import Names
-from crosscheck.diagnosis.advice import check_of
 from crosscheck.diagnosis.averaged import spread_by_others
 from crosscheck.diagnosis.chances import PROBABLE, Chances, chances_of
-from crosscheck.diagnosis.common_part import common_part
-from crosscheck.diagnosis.listed import diagnosis_of, left_out
+from crosscheck.diagnosis.listed import diagnosis_of, left_out, missing_of
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect, NotListed
 from crosscheck.diagnosis.rivals import Rival, loss_of_its_part
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.set_steps import fit_of, steps_of_set
-from crosscheck.diagnosis.small import share_of
 from crosscheck.diagnosis.steps import OTHER
 from crosscheck.diagnosis.unexplained import estimated_floor, structure_words, where_of
 from crosscheck.diagnosis.words import (
@@ -40,12 +35,9 @@ from crosscheck.diagnosis.words import (
     words_of,
 )
 from crosscheck.fit.effects.candidates import Candidate
-from crosscheck.fit.effects.gauss_newton import Fit
-from crosscheck.fit.least_squares.problem import rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.words import rms_words
 from seecr.counted import counted
-from seecr.pose import Array
 
 # A note mentions noise with a larger autocorrelation than this.
 _ALIKE = 0.3
@@ -75,7 +67,11 @@ def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
     if verdict is not DiagnosisVerdict.EFFECTS_FOUND:
         best = fit_of(sought.calibration.setting, sought.found.best.joint)
     spread = spread_by_others(search.problem, best, chances)
-    missing = [_missing(sought, search, chances, name, best, spread) for name in search.found]
+    own = frozenset(search.last.fit.terms.names)
+    missing = [
+        missing_of(search, name, chances, _rivals(sought, own, name), spread, best)
+        for name in search.found
+    ]
     return diagnosis_of(
         verdict,
         _sentence(sought.judgement, missing, search.tried, chances, some, fitted),
@@ -90,28 +86,6 @@ def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
         alternatives={
             names: sought.found.refits[sought.found.always | names].joint.terms for names in some
         },
-    )
-
-
-def _missing(
-    sought: SetSearch, search: Search, chances: Chances, name: str, best: Fit, spread: Array
-) -> MissingEffect:
-    """A listed effect with its values in a fit, and their further standard deviation (p,)."""
-    term, part = best.terms[name], best.terms.part(name)
-    stderr = np.hypot(best.stderr[part], spread[part])
-    index = 1 + search.found.index(name)
-    before, step = search.steps[index - 1], search.steps[index]
-    return MissingEffect(
-        term=term,
-        stderr=stderr,
-        at_bound=best.at_bound[part],
-        rivals=tuple(_rivals(sought, frozenset(search.last.fit.terms.names), name)),
-        check=check_of(term, search.problem.robot, stderr),
-        rms=rms_by_kind(search.problem, step.fit.state.raw),
-        held_out_rms=step.held_out.rms,
-        share=share_of(before, step),
-        probability=chances.of(name),
-        common=common_part(search, term, best),
     )
 
 

@@ -19,6 +19,7 @@ from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.small import share_of
 from crosscheck.diagnosis.words import doubts_about
 from crosscheck.fit.effects.candidates import Candidate
+from crosscheck.fit.effects.gauss_newton import Fit
 from crosscheck.fit.least_squares.problem import Rms, rms_by_kind
 from crosscheck.fit.noise.unstated import overestimated
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
@@ -97,6 +98,7 @@ def missing_of(
     chances: Chances,
     rivals: Sequence[Rival] | None = None,
     spread: Array | None = None,
+    best: Fit | None = None,
 ) -> MissingEffect:
     """An effect that the search found, with what adding it does.
 
@@ -104,13 +106,16 @@ def missing_of(
         found: the search. name: name of the effect.
         chances: probabilities of all effects.
         rivals: effects that cannot be told from it; if not given, they are searched.
-        spread: (p,) further standard deviation of the values of the last model, if any.
+        spread: (p,) further standard deviation of the values, if any.
+        best: the fit that they are of; by default the last model, whose errors are larger by what
+            it leaves.
     """
-    best = found.last.fit
+    inflation = found.last.whiteness.inflation if best is None else 1.0
+    best = found.last.fit if best is None else best
     term, part = best.terms[name], best.terms.part(name)
     index = 1 + found.found.index(name)
     before, step = found.steps[index - 1], found.steps[index]
-    stderr = best.stderr[part] * found.last.whiteness.inflation
+    stderr = best.stderr[part] * inflation
     stderr = stderr if spread is None else np.hypot(stderr, spread[part])
     return MissingEffect(
         term=term,

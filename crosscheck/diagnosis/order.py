@@ -6,11 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from crosscheck.diagnosis.node import LEAST_GAIN, Names, Node, hopeless, node_of
-from crosscheck.fit.effects.candidates import Candidate, Trials
-from crosscheck.fit.effects.evidence import Evidence
-from crosscheck.fit.effects.gauss_newton import Fit
+from crosscheck.fit.effects.candidates import Trials
 from crosscheck.fit.effects.held_out import HeldOut, hold_out, pays, unfitted
-from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.fit.reasons import Reason, Why
 from seecr.effects import Terms
 
@@ -18,39 +15,17 @@ from seecr.effects import Terms
 _ITERATIONS = 8
 
 
-@dataclass(frozen=True, eq=False)
-class Step:
-    """An intermediate model: what was added last, and how well it does.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Step(Node):
+    """An intermediate model, with the candidates tried beside it, and how well it does.
 
     Attributes:
         added: name of the effect that was added last, "" for the start.
-        node: the model, with the candidates that were tried beside it.
         held_out: its errors on held-out runs.
     """
 
     added: str
-    node: Node
     held_out: HeldOut
-
-    @property
-    def fit(self) -> Fit:
-        """The fit of the model to all rows."""
-        return self.node.fit
-
-    @property
-    def evidence(self) -> Evidence:
-        """Evidence of the fit."""
-        return self.node.evidence
-
-    @property
-    def whiteness(self) -> Whiteness:
-        """The test of its residuals."""
-        return self.node.whiteness
-
-    @property
-    def candidates(self) -> tuple[Candidate, ...]:
-        """The candidates that were tried beside it."""
-        return self.node.candidates
 
     @property
     def tried(self) -> int:
@@ -64,7 +39,8 @@ def step_of(trials: Trials, added: str, node: Node) -> Step:
         held = hold_out(trials.problem, node.fit, trials.factor, trials.fit)
     else:
         held = unfitted(trials.problem, node.fit)
-    return Step(added, node, held)
+    model = node.fit, node.evidence, node.whiteness, node.candidates
+    return Step(*model, added=added, held_out=held)
 
 
 def fitted_to_the_end(trials: Trials, node: Node) -> Node:
@@ -149,4 +125,4 @@ def _blamed(first: Step, names: Collection[str]) -> Step:
     candidates = tuple(
         c.refused(reason) if c.name in names and c.why_not is None else c for c in first.candidates
     )
-    return replace(first, node=replace(first.node, candidates=candidates))
+    return replace(first, candidates=candidates)

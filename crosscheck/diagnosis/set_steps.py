@@ -16,13 +16,11 @@ from crosscheck.calibration.search import SetSearch
 from crosscheck.calibration.sets.exact import Refit
 from crosscheck.calibration.sets.linear_search import Names
 from crosscheck.calibration.sets.refits import ComparedSets
-from crosscheck.diagnosis.node import Node
 from crosscheck.diagnosis.order import Step
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.effects.candidates import Candidate, Trials, candidates_for
 from crosscheck.fit.effects.evidence import Evidence, p_value
 from crosscheck.fit.effects.gauss_newton import Fit, FitStatus
-from crosscheck.fit.effects.held_out import HeldOut
 from crosscheck.fit.noise.whiteness import whiteness
 from crosscheck.fit.reasons import Reason, Why
 from seecr.effects import Term
@@ -43,7 +41,7 @@ def steps_of_set(sought: SetSearch, names: Names) -> Search:
     problem, factor = setting.problem, setting.factor
     here, model = found.always, found.none
     steps = [_step(setting, "", model)]
-    steps[0] = replace(steps[0], node=replace(steps[0].node, candidates=tuple(_tried(sought))))
+    steps[0] = replace(steps[0], candidates=tuple(_tried(sought)))
     todo = set(names - here)
     while todo:
         added = max(sorted(todo), key=lambda n: _score(found, here | {n}))
@@ -77,9 +75,8 @@ def _step(setting: Setting, added: str, model: Refit) -> Step:
     left = joint.whitened(setting.chain, joint.state.white)
     seen = directions(setting, joint)
     evidence = Evidence(model.score, joint.state.chi2, seen)
-    out = leave_out(setting, joint)
-    held = HeldOut(out.raw, out.chi2, out.readings, out.values, out.rms, valid=True)
-    return Step(added, Node(fit, evidence, whiteness(problem, left, seen)), held)
+    held = leave_out(setting, joint)
+    return Step(fit, evidence, whiteness(problem, left, seen), added=added, held_out=held)
 
 
 def directions(setting: Setting, joint: JointFit) -> int:

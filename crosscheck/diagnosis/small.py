@@ -45,7 +45,7 @@ def small_effects_alone(
         last = search.last
         if search.found:
             tried = tuple(_small_candidates(search, parameters))
-            last = replace(last, node=replace(last.node, candidates=tried))
+            last = replace(last, candidates=tried)
             search = replace(search, steps=(*search.steps[:-1], last))
         step = _small_step(search, parameters, shares[1] if search.found else shares[0])
         if step is None:

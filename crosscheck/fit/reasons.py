@@ -6,6 +6,7 @@ Programs decide by the enum, never by the text, as with :class:`seecr.Status`.
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, StrEnum
 
@@ -106,6 +107,15 @@ class Reason:
     def __str__(self) -> str:
         text = f"not a candidate: {self.words}" if self.lacking else self.words
         return f"{text}, tried with {', '.join(self.beside)} in the model" if self.beside else text
+
+
+def by_reason(reasons: Mapping[str, Reason]) -> list[str]:
+    """Effects grouped by why they are left out, without those that the user excluded."""
+    words: dict[str, list[str]] = {}
+    for name, why in reasons.items():
+        if why.why is not Why.EXCLUDED:
+            words.setdefault(why.words, []).append(name)
+    return [f"{', '.join(names)} ({why})" for why, names in words.items()]
 
 
 class Unfit(Enum):

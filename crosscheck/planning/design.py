@@ -132,13 +132,11 @@ def _unsolved(plan: Planned) -> list[str]:
 
 
 def _confusion(own: Mapping[str, Signal]) -> tuple[tuple[str, ...], Array]:
-    names = tuple(own)
-    table = np.eye(len(names))
-    for i, a in enumerate(names):
-        for j, b in enumerate(names):
-            if i != j:
-                table[i, j] = imitated(own[a].columns, own[b].basis)
-    return names, table
+    part = [
+        [1.0 if a is b else imitated(a.columns, b.basis) for b in own.values()]
+        for a in own.values()
+    ]
+    return tuple(own), np.array(part).reshape(len(own), len(own))
 
 
 def _wanted(own: Mapping[str, Signal], effects: Mapping[str, Visible]) -> list[Wanted]:

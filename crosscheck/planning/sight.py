@@ -10,7 +10,7 @@ import numpy as np
 
 from crosscheck.fit.effects.gauss_newton import Fit
 from crosscheck.fit.least_squares.problem import Problem
-from crosscheck.fit.reasons import Reason, Why
+from crosscheck.fit.reasons import Reason, Why, by_reason
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.result import Visible
 from crosscheck.planning.visibility import EXACT, Signal, needed, signal_left, signals
@@ -53,7 +53,7 @@ class Sight:
         effects = f"{seen} of {counted(total, 'effect')}"
         out = [f"In these data {effects} would be visible at a plausible size."]
         large = [n for n, why in self.missing.items() if why.why is Why.TOO_MANY_PARAMETERS]
-        lacking = _by_reason({n: why for n, why in self.missing.items() if n not in large})
+        lacking = by_reason({n: why for n, why in self.missing.items() if n not in large})
         if lacking or self.hidden:
             small = [(f"{', '.join(self.hidden)} (too small compared with the noise)")] * bool(
                 self.hidden
@@ -78,15 +78,6 @@ class Sight:
             "cannot_be_told_from": {name: list(others) for name, others in self.alike.items()},
             "not_with_these_data": {name: why.words for name, why in self.missing.items()},
         }
-
-
-def _by_reason(missing: Mapping[str, Reason]) -> list[str]:
-    """Effects grouped by what the data lack for them, without those that the user excluded."""
-    words: dict[str, list[str]] = {}
-    for name, why in missing.items():
-        if why.why is not Why.EXCLUDED:
-            words.setdefault(why.words, []).append(name)
-    return [f"{', '.join(names)} ({why})" for why, names in words.items()]
 
 
 def sight_of(problem: Problem, base: Fit, factor: Array) -> Sight:

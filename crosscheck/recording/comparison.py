@@ -6,14 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import rerun as rr
 import rerun.blueprint as rrb
 
 from crosscheck.comparison.quantities import channels
 from crosscheck.fit.least_squares.problem import Kind
 from crosscheck.recording import misfit, words
-from crosscheck.recording.diagnosis_words import plain
 from crosscheck.recording.misfit import MEASURED, Misfit
+from crosscheck.recording.words import plain
 from crosscheck.units import in_unit, short
 from seecr.recording import colours, layout, plots, shapes
 from seecr.recording.legends import Legend, legend_of
@@ -23,7 +22,6 @@ from seecr.recording.stream import Index, Recording, pose_index, recording_file
 if TYPE_CHECKING:
     from crosscheck.comparison.result import Comparison
 
-_MARKDOWN = rr.MediaType.MARKDOWN
 _MOST_LISTED, _MOST_WORST = 5, 6
 
 
@@ -45,34 +43,24 @@ def write_comparison_recording(found: Comparison, path: str | Path) -> None:
             _verdict(recording, found, None)
         return
     shown = Misfit(problem, found.state)
-    seen = np.concatenate(
-        [shown.measured[shown.rows], misfit.predicted_poses(shown.first)[shown.rows]]
-    )
-    with recording_file(path, name, _blueprint(found, shown, name, seen)) as recording:
+    with recording_file(path, name, _blueprint(found, shown, name)) as recording:
         top = colours.round_up(float(np.nanmax(found.state.prediction.tensions, initial=0.0)))
-        scene = Scene(recording, problem.robot, seen, top)
+        scene = Scene(recording, problem.robot, shown.seen, top)
         scene.surroundings()
         _over_poses(recording, scene, found, shown)
         _verdict(recording, found, shown)
 
 
-def _blueprint(found: Comparison, shown: Misfit, name: str, seen: np.ndarray) -> rrb.Blueprint:
+def _blueprint(found: Comparison, shown: Misfit, name: str) -> rrb.Blueprint:
     robot = found.problem.robot
-    low, high = shapes.extent(robot, seen)
+    low, high = shapes.extent(robot, shown.seen)
     # half of a column of a window of 1920 by 1080 points
     size = (630.0, 445.0)
-    plotted = [
-        layout.plot(
-            f"{kind.name.capitalize()} error [{kind.unit}]", [f"plot/{kind.name}/**"],
-            _legend(found, kind, size),
-        )
-        for kind in shown.kinds
-    ]  # fmt: skip
     root = rrb.Horizontal(
         layout.scene_view(robot, low, high, name, 0.76),
         rrb.Vertical(
             *misfit.map_views(shown),
-            rrb.Tabs(*plotted),
+            misfit.panels(shown, [_legend(found, kind, size) for kind in shown.kinds]),
             row_shares=[*[1.0] * len(shown.kinds), float(len(shown.kinds))],
         ),
         rrb.Vertical(
@@ -101,9 +89,7 @@ def _over_poses(recording: Recording, scene: Scene, found: Comparison, shown: Mi
     scene.cables("model", index, states)
     for kind in shown.kinds:
         _plots(recording, index, found, kind)
-    texts = [_pose(found, k) for k in range(n)]
-    kinds = [str(_MARKDOWN)] * n
-    recording.rows("text/now", index, rr.TextDocument.columns(text=texts, media_type=kinds))
+    recording.texts("text/now", index, [_pose(found, k) for k in range(n)])
 
 
 def _errors_of(found: Comparison, kind: Kind) -> tuple[np.ndarray, np.ndarray]:
@@ -129,11 +115,10 @@ def _plots(recording: Recording, index: Index, found: Comparison, kind: Kind) ->
     names, _units = channels(found.problem)
     counted, raw = _errors_of(found, kind)
     shades = colours.cable_colours(raw.shape[1])
-    for k, (name, shade) in enumerate(zip(names[kind.columns], shades, strict=True)):
+    for k, (name, colour) in enumerate(zip(names[kind.columns], shades, strict=True)):
         if not counted[:, k].any():
             continue
         entity = f"plot/{kind.name}/reading_{k + 1}"
-        colour = (int(shade[0]), int(shade[1]), int(shade[2]), 255)
         starts = found.problem.experiment.commands.starts
         plots.line_by_runs(recording, entity, index, raw[:, k], starts, _short(name), colour, 1.5)
 
@@ -143,7 +128,8 @@ def _verdict(recording: Recording, found: Comparison, shown: Misfit | None) -> N
     if found.terms:
         parts.append("Model: SEECR + " + ", ".join(map(plain, found.terms.names)) + ".\n")
     if shown is not None:
-        parts.append(_errors(found, shown))
+        rms = [(found.rms.get(kind.key), found.floor.get(kind.key)) for kind in shown.kinds]
+        parts.append(words.errors(shown.kinds, rms, ("model", "noise")))
         parts.append(
             f"\n**Scene.** {misfit.misfit_words(shown)} Blue box and cables: the model; orange "
             "edges: what was measured.\n"
@@ -152,17 +138,7 @@ def _verdict(recording: Recording, found: Comparison, shown: Misfit | None) -> N
     if found.notes:
         lines = [f"- {plain(note)}" for note in found.notes[:_MOST_LISTED]]
         parts.append("\n".join(["## Notes", *lines]))
-    document = rr.TextDocument("\n".join(parts), media_type=_MARKDOWN)
-    recording.always("text/verdict", document)
-
-
-def _errors(found: Comparison, shown: Misfit) -> str:
-    rows = []
-    for kind in shown.kinds:
-        values = (found.rms.get(kind.key), found.floor.get(kind.key))
-        cells = [short(None if v is None else kind.factor * v) for v in values]
-        rows.append((f"{kind.name} [{kind.unit}]", *cells))
-    return words.table(rows, ("rms error", "model", "noise"))
+    recording.text("text/verdict", "\n".join(parts))
 
 
 def _worst(found: Comparison) -> str:
@@ -175,8 +151,7 @@ def _worst(found: Comparison) -> str:
 
 def _pose(found: Comparison, k: int) -> str:
     data = found.problem.data
-    where = f"line {int(data.line[k])}, run {plain(data.run[k])}"
-    head = f"{words.pose_heading(k, data.n_rows)}\n{where}\n"
+    head = words.row_heading(data, k)
     missing = [row.why for row in found.unsolved if row.row == k]
     if missing:
         return head + f"\nNo equilibrium to compare with: {plain(missing[0])}."

@@ -19,13 +19,11 @@ from crosscheck.fit.least_squares.problem import Kind
 from crosscheck.recording import bars, misfit
 from crosscheck.recording.diagnosis_words import model_words, pose_words, verdict_words
 from crosscheck.recording.misfit import MEASURED, Misfit
-from seecr.pose import Array
 from seecr.recording import colours, layout, plots, shapes
 from seecr.recording.legends import Legend, legend_of
 from seecr.recording.scene import Scene
 from seecr.recording.stream import MODEL_STEP, Recording, pose_index, recording_file
 
-_MARKDOWN = rr.MediaType.MARKDOWN
 _STEPS_A_SECOND = 1.0
 # Size of the plot, in points of a window of 1920 by 1080.
 _PLOT = (820.0, 250.0)
@@ -49,12 +47,11 @@ def write_diagnosis_recording(found: Diagnosis, path: str | Path) -> None:
     assert found.search is not None
     shown = Misfit(found.search.problem, stages[0].state)
     with recording_file(path, _name(found), _blueprint(found, stages, shown)) as recording:
-        scene = Scene(recording, shown.problem.robot, _seen(shown), _top_tension(stages))
+        scene = Scene(recording, shown.problem.robot, shown.seen, _top_tension(stages))
         scene.surroundings()
         _over_steps(recording, scene, found, stages, shown)
         _over_poses(recording, scene, stages, shown)
-        document = rr.TextDocument(verdict_words(found, shown), media_type=_MARKDOWN)
-        recording.always("text/verdict", document)
+        recording.text("text/verdict", verdict_words(found, shown))
 
 
 def _name(found: Diagnosis) -> str:
@@ -66,14 +63,7 @@ def _name(found: Diagnosis) -> str:
 def _write_words(found: Diagnosis, path: str | Path) -> None:
     root = rrb.Vertical(layout.text("Verdict", "text/verdict"))
     with recording_file(path, "diagnosis", layout.blueprint(root)) as recording:
-        document = rr.TextDocument(verdict_words(found, None), media_type=_MARKDOWN)
-        recording.always("text/verdict", document)
-
-
-def _seen(shown: Misfit) -> Array:
-    return np.concatenate(
-        [shown.measured[shown.rows], misfit.predicted_poses(shown.first)[shown.rows]]
-    )
+        recording.text("text/verdict", verdict_words(found, None))
 
 
 def _top_tension(stages: list[Stage]) -> float:
@@ -82,21 +72,14 @@ def _top_tension(stages: list[Stage]) -> float:
 
 
 def _blueprint(found: Diagnosis, stages: list[Stage], shown: Misfit) -> rrb.Blueprint:
-    low, high = shapes.extent(shown.problem.robot, _seen(shown))
+    low, high = shapes.extent(shown.problem.robot, shown.seen)
     robot = shown.problem.robot
     low_part = bars.share(found, stages)
     middle = [*misfit.map_views(shown), bars.view(found, stages)]
-    plotted = [
-        layout.plot(
-            f"{kind.name.capitalize()} error [{kind.unit}]", [f"plot/{kind.name}/**"],
-            _legend(stages, shown, kind),
-        )
-        for kind in shown.kinds
-    ]  # fmt: skip
     root = rrb.Horizontal(
         rrb.Vertical(
             layout.scene_view(robot, low, high, _name(found), 1.22),
-            rrb.Tabs(*plotted),
+            misfit.panels(shown, [_legend(stages, shown, kind) for kind in shown.kinds]),
             row_shares=[3.0, 1.3],
         ),
         rrb.Vertical(
@@ -130,7 +113,7 @@ def _over_steps(
     scene.platform("model", index, predicted, colours.SEECR, solid=True)
     scene.cables("model", index, misfit.stacked([(state, worst) for state in states]))
     texts = [model_words(found, stages, k, shown, worst) for k in range(count)]
-    _texts(recording, index, texts)
+    recording.texts("text/now", index, texts)
 
 
 def _over_poses(recording: Recording, scene: Scene, stages: list[Stage], shown: Misfit) -> None:
@@ -148,7 +131,7 @@ def _over_poses(recording: Recording, scene: Scene, stages: list[Stage], shown: 
     misfit.cursor(recording, index, shown)
     for kind in shown.kinds:
         _plots(recording, index, stages, shown, kind)
-    _texts(recording, index, [pose_words(stages, shown, k) for k in range(n)])
+    recording.texts("text/now", index, [pose_words(stages, shown, k) for k in range(n)])
 
 
 def _plots(
@@ -174,8 +157,3 @@ def _legend(stages: list[Stage], shown: Misfit, kind: Kind) -> Legend:
     sizes = [kind.sizes(shown.problem, stage.state.raw) * kind.factor for stage in stages]
     legend = legend_of([np.stack(sizes, axis=1)], [stage.label for stage in stages], _PLOT)
     return replace(legend, values=None)
-
-
-def _texts(recording: Recording, index: rr.TimeColumn, texts: list[str]) -> None:
-    kinds = [str(_MARKDOWN)] * len(texts)
-    recording.rows("text/now", index, rr.TextDocument.columns(text=texts, media_type=kinds))

@@ -10,6 +10,7 @@ from crosscheck.diagnosis.words import removed
 from crosscheck.fit.least_squares.problem import rms_by_kind
 from crosscheck.recording import misfit, words
 from crosscheck.recording.misfit import Misfit
+from crosscheck.recording.words import plain
 from crosscheck.units import in_unit, parameter_name, short, with_error
 
 _MOST_PARAMETERS, _MOST_CANDIDATES, _MOST_LISTED = 9, 6, 6
@@ -32,11 +33,6 @@ def verdict_words(found: Diagnosis, shown: Misfit | None) -> str:
     parts += _listed("What to measure next", list(found.measure_further))
     parts += _listed("Notes", list(found.notes))
     return "\n".join(parts)
-
-
-def plain(text: str) -> str:
-    """A user's text, with the characters escaped that Markdown would interpret."""
-    return "".join(f"\\{c}" if c in "\\`*_[]<>#|" else c for c in text)
 
 
 def _listed(title: str, lines: list[str]) -> list[str]:
@@ -67,12 +63,11 @@ def model_words(found: Diagnosis, stages: list[Stage], k: int, shown: Misfit, wo
 
 def _errors(found: Diagnosis, stage: Stage, shown: Misfit) -> str:
     fitted = rms_by_kind(shown.problem, stage.state.raw)
-    rows = []
-    for kind in shown.kinds:
-        values = (stage.step.held_out.rms[kind.key], fitted[kind.key], floor_of(found, kind))
-        cells = [short(None if v is None else kind.factor * v) for v in values]
-        rows.append((f"{kind.name} [{kind.unit}]", *cells))
-    return words.table(rows, ("rms error", "held-out runs", "fitted runs", "noise"))
+    values = [
+        (stage.step.held_out.rms[kind.key], fitted[kind.key], floor_of(found, kind))
+        for kind in shown.kinds
+    ]
+    return words.errors(shown.kinds, values, ("held-out runs", "fitted runs", "noise"))
 
 
 def _finding(finding: MissingEffect) -> str:
@@ -108,8 +103,7 @@ def _candidates(found: Diagnosis) -> str:
 def pose_words(stages: list[Stage], shown: Misfit, k: int) -> str:
     """The numbers of one row under the first and the last model."""
     data = shown.problem.data
-    where = f"line {int(data.line[k])}, run {plain(data.run[k])}"
-    head = f"{words.pose_heading(k, data.n_rows)}\n{where}\n"
+    head = words.row_heading(data, k)
     if not shown.problem.use[k]:
         return head + words.unused(data, k)
     ends = stages if len(stages) < 2 else [stages[0], stages[-1]]

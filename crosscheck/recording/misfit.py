@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from crosscheck.recording.axes import bounds, draw_axes
 from seecr.compiled.columns import REST
 from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
 from seecr.recording import colours, layout
+from seecr.recording.legends import Legend
 from seecr.recording.shapes import States
 from seecr.recording.stream import Index, Recording
 
@@ -81,6 +83,11 @@ class Misfit:
             known = np.isfinite(data.angles_rad)
             quat = quat_from_rxyz(np.where(known, data.angles_rad, angles))
         return np.concatenate([position, quat], axis=1)
+
+    @property
+    def seen(self) -> Array:
+        """(k, 7) poses that the scene has to show: those measured and those predicted."""
+        return np.concatenate([self.measured[self.rows], predicted_poses(self.first)[self.rows]])
 
 
 def predicted_poses(state: State) -> Array:
@@ -163,6 +170,18 @@ def maps(recording: Recording, index: Index, misfit: Misfit, states: list[State]
             recording.rows(f"map/{kind.name}/arrows", index, thin.partition(count))
             style = rr.Arrows2D.from_fields(radii=[_on_screen(_THIN)], colors=[colours.SILVER])
             recording.always(f"map/{kind.name}/arrows", style)
+
+
+def panels(misfit: Misfit, legends: Sequence[Legend]) -> rrb.Tabs:
+    """The plots of the errors, one per kind of reading, each with its legend."""
+    return rrb.Tabs(
+        *(
+            layout.plot(
+                f"{kind.name.capitalize()} error [{kind.unit}]", [f"plot/{kind.name}/**"], legend
+            )
+            for kind, legend in zip(misfit.kinds, legends, strict=True)
+        )
+    )
 
 
 def cursor(recording: Recording, index: Index, misfit: Misfit) -> None:

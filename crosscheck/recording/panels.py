@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import rerun as rr
 from numpy.typing import NDArray
 
 from crosscheck.recording import words
@@ -15,7 +14,6 @@ from seecr.recording.stream import Index, Recording, opening
 
 READ_ME, NOW = "text/read_me", "text/now"
 _LISTED = 12
-_MARKDOWN = rr.MediaType.MARKDOWN
 _KINDS = {
     "sweep": "poses along a line",
     "random": "poses at random",
@@ -38,9 +36,8 @@ class Panels:
 
     def over_poses(self, index: Index) -> None:
         """The guide, and the numbers of each pose."""
-        document = rr.TextDocument(self._guide(), media_type=_MARKDOWN)
-        self.recording.always(READ_ME, document)
-        self._texts(index, [self._pose(i) for i in range(self.material.count)])
+        self.recording.text(READ_ME, self._guide())
+        self.recording.texts(NOW, index, [self._pose(i) for i in range(self.material.count)])
 
     def over_settling(self, index: Index) -> None:
         """The numbers of each instant of the settling."""
@@ -53,12 +50,7 @@ class Panels:
             words.instant(float(t), float(energy), away[k], self._loose(loose[k]))
             for k, (t, energy) in enumerate(zip(motion.t_s, motion.kinetic_energy, strict=True))
         ]
-        self._texts(index, texts)
-
-    def _texts(self, index: Index, texts: list[str]) -> None:
-        kinds = [str(_MARKDOWN)] * len(texts)
-        columns = rr.TextDocument.columns(text=texts, media_type=kinds)
-        self.recording.rows(NOW, index, columns)
+        self.recording.texts(NOW, index, texts)
 
     def _guide(self) -> str:
         material = self.material

@@ -152,8 +152,7 @@ class Series:
         names = self.material.robot.cable_names
         shades = colours.cable_colours(self.material.robot.n_cables)
         said = {group[0]: joined([names[k] for k in group]) for group in _drawn(self.material)}
-        for k, (name, shade) in enumerate(zip(names, shades, strict=True)):
-            colour = (int(shade[0]), int(shade[1]), int(shade[2]), 255)
+        for k, (name, colour) in enumerate(zip(names, shades, strict=True)):
             self._pair(TENSION, entity_of(name), said.get(k, name), colour)
             plots.lane_style(self.recording, f"{LANES}/{entity_of(name)}", colour)
         for quantity, (name, colour) in _QUANTITIES.items():

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from crosscheck.fit.least_squares.problem import Kind
 from crosscheck.measurements.data import Measurements
+from crosscheck.units import short
 from seecr.counted import counted
 from seecr.pose import Array, pose_difference, rxyz_from_quat
 from seecr.recording.plots import DEG, MM
@@ -38,6 +40,17 @@ _CROSSES = "Crosses are SEECR, the dots on them MuJoCo."
 def pose_heading(k: int, count: int) -> str:
     """The heading for one of so many poses, counted from 0."""
     return f"## Pose {k}" + (f" (of 0 to {count - 1})" if count > 1 else "")
+
+
+def row_heading(data: Measurements, k: int) -> str:
+    """The heading for one row of measurements: which pose it is, and where it was read."""
+    where = f"line {int(data.line[k])}, run {plain(data.run[k])}"
+    return f"{pose_heading(k, data.n_rows)}\n{where}\n"
+
+
+def plain(text: str) -> str:
+    """A user's text, with the characters escaped that Markdown would interpret."""
+    return "".join(f"\\{c}" if c in "\\`*_[]<>#|" else c for c in text)
 
 
 def unused(data: Measurements, k: int) -> str:
@@ -89,6 +102,25 @@ def table(rows: Sequence[tuple[str, ...]], head: tuple[str, ...] | None = None) 
         head, *rows = rows
     lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
     return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
+
+
+def errors(
+    kinds: Iterable[Kind], values: Iterable[Sequence[float | None]], names: tuple[str, ...]
+) -> str:
+    """A table of rms errors, one row per kind of reading.
+
+    Args:
+        kinds: the kinds. values: for each, its errors, SI; None where there is none.
+        names: what the columns are.
+    """
+    rows = [
+        (
+            f"{kind.name} [{kind.unit}]",
+            *(short(None if v is None else kind.factor * v) for v in row),
+        )
+        for kind, row in zip(kinds, values, strict=True)
+    ]
+    return table(rows, ("rms error", *names))
 
 
 def number(value: float, unit: str, digits: int = 3) -> str:

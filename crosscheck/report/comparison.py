@@ -91,24 +91,27 @@ def _groups(found: Comparison) -> list[tuple[str, str, list[str]]]:
     return out
 
 
-def _coordinates(found: Comparison) -> list[tuple[str, list[str], str, str]]:
-    """Name, bias, rms and largest error, unit, line of the largest."""
-    out = []
-    for row in found.coordinates:
-        factor, unit = in_unit(row.unit)
-        numbers = [short(factor * value) for value in (row.bias, row.rms, row.max)]
-        out.append((row.name, numbers, unit, found.problem.data.place(row.row)))
-    return out
+_Row = tuple[str, list[str], str, str]
+"""Name, numbers, their unit, line of the largest."""
 
 
-def _tracking(found: Comparison) -> list[tuple[str, list[str], str, str]]:
-    """Kind, rms and largest distance from the wanted poses, unit, line of the largest."""
-    out = []
-    for one in found.tracking.away if found.tracking else ():
-        factor, unit = in_unit(one.unit)
-        numbers = [short(factor * value) for value in (one.rms, one.max)]
-        out.append((one.kind, numbers, unit, found.problem.data.place(one.row)))
-    return out
+def _row(found: Comparison, name: str, values: Sequence[float], si: str, row: int) -> _Row:
+    factor, unit = in_unit(si)
+    return name, [short(factor * value) for value in values], unit, found.problem.data.place(row)
+
+
+def _coordinates(found: Comparison) -> list[_Row]:
+    """Of each reading: bias, rms and largest error."""
+    return [
+        _row(found, one.name, (one.bias, one.rms, one.max), one.unit, one.row)
+        for one in found.coordinates
+    ]
+
+
+def _tracking(found: Comparison) -> list[_Row]:
+    """Of each kind: rms and largest distance from the wanted poses."""
+    away = found.tracking.away if found.tracking else ()
+    return [_row(found, one.kind, (one.rms, one.max), one.unit, one.row) for one in away]
 
 
 def _worst(found: Comparison) -> list[tuple[int, str, str, list[str], str]]:

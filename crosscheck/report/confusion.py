@@ -9,12 +9,10 @@ from matplotlib.patches import Rectangle
 
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.search import Search
-from crosscheck.fit.effects.gauss_newton import Fit
 from crosscheck.fit.effects.starts import amplitude_columns
 from crosscheck.fit.least_squares.imitation import basis, beside, imitated
 from crosscheck.fit.reasons import Why
 from crosscheck.report.drawing import BEFORE, INK, WIDTH, blank, image, styled
-from seecr.effects.base import Layout
 from seecr.pose import Array
 
 # Effects in the map where some are listed, and where none are.
@@ -82,32 +80,18 @@ def _names(found: Diagnosis) -> list[str]:
 def _columns(found: Search, name: str) -> Array | None:
     """(N, p) what an effect does beside the base model, by plausible sizes."""
     final = found.last.fit
-    base = _base_columns(final, found.base)
     if name in final.terms:
         own = final.jacobian[:, final.terms.part(name)]
     else:
-        layout = _layout(found, name)
+        tried = (c.layout for c in found.steps[0].candidates if c.name == name)
+        layout = next(tried, None)
         if layout is None:
             return None
         shapes = layout.effect.shapes(final.state.prediction.setup)
         null = layout.start(shapes[0] if shapes else {})
         own = amplitude_columns(found.problem, final, layout, null) * layout.scale
-    return beside(own, basis(base))
-
-
-def _base_columns(final: Fit, held: tuple[str, ...]) -> Array:
-    """Columns of the effects that the model had before the diagnosis."""
-    keep = np.zeros(final.jacobian.shape[1], dtype=bool)
-    for name in held:
-        keep |= final.terms.own(name)
-    return final.jacobian[:, keep]
-
-
-def _layout(found: Search, name: str) -> Layout | None:
-    for candidate in found.steps[0].candidates:
-        if candidate.name == name:
-            return candidate.layout
-    return None
+    had = np.array([effect in found.base for effect, _key in final.terms.labels], dtype=bool)
+    return beside(own, basis(final.jacobian[:, had]))
 
 
 def draw_confusion(confusion: Confusion) -> str:

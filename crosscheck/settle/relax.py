@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import mujoco
@@ -83,13 +83,11 @@ class Rest:
 
     def after(self, first: Rest) -> Rest:
         """This result, with the cost of an earlier one added."""
-        return Rest(
-            self.status,
-            self.residual,
-            self.steps + first.steps,
-            self.simulated_s + first.simulated_s,
-            self.time_step,
-            self.wall_s + first.wall_s,
+        return replace(
+            self,
+            steps=self.steps + first.steps,
+            simulated_s=self.simulated_s + first.simulated_s,
+            wall_s=self.wall_s + first.wall_s,
         )
 
 

@@ -34,12 +34,18 @@ def junit_xml(run: Run) -> str:
         counts = _counts(run.results, run.wall_s)
         suite = ET.SubElement(root, "testsuite", {"name": "crosscheck run", **counts})
         for result in run.results:
-            _add_case(suite, result)
+            lines, found = words.failures(result), _report(result)
+            _add(
+                suite, "crosscheck", result, words.remarks(result), "\n".join(lines),
+                "\n".join(found),
+            )  # fmt: skip
     if run.effects:
         counts = _counts(run.effects, sum(effect.wall_s for effect in run.effects))
         suite = ET.SubElement(root, "testsuite", {"name": GROUP, **counts})
         for effect in run.effects:
-            _add_effect(suite, effect)
+            said = words.effect_text(effect)
+            wrong = f"{effect.case.name}: {said}"
+            _add(suite, f"crosscheck.{GROUP}", effect, said, wrong, said)
     ET.indent(root)
     text: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
     return text.decode() + "\n"
@@ -55,37 +61,23 @@ def _counts(results: Sequence[CaseResult | EffectResult], seconds: float) -> dic
     }
 
 
-def _add_effect(suite: ET.Element, result: EffectResult) -> None:
+def _add(
+    suite: ET.Element, group: str, result: CaseResult | EffectResult, message: str, wrong: str,
+    found: str,
+) -> None:  # fmt: skip
+    """A test case: what was found, and, unless both sides agree, what is wrong."""
     case = ET.SubElement(
         suite,
         "testcase",
-        classname=f"crosscheck.{GROUP}",
-        name=_clean(result.case.name),
-        time=f"{result.wall_s:.3f}",
-    )
-    text = _clean(words.effect_text(result))
-    tag = _TAGS.get(result.outcome)
-    if tag is not None:
-        message = f"{_clean(result.case.name)}: {text}"
-        ET.SubElement(case, tag, message=message, type=tag).text = message
-    ET.SubElement(case, "system-out").text = text
-
-
-def _add_case(suite: ET.Element, result: CaseResult) -> None:
-    case = ET.SubElement(
-        suite,
-        "testcase",
-        classname="crosscheck",
+        classname=group,
         name=_clean(result.case.name),
         time=f"{result.wall_s:.3f}",
     )
     tag = _TAGS.get(result.outcome)
     if tag is not None:
-        lines = words.failures(result)
-        message = f"{result.case.name}: {words.remarks(result)}"
-        bad = ET.SubElement(case, tag, message=_clean(message), type=tag)
-        bad.text = _clean("\n".join(lines))
-    ET.SubElement(case, "system-out").text = _clean("\n".join(_report(result)))
+        said = _clean(f"{result.case.name}: {message}")
+        ET.SubElement(case, tag, message=said, type=tag).text = _clean(wrong)
+    ET.SubElement(case, "system-out").text = _clean(found)
 
 
 def _report(result: CaseResult) -> list[str]:

@@ -41,33 +41,15 @@ _NOWHERE = Descent(False, False, np.nan)
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
-    """MuJoCo's answers for n rows.
+class _Rows:
+    """Where n rows ended.
 
     Attributes:
         pose: (n, 7) equilibria; tensions: (n, m) [N] where cables leave.
-        position: (n, 3) [m]; quat_wxyz: (n, 4); tension_readings: (n, m) [N], as read, without
-            noise.
-        rest_lengths: (n, m) [m] actually paid out.
         at_rest: (n,) bool, a stable equilibrium was found.
         free: (n,) bool, in equilibrium, but free to move along some direction.
         residual: (n,) residual force relative to the load.
     """
-
-    pose: Array
-    tensions: Array
-    position: Array
-    quat_wxyz: Array
-    tension_readings: Array
-    rest_lengths: Array
-    at_rest: NDArray[np.bool_]
-    free: NDArray[np.bool_]
-    residual: Array
-
-
-@dataclass(frozen=True, eq=False)
-class _Rows:
-    """Results of rows: pose (n, 7), tensions (n, m) [N], how each ended (n,), residual (n,)."""
 
     pose: Array
     tensions: Array
@@ -79,6 +61,22 @@ class _Rows:
     def empty(cls, n: int, m: int) -> _Rows:
         no, nan = np.zeros(n, dtype=bool), np.full(n, np.nan)
         return cls(np.full((n, 7), np.nan), np.full((n, m), np.nan), no, no.copy(), nan)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Truth(_Rows):
+    """MuJoCo's answers for n rows, and what sensors read there.
+
+    Attributes:
+        position: (n, 3) [m]; quat_wxyz: (n, 4); tension_readings: (n, m) [N], as read, without
+            noise.
+        rest_lengths: (n, m) [m] actually paid out.
+    """
+
+    position: Array
+    quat_wxyz: Array
+    tension_readings: Array
+    rest_lengths: Array
 
 
 def measure(
@@ -119,15 +117,11 @@ def measure(
     reading = (rows.pose[:, :3], rows.pose[:, 3:], rows.tensions)
     for sensor in true.sensors:
         reading = sensor(reading)
+    position, quat, tensions = reading
     return Truth(
-        rows.pose,
-        rows.tensions,
-        *reading,
-        rest[path.is_row],
-        rows.at_rest,
-        rows.free,
-        rows.residual,
-    )
+        **vars(rows), position=position, quat_wxyz=quat, tension_readings=tensions,
+        rest_lengths=rest[path.is_row],
+    )  # fmt: skip
 
 
 def _extrapolated(coarse: _Rows, fine: _Rows, ratio: float) -> _Rows:

@@ -294,14 +294,7 @@ def _commands(
     if poses is None:
         return Commands(_along(robot, given)), {}, (_COUNTED,), None
     read = read_commands(poses, robot)
-    more: _Columns = {}
-    if len(set(read.run)) > 1:
-        more["run"] = read.run
-    if read.commands.time is not None:
-        more["t_s"] = read.commands.time.tolist()
-    if read.commands.temperature is not None:
-        more["temperature_C"] = read.commands.temperature.tolist()
-    return read.commands, more, read.notes, read.wanted
+    return read.commands, read.conditions, read.notes, read.wanted
 
 
 def _along(robot: Robot, given: _Commanded) -> NDArray[np.float64]:

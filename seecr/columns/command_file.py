@@ -7,8 +7,10 @@ poses that lengths are for. The TOML beside it may state ``lengths = "told"`` an
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +48,16 @@ class CommandFile:
     run: tuple[str, ...]
     notes: tuple[str, ...]
     any_orientation: bool = False
+
+    @property
+    def conditions(self) -> dict[str, Sequence[Any]]:
+        """Columns of the rows' runs, if there are several, their times and temperatures."""
+        columns: dict[str, Sequence[Any]] = {"run": self.run} if len(set(self.run)) > 1 else {}
+        if self.commands.time is not None:
+            columns["t_s"] = self.commands.time.tolist()
+        if self.commands.temperature is not None:
+            columns["temperature_C"] = self.commands.temperature.tolist()
+        return columns
 
 
 def read_commands(path: str | Path, robot: Robot) -> CommandFile:

@@ -131,7 +131,7 @@ def follow_commands(robot: Robot, commands: Commands, setup_of: SetupOf) -> Solu
     path = waypoints_of(robot, commands, waypoints=_WAY)
     tables = assemble(setup_of(path.commands, path.source))
     followed = _Followed(robot, path, tables, setup_of)
-    found = batch.Evaluation.empty(len(tables), robot.n_cables, robot.n_dof)
+    found = batch.Evaluation.at_commands(tables)
     jumps: list[list[Jump]] = [[] for _ in range(len(commands))]
     state = None
     for k in range(len(tables)):

@@ -261,12 +261,12 @@ def _joins(one: Solution, tables: Tables, saddle: Array, path: _Path) -> bool:
     higher = np.flatnonzero(energies > height + rounding)
     # the last points from either end that are not higher
     last = (higher[0] - 1, higher[-1] + 1) if len(higher) else (path.highest, path.highest)
-    feet = [_foot(one, tables, pose) for pose in _sides(one, tables, saddle)]
+    feet = [rest_below(one.robot, tables, pose) for pose in _sides(one, tables, saddle)]
     ends = [[path.poses[[0]]], [path.poses[[-1]]]]
     if _pair(one, feet, ends):
         return True
     for k, points in zip(last, ends, strict=True):
-        points.append(_foot(one, tables, path.poses[[k]]))
+        points.append(rest_below(one.robot, tables, path.poses[[k]]))
     return _pair(one, feet, ends)
 
 
@@ -283,11 +283,6 @@ def _sides(one: Solution, tables: Tables, saddle: Array) -> tuple[Array, Array]:
     direction = np.linalg.eigh(evaluated(one.robot, tables, saddle).hessian[0])[1][:, :1].T
     step = _ASIDE * one.robot.length * direction
     return moved(one.robot, saddle, step), moved(one.robot, saddle, -step)
-
-
-def _foot(one: Solution, tables: Tables, pose: Array) -> Array:
-    """Where a platform comes to rest that is let go at a pose (1, 7); NaN where it does not."""
-    return rest_below(one.robot, tables, pose)
 
 
 def _among(one: Solution, pose: Array, others: list[Array]) -> bool:

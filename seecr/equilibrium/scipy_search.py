@@ -50,13 +50,12 @@ def solve_with_scipy(
         limit: most iterations, each of which differences the Jacobian once.
         start_values: (n, d) the same for a platform on joints.
     """
-    n, m = tables.cables.shape[:2]
-    found = batch.Evaluation.empty(n, m, tables.n_dof)
+    found = batch.Evaluation.at_commands(tables)
     fall = first_guess(setup)
     down = -setup.robot.up
-    for i in range(n):
+    for i in range(len(tables)):
         one = take(tables, np.array([i]))
-        point = batch.Evaluation.empty(1, m, tables.n_dof)
+        point = batch.Evaluation.at_commands(one)
         base = np.array([0.0, 0, 0, 1, 0, 0, 0]) if start is None else start[i]
         counter = [0]
 

@@ -186,11 +186,7 @@ class _Cable:
     def _carrier(self, parent: ET.Element, name: str, place: Array) -> ET.Element:
         """A body of small mass, held by springs, without weight."""
         body = ET.SubElement(parent, "body", name=name, pos=numbers_text(place), gravcomp="1")
-        turning = 1e-3 * self.small * self.robot.length**2
-        ET.SubElement(
-            body, "inertial", pos="0 0 0", mass=numbers_text(self.small),
-            diaginertia=numbers_text([turning] * 3),
-        )  # fmt: skip
+        self._weigh(body, self.small)
         return body
 
     def _spring(self, body: ET.Element, axis: Array, compliance: float, pull: float) -> None:
@@ -271,23 +267,21 @@ class _Cable:
             node = ET.SubElement(world, "body", name=name, pos=numbers_text(there))
             for axis in np.eye(3):
                 ET.SubElement(node, "joint", type="slide", axis=numbers_text(axis), damping=slowing)
-            self._point(node, chain.between)
+            self._weigh(node, part)
             ET.SubElement(node, "site", name=name, size=dot(self.robot))
             names.append(name)
             self.at_rest += [0.0, 0.0, 0.0]
-        self._point(ET.SubElement(body, "body", pos=numbers_text(self.anchor)), chain.end)
+        end = ET.SubElement(body, "body", pos=numbers_text(self.anchor))
+        self._weigh(end, chain.end / self.gravity)
         if self.yields:
             rest = self.weight - (SEGMENTS - 1) * chain.between - chain.end
-            self._point(ET.SubElement(carrier, "body"), rest)
+            self._weigh(ET.SubElement(carrier, "body"), rest / self.gravity)
         return names
 
-    def _point(self, body: ET.Element, weight: float) -> None:
-        mass = weight / self.gravity
+    def _weigh(self, body: ET.Element, mass: float) -> None:
+        """Give a body a mass [kg] that hardly resists turning."""
         turning = 1e-3 * mass * self.robot.length**2
         ET.SubElement(
-            body,
-            "inertial",
-            pos="0 0 0",
-            mass=numbers_text(mass),
+            body, "inertial", pos="0 0 0", mass=numbers_text(mass),
             diaginertia=numbers_text([turning] * 3),
-        )
+        )  # fmt: skip

@@ -117,8 +117,7 @@ def with_rest(tables: Tables, rest: Array) -> Tables:
 
 def here(tables: Tables) -> batch.Evaluation:
     """The platform at the poses of the tables."""
-    n, m = tables.cables.shape[:2]
-    return batch.Evaluation.empty(n, m, tables.n_dof)
+    return batch.Evaluation.at_commands(tables)
 
 
 def first_tensions(tables: Tables, low: Array) -> Array:

@@ -265,14 +265,13 @@ class Experiment:
             def afresh(rows: NDArray[np.intp]) -> batch.Evaluation:
                 return batch.descend(take(tables, rows), limit=_LIMIT)
 
-            n, m = tables.cables.shape[:2]
             if start is None:
-                found = batch.Evaluation.empty(n, m, tables.n_dof)
+                found = batch.Evaluation.at_commands(tables)
                 found.outcome[:] = ITERATIONS
-            elif n <= _AT_ONCE:
+            elif len(tables) <= _AT_ONCE:
                 found = warm(slice(None))
             else:
-                found = batch.take_evaluation(start, np.arange(n))
+                found = batch.take_evaluation(start, np.arange(len(tables)))
                 found.outcome[:] = ITERATIONS
                 found = _among(found, warm)
             for search in (*([] if self._first is None else [on_the_way]), afresh):

@@ -149,8 +149,7 @@ class Parted(Experiment):
         """The predictions of the parts as one."""
         order = np.argsort(np.concatenate([part.rows for part in parts]))
         tables = _tables([one.tables for one in found], order)
-        n, m = tables.cables.shape[:2]
-        whole = batch.Evaluation.empty(n, m, tables.n_dof)
+        whole = batch.Evaluation.at_commands(tables)
         for part, one in zip(parts, found, strict=True):
             batch.put_evaluation(whole, part.rows, one.found)
         readings = _readings([one.readings for one in found], order)

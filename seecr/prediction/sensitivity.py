@@ -270,7 +270,7 @@ def _response_by_cable(at: Prediction, plus: Tables, minus: Tables, apart: Any) 
 
 def motion_of(at: Prediction) -> Array:
     """Displacement and rotation vector (n, 6, d) per step in the compiled loop's coordinates."""
-    return _kept(at, "motion", _motion_columns)
+    return _kept(at, "motion", lambda at: _motion_at(at.tables, at.found))
 
 
 def _moved(at: Prediction, step: Array) -> Array:
@@ -280,10 +280,6 @@ def _moved(at: Prediction, step: Array) -> Array:
         # each coordinate by itself: a product of matrices is for platforms on joints
         return np.asarray(np.diagonal(motion[0])[:, None] * step)
     return np.asarray(motion @ step)
-
-
-def _motion_columns(at: Prediction) -> Array:
-    return _motion_at(at.tables, at.found)
 
 
 def _motion_at(tables: Tables, found: batch.Evaluation) -> Array:

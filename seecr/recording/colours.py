@@ -51,11 +51,12 @@ def scale_colours(values: Array, top: float) -> Colours:
     return np.stack([*channels, opaque], axis=-1).round().astype(np.uint8)
 
 
-def cable_colours(count: int) -> Colours:
-    """One colour per cable, (count, 4): from Okabe and Ito for up to eight cables."""
+def cable_colours(count: int) -> list[Rgba]:
+    """One colour per cable, from Okabe and Ito for up to eight cables."""
     if count <= len(SERIES):
-        return np.array(SERIES[:count], dtype=np.uint8)
-    return scale_colours(np.arange(count, dtype=float), max(count - 1.0, 1.0))
+        return list(SERIES[:count])
+    scale = scale_colours(np.arange(count, dtype=float), max(count - 1.0, 1.0))
+    return [(red, green, blue, alpha) for red, green, blue, alpha in scale.tolist()]
 
 
 def round_up(value: float) -> float:

@@ -36,6 +36,15 @@ class Recording:
         """Log something that holds at every time."""
         self.stream.log(entity, *archetypes, static=True, strict=True)
 
+    def text(self, entity: str, text: str) -> None:
+        """Show a text in Markdown at every time."""
+        self.always(entity, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+
+    def texts(self, entity: str, index: Index, texts: Sequence[str]) -> None:
+        """Show texts (n,) in Markdown over timelines."""
+        kinds = [str(rr.MediaType.MARKDOWN)] * len(texts)
+        self.rows(entity, index, rr.TextDocument.columns(text=texts, media_type=kinds))
+
     def rows(self, entity: str, index: Index, columns: Iterable[Any]) -> None:
         """Log rows over timelines, sent as columns: faster and smaller than row by row."""
         timelines = [index] if isinstance(index, rr.TimeColumn) else index

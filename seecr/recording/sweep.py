@@ -124,8 +124,7 @@ def _plots(recording: Recording, index: Index, solution: Solution, commanded: bo
     states = plots.lane_states(solution.slack, nowhere, known)
     names = solution.robot.cable_names
     said = _said(names, alike([solution.tensions]))
-    for k, shade in enumerate(colours.cable_colours(solution.robot.n_cables)):
-        colour = (int(shade[0]), int(shade[1]), int(shade[2]), 255)
+    for k, colour in enumerate(colours.cable_colours(solution.robot.n_cables)):
         entity = f"{_PULL}/{entity_of(names[k])}"
         recording.scalars(entity, index, solution.tensions[:, k])
         plots.as_line(recording, entity, said.get(k, names[k]), colour, 1.5)

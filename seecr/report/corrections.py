@@ -31,17 +31,10 @@ def corrected_csv(found: Correction, wanted: CommandFile) -> str:
         found: the correction.
         wanted: the list that it is for, whose runs, times, temperatures and loads are kept.
     """
-    given = wanted.commands
-    columns: dict[str, Sequence[object] | Array] = {}
-    if len(set(wanted.run)) > 1:
-        columns["run"] = wanted.run
-    if given.time is not None:
-        columns["t_s"] = given.time
-    if given.temperature is not None:
-        columns["temperature_C"] = given.temperature
+    columns: dict[str, Sequence[object] | Array] = dict(wanted.conditions)
     columns |= dict(zip(_WANT, found.wanted.T, strict=True))
     columns |= {f"length_{k + 1}_m": one for k, one in enumerate(found.lengths.T)}
-    columns |= load_columns(given.loads)
+    columns |= load_columns(wanted.commands.loads)
     kept = np.flatnonzero(found.found).tolist()
     return table_text({name: [one[i] for i in kept] for name, one in columns.items()})
 

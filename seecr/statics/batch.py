@@ -84,6 +84,12 @@ class Evaluation:
             energy=np.zeros(n),
         )
 
+    @classmethod
+    def at_commands(cls, tables: Tables) -> Evaluation:
+        """Nothing evaluated yet, with the platform at the poses of tables."""
+        n, m = tables.cables.shape[:2]
+        return cls.empty(n, m, tables.n_dof)
+
 
 def descend(
     tables: Tables,
@@ -113,13 +119,12 @@ def descend(
             better.count += out.count[again]
             put_evaluation(out, again, better)
         return out
-    n, m = tables.cables.shape[:2]
-    out = Evaluation.empty(n, m, tables.n_dof)
+    n, out = len(tables), Evaluation.at_commands(tables)
     starts = np.array(out.deviation if start is None else start, order="C")
     first = np.zeros((n, tables.n_dof)) if start_values is None else start_values
     if guess is not None:
         out.guess[:] = guess
-    out.energy = np.full(n, np.nan)
+    out.energy[:] = np.nan
 
     def run(part: slice) -> None:
         solve_batch(
@@ -164,11 +169,8 @@ def motions(tables: Tables, at: Evaluation) -> Array:
 
 def evaluate(tables: Tables, at: Evaluation, threads: int | None = 1) -> Evaluation:
     """Wrench, stiffness and energy at the deviations of ``at``; nothing is solved."""
-    n, m = tables.cables.shape[:2]
-    out = Evaluation.empty(n, m, tables.n_dof)
-    out.deviation[:] = at.deviation
-    out.values[:] = at.values
-    out.guess[:] = at.guess
+    out = Evaluation.at_commands(tables)
+    out.deviation[:], out.values[:], out.guess[:] = at.deviation, at.values, at.guess
 
     def run(part: slice) -> None:
         evaluate_batch(
@@ -178,7 +180,7 @@ def evaluate(tables: Tables, at: Evaluation, threads: int | None = 1) -> Evaluat
             out.guess[part],
         )  # fmt: skip
 
-    in_parts(run, n, threads)
+    in_parts(run, len(tables), threads)
     out.outcome = np.where(np.isinf(out.energy), CABLE_LAW, CONVERGED)
     out.residual = residual_size(out.gradient) / tables.scale
     return out
@@ -190,9 +192,8 @@ def walk(tables: Tables, path: Path, limit: int) -> Evaluation:
     Fills the history columns in ``tables``. Runs are independent, except with creep, which
     continues through all runs that share a clock.
     """
-    n, m = tables.cables.shape[:2]
-    out = Evaluation.empty(n, m, tables.n_dof)
-    out.energy = np.full(n, np.nan)
+    out = Evaluation.at_commands(tables)
+    out.energy[:] = np.nan
 
     def run(part: slice) -> None:
         walk_in_order(
@@ -290,7 +291,7 @@ def pull_and_change(tables: Tables, at: Evaluation) -> tuple[Evaluation, Array, 
     from seecr.compiled import lengthening  # takes a while to import
 
     (n, m), d = tables.cables.shape[:2], tables.n_dof
-    out, pulls = Evaluation.empty(n, m, d), np.empty((n, m))
+    out, pulls = Evaluation.at_commands(tables), np.empty((n, m))
     out.deviation[:], out.values[:], out.guess[:] = at.deviation, at.values, at.guess
     gradient, tension = np.empty((n, m, d)), np.empty((n, m))
 

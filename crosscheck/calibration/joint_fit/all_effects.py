@@ -7,7 +7,6 @@ for them. Size and autocorrelation of the noise maximise the marginal likelihood
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting
 from crosscheck.calibration.joint_fit.leave_out import LeftOut, leave_out
 from crosscheck.calibration.joint_fit.linearised import linearised
-from crosscheck.calibration.joint_fit.stages import Progress, fit_everything
+from crosscheck.calibration.joint_fit.stages import Everything, Progress, fit_everything
 from crosscheck.calibration.noise.colour import Colour, chain_of
 from crosscheck.calibration.noise.robust import outliers
 from crosscheck.fit.least_squares.definite import inverse_of
@@ -57,23 +56,15 @@ class JointErrors:
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration:
-    """All effects, fitted to the data together.
+class Calibration(Everything):
+    """All effects, fitted to the data together, and how well they predict.
 
     Attributes:
-        setting: the data. joint: the fit.
-        later: all effects that join later, at their most promising shapes, amplitudes at null.
-        prices: for those of them that did not join, how much more ln evidence they gain at that
-            shape than on average over shapes.
         before: rms errors of the model as it stood. after: those of this model.
         held_out: errors on held-out runs.
         outliers: (n,) bool rows that hardly count.
     """
 
-    setting: Setting
-    joint: JointFit
-    later: Terms
-    prices: Mapping[str, float]
     before: Rms
     after: Rms
     held_out: LeftOut
@@ -88,6 +79,11 @@ class Calibration:
     def colour(self) -> Colour:
         """The noise: its size relative to the stated one, and its autocorrelation along runs."""
         return self.joint.colour
+
+    @property
+    def surprise(self) -> float:
+        """How many times as far off held-out runs are as the fit expects, in the worst block."""
+        return float(np.max(self.held_out.surprise, initial=0.0))
 
     @property
     def together(self) -> JointErrors:

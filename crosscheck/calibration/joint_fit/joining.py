@@ -16,6 +16,7 @@ from scipy import linalg, special
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting
 from crosscheck.calibration.linear_evidence.priors import widths_for
 from crosscheck.calibration.linear_evidence.worth import log_gain
+from crosscheck.fit.effects.candidates import input_lacking
 from crosscheck.fit.least_squares.definite import root_beside_one
 from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.least_squares.state import derivatives, evaluate
@@ -42,25 +43,13 @@ class Promising:
     price: float
 
 
-def has_inputs(problem: Problem, layout: Layout) -> bool:
-    """Whether the data contain what the effect needs."""
-    data, needs = problem.data, layout.effect.needs
-    clock, warmth = data.t_s, data.temperature_C
-    return not (
-        ("poses" in needs and data.absolute)
-        or ("time" in needs and (clock is None or np.ptp(clock) == 0))
-        or ("temperature" in needs and (warmth is None or np.ptp(warmth) == 0))
-        or ("tensions" in needs and not data.has_tension)
-    )
-
-
 def layouts(problem: Problem) -> tuple[list[Layout], list[Layout]]:
     """The effects that are fitted from the start, and those that join later."""
     at_once: list[Layout] = []
     later: list[Layout] = []
     for effect in catalogue().values():
         layout = layout_of(effect, problem.robot)
-        if layout.name in problem.considered and has_inputs(problem, layout):
+        if layout.name in problem.considered and not input_lacking(problem.data, layout):
             (later if _waits(problem, layout) else at_once).append(layout)
     return at_once, later
 
@@ -98,11 +87,15 @@ def at_null(term: Term) -> Term:
     return term.with_vector(np.where(held, term.vector, layout.null))
 
 
-def inside(term: Term) -> Term:
-    """Move a start off its bound, where laws with history have two-sided derivatives."""
+def inside(term: Term, by: float = 0.1) -> Term:
+    """Move a start off its bound, where laws with history have two-sided derivatives.
+
+    Args:
+        term: the start. by: how far amplitudes at null are moved, in plausible sizes.
+    """
     layout = term.layout
     at_bound = (term.vector <= layout.lower) & ~layout.shape & ~term.knowledge.fixed
-    return term.with_vector(np.where(at_bound, term.vector + 0.1 * layout.scale, term.vector))
+    return term.with_vector(np.where(at_bound, term.vector + by * layout.scale, term.vector))
 
 
 class _Beside:

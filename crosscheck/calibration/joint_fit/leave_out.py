@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting, moved_on, settle
 from crosscheck.calibration.joint_fit.linearised import Linear, linearised
-from crosscheck.fit.effects.held_out import blocks_of, folds_of
-from crosscheck.fit.least_squares.problem import Rms, rms_by_kind
+from crosscheck.fit.effects.held_out import HeldOut, blocks_of, folds_of
+from crosscheck.fit.least_squares.problem import rms_by_kind
 from crosscheck.fit.least_squares.state import State
 from seecr.pose import Array
 
@@ -26,25 +26,16 @@ _STEPS, _EARNEST = 6, 4
 _BENT = 0.1
 
 
-@dataclass(frozen=True, eq=False)
-class LeftOut:
-    """Held-out blocks of rows, predicted by fits that had not seen them.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LeftOut(HeldOut):
+    """Held-out blocks of rows, predicted by fits that had not seen them; ``raw`` is NaN elsewhere.
 
     Attributes:
-        raw: (n, 6 + m) residuals, NaN in rows that do not count.
-        rms: rms errors by kind of reading.
-        chi2: (blocks,) of the whitened residuals in each block. readings: (blocks,) their number.
-        values: (blocks, p) parameters fitted without each block.
         surprise: (blocks,) chi2 per reading of linearised predictions, in units of noise plus the
             uncertainty of the fit without the block: about 1 if the model is right, however far
             it extrapolates.
     """
 
-    raw: Array
-    rms: Rms
-    chi2: Array
-    readings: Array
-    values: Array
     surprise: Array
 
 
@@ -71,7 +62,8 @@ def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
             chi2[b], readings[b] = float(left[own] @ left[own]), int(own.sum())
             power = surprise_of(linear, absent, _padded(own, len(absent)), expected[own])
             surprise[b] = power / max(int(own.sum()), 1)
-    return LeftOut(raw, rms_by_kind(problem, raw), chi2, readings, values, surprise)
+    rms = rms_by_kind(problem, raw)
+    return LeftOut(raw, chi2, readings, values, rms, valid=True, surprise=surprise)
 
 
 def _without(setting: Setting, joint: JointFit, absent: NDArray[np.bool_]) -> State:

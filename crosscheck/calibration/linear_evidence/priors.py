@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -33,8 +33,12 @@ def widths_of(terms: Terms, free: Collection[str] = ()) -> Array:
     Args:
         terms: effects. free: those whose values belong to the data, which no size is expected of.
     """
-    flat = {TRACKER, *free}
-    parts = [np.where(t.layout.shape, SHAPES, FLAT if t.name in flat else 1.0) for t in terms]
+    return width_of(terms, dict.fromkeys((TRACKER, *free), FLAT))
+
+
+def width_of(terms: Terms, widths: Mapping[str, float]) -> Array:
+    """The same with other widths than 1, by the effect's name."""
+    parts = [np.where(t.layout.shape, SHAPES, widths.get(t.name, 1.0)) for t in terms]
     return np.where(terms.knowledge.fixed, 0.0, np.concatenate([np.zeros(0), *parts]))
 
 

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from crosscheck.calibration.joint_fit.joining import at_null
+from crosscheck.calibration.joint_fit.joining import at_null, inside
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting, settle
 from crosscheck.calibration.joint_fit.linearised import (
     Linear,
@@ -23,7 +23,7 @@ from crosscheck.calibration.linear_evidence.gram import (
     best_widths,
     gram_of,
 )
-from crosscheck.calibration.linear_evidence.priors import SHAPES, widths_for
+from crosscheck.calibration.linear_evidence.priors import width_of, widths_for
 from crosscheck.calibration.sets.bounds import log_absent
 from crosscheck.calibration.sets.catalogue import Catalogue, gram_about
 from crosscheck.calibration.sets.linear_search import Names, Scores
@@ -41,6 +41,8 @@ LOCAL_MINIMUM = 8.0
 FEW = 5
 # Parts of the way to the values of a linear model at which fits may begin.
 _PARTS = (1.0, 0.5, 0.25, 0.125)
+# Fits begin so far off a bound, in plausible sizes.
+_OFF = 0.03
 
 
 # The members of a set, each with the term whose shape the fit started from.
@@ -178,7 +180,7 @@ class Exact:
             self.take(scores, self.given[names])
         few = 0 < len(names - scores.always) <= FEW
         if few and (best is None or best.score < linear - LOCAL_MINIMUM):
-            self.take(scores, Terms(_off_bound(self.catalogue.start(name)) for name in names))
+            self.take(scores, Terms(inside(self.catalogue.start(name), _OFF) for name in names))
 
     def _at(self, terms: Terms) -> State:
         return evaluate(self.setting.problem, terms, self.setting.factor, self.plain)
@@ -239,22 +241,9 @@ def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names, part: floa
         vector = start.copy()
         linear = layout.null[own] + values[first : first + count] * layout.scale[own]
         vector[own] = start[own] + part * (linear - start[own])
-        out.append(_off_bound(term.with_vector(np.clip(vector, layout.lower, layout.upper))))
+        out.append(inside(term.with_vector(np.clip(vector, layout.lower, layout.upper)), _OFF))
         first += count
     return Terms([*out, *(catalogue.start(name) for name in names if name not in solved.chosen)])
-
-
-def _off_bound(term: Term) -> Term:
-    """Move amplitudes off a bound at null, where laws with history have two-sided derivatives."""
-    layout = term.layout
-    pressed = (term.vector <= layout.lower) & ~layout.shape & ~term.knowledge.fixed
-    return term.with_vector(np.where(pressed, term.vector + 0.03 * layout.scale, term.vector))
-
-
-def width_of(terms: Terms, widths: Mapping[str, float]) -> Array:
-    """(p,) prior standard deviations of z; 0 holds a parameter."""
-    parts = [np.where(t.layout.shape, SHAPES, widths.get(t.name, 1.0)) for t in terms]
-    return np.where(terms.knowledge.fixed, 0.0, np.concatenate([np.zeros(0), *parts]))
 
 
 def scored(
@@ -267,8 +256,8 @@ def scored(
     linear = linearised(setting, joint)
     gram = own_gram(linear, joint, setting.free)
     # what moves readings at this fit need not have been in the linear model of the search
-    inside = {n: widths.get(n, _only(gram.groups[n].widths)) for n in gram.names}
-    better, wished = widths_near(gram, inside, joint.z)
+    held = {n: widths.get(n, _only(gram.groups[n].widths)) for n in gram.names}
+    better, wished = widths_near(gram, held, joint.z)
     share = sum(log_shares(joint, linear).values()) + log_absent(setting, joint, linear, better)
     score = averaged(gram, better) + share + scores.log_prior(names)
     score -= 0.5 * (joint.state.log_det + left_to_gain(linear, joint.z))

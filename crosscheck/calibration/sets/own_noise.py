@@ -20,9 +20,10 @@ from scipy import special
 
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting, settle
 from crosscheck.calibration.joint_fit.stages import with_noise
+from crosscheck.calibration.linear_evidence.priors import width_of
 from crosscheck.calibration.noise.colour import log_det
 from crosscheck.calibration.noise.robust import log_chance_of_outliers
-from crosscheck.calibration.sets.exact import FEW, scored, width_of
+from crosscheck.calibration.sets.exact import FEW, scored
 from crosscheck.calibration.sets.linear_search import Names
 from crosscheck.calibration.sets.refits import ComparedSets
 from crosscheck.fit.least_squares.state import evaluate

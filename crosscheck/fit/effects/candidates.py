@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.fit.effects.evidence import Evidence, evidence, p_value
-from crosscheck.fit.effects.gauss_newton import Fit, FitStatus, fit
+from crosscheck.fit.effects.gauss_newton import Fit, FitStatus, fit, not_fitted
 from crosscheck.fit.effects.possible import can_be
 from crosscheck.fit.effects.starts import Starts, starts_of
 from crosscheck.fit.least_squares.imitation import beside
@@ -22,6 +22,7 @@ from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.least_squares.state import State, evaluate
 from crosscheck.fit.noise.whiteness import Whiteness, whiteness
 from crosscheck.fit.reasons import Reason, Why
+from crosscheck.measurements.data import Measurements
 from seecr.effects import Term, Terms, catalogue, layout_of
 from seecr.effects.base import Layout
 from seecr.errors import InputError
@@ -80,12 +81,17 @@ def candidates_for(problem: Problem) -> list[Candidate]:
 
 def _lacking(problem: Problem, layout: Layout) -> Reason | None:
     """The first thing that the effect needs and the data lack; None if they lack nothing."""
-    data, needs = problem.data, layout.effect.needs
     rows = int(problem.use.sum())
     if layout.name not in problem.considered:
         return Reason(Why.EXCLUDED)
     if len(layout) > min(problem.n_readings, rows) or rows < 2:
         return Reason(Why.TOO_MANY_PARAMETERS, parameters=len(layout), rows=rows)
+    return input_lacking(problem.data, layout)
+
+
+def input_lacking(data: Measurements, layout: Layout) -> Reason | None:
+    """The first column that the effect depends on and the data do not have; None if it is there."""
+    needs = layout.effect.needs
     still = data.temperature_C is not None and np.ptp(data.temperature_C) == 0
     timeless = data.t_s is None or np.ptp(data.t_s) == 0
     lacks = (
@@ -205,13 +211,5 @@ def null_fit(problem: Problem, terms: Terms, factor: Array, refit: bool) -> Fit:
     if refit and terms:
         return fit(problem, terms, factor)
     state = evaluate(problem, terms, factor)
-    p = len(terms)
     status = FitStatus.SOLVED if state.valid else FitStatus.UNSOLVED_AT_VALUES
-    return Fit(
-        state,
-        lambda: np.zeros((len(state.white), p)),
-        lambda _nothing: np.zeros((p, p)),
-        np.zeros(p, dtype=bool),
-        status,
-        0,
-    )
+    return not_fitted(state, status, 0.0)

@@ -163,12 +163,11 @@ def fit(
             compare models, but not for final values.
     """
     state = evaluate(problem, terms, factor, start)
-    p = len(terms)
     if not state.valid:
-        return _invalid(state, p, FitStatus.UNSOLVED_AT_START)
+        return not_fitted(state, FitStatus.UNSOLVED_AT_START, np.inf)
     fixed = terms.knowledge.fixed
     descent = _Descent(problem, factor, ~fixed if free is None else free & ~fixed, quick)
-    end = descent.run(state, iterations if p else 0, hopeless)
+    end = descent.run(state, iterations if len(terms) else 0, hopeless)
     state = end.state
     found = state.terms
     at_bound = ((found.vector <= found.lower) | (found.vector >= found.upper)) & ~fixed
@@ -191,11 +190,17 @@ def _spread(jacobian: Array, found: Terms, moved: NDArray[np.bool_]) -> Array:
     return covariance
 
 
-def _invalid(state: State, p: int, status: FitStatus) -> Fit:
+def not_fitted(state: State, status: FitStatus, variance: float) -> Fit:
+    """A model at values that no fit has moved, in the form of a fit; (p, p) covariances are alike.
+
+    Args:
+        state: the model. status: whether its rows were solved. variance: the covariances.
+    """
+    p = len(state.terms)
     return Fit(
         state,
         lambda: np.zeros((len(state.white), p)),
-        lambda _nothing: np.full((p, p), np.inf),
+        lambda _nothing: np.full((p, p), variance),
         np.zeros(p, dtype=bool),
         status,
         0,

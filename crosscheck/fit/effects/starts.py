@@ -320,8 +320,7 @@ class _Forces:
         if setup.has_history:
             return None
         tables = assemble(setup)
-        n, m = tables.cables.shape[:2]
-        start = batch.Evaluation.empty(n, m, tables.n_dof)
+        start = batch.Evaluation.at_commands(tables)
         start.deviation[:] = batch.deviations(tables, self.poses)
         found = batch.evaluate(tables, start)
         found.deviation[:] = start.deviation

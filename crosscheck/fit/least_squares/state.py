@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.fit.least_squares.length_errors import with_length_errors
 from crosscheck.fit.least_squares.problem import Problem, in_units_of
@@ -101,21 +102,21 @@ def _on_measured_branch(problem: Problem, state: State) -> State:
         return state
     poses = np.concatenate([data.position, data.quat_wxyz], axis=1)[rows]
     effects = state.terms.effects
-    other = state.experiment.from_other_starts(effects, at, rows, poses)
-    there = _compared(
-        problem, state.terms, other, problem.residuals(other.readings), state.factor,
-        state.experiment,
-    )  # fmt: skip
+
+    def moved(some: NDArray[np.intp], to: Array) -> State:
+        """The state with some rows at the equilibria nearest to other poses."""
+        other = state.experiment.from_other_starts(effects, at, some, to)
+        raw = problem.residuals(other.readings)
+        return _compared(problem, state.terms, other, raw, state.factor, state.experiment)
+
+    there = moved(rows, poses)
+    other = there.prediction
     better = np.nansum(there.table**2, axis=1) < 0.5 * np.nansum(state.table**2, axis=1)
     better = (better | ~at.solved) & other.solved
     keep = rows[better[rows]]
     if len(keep) == 0:
         return state
-    moved = state.experiment.from_other_starts(effects, at, keep, other.pose[keep])
-    return _compared(
-        problem, state.terms, moved, problem.residuals(moved.readings), state.factor,
-        state.experiment,
-    )  # fmt: skip
+    return moved(keep, other.pose[keep])
 
 
 def _compared(

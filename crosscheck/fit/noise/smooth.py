@@ -11,7 +11,7 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from crosscheck.fit.least_squares.imitation import basis
+from crosscheck.fit.least_squares.imitation import basis, beside
 from crosscheck.fit.least_squares.problem import TENSION, Problem
 from crosscheck.fit.least_squares.state import State
 from seecr.pose import Array
@@ -60,11 +60,7 @@ def beyond_smooth(problem: Problem, before: State, after: State, share: float) -
         share: the effect must explain at least this part of what the field leaves beyond noise.
     """
     span = basis(field_columns(problem, before.prediction.pose[:, :3]))
-
-    def beside(white: Array) -> Array:
-        return white - span @ (span.T @ white)
-
-    left, explained = beside(before.white), beside(before.white - after.white)
+    left, explained = beside(before.white, span), beside(before.white - after.white, span)
     power = float(explained @ explained)
     if power == 0.0:
         return False

@@ -67,7 +67,7 @@ def test_a_step_tells_the_errors_with_its_effect() -> None:
     assert effect.probability == found.chances.of("pulley_radius")
     assert effect.share == pytest.approx(1.0, abs=0.01) and effect.rivals == ()
     assert before.fit.state.chi2 > 100.0 * after.fit.state.chi2
-    wider = replace(after, node=replace(after.node, whiteness=replace(after.whiteness, scale=3.0)))
+    wider = replace(after, whiteness=replace(after.whiteness, scale=3.0))
     other = replace(search, steps=(*search.steps[:1], wider))
     there = missing_of(other, "pulley_radius", found.chances, rivals=())
     ratio = wider.whiteness.inflation / after.whiteness.inflation
@@ -109,7 +109,7 @@ def test_a_joint_fit_in_the_form_of_a_fit_keeps_its_errors_and_names_what_is_uns
     assert fit.covariance.shape == (1, 1) and fit.stderr[0] == pytest.approx(
         fit.covariance[0, 0] ** 0.5
     )
-    assert searched(pulleys()).last.node.evidence.parameters == 1
+    assert searched(pulleys()).last.evidence.parameters == 1
 
 
 def test_what_may_stand_for_a_listed_effect_has_that_reason_and_what_is_in_common_its_own() -> None:

@@ -34,6 +34,5 @@ def test_equals_of_a_second_effect_are_looked_for_beside_the_first() -> None:
         assert f"looking for effects that could replace {name}" in told
     first, *others = search.steps
     unsolved = tuple(replace(c, fit=None) if c.name == equal else c for c in first.candidates)
-    node = replace(first.node, candidates=unsolved)
-    spoiled = replace(search, steps=(replace(first, node=node), *others))
+    spoiled = replace(search, steps=(replace(first, candidates=unsolved), *others))
     assert equal in [rival.name for rival in rivals_of(spoiled, second)]

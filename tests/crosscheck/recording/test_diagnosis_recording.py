@@ -21,8 +21,9 @@ from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.recording import bars
 from crosscheck.recording.comparison import write_comparison_recording
 from crosscheck.recording.diagnosis import write_diagnosis_recording
-from crosscheck.recording.diagnosis_words import model_words, plain
+from crosscheck.recording.diagnosis_words import model_words
 from crosscheck.recording.misfit import Misfit, predicted_poses, states_of, worst_row
+from crosscheck.recording.words import plain
 from crosscheck.units import short
 from seecr.errors import InputFileError
 

@@ -400,7 +400,7 @@ def test_correlated_parameters_go_by_the_names_that_tables_have() -> None:
     alike = replace(
         last.fit, state=replace(last.fit.state, terms=terms), spread=lambda _columns: together
     )
-    steps = (*found.search.steps[:-1], replace(last, node=replace(last.node, fit=alike)))
+    steps = (*found.search.steps[:-1], replace(last, fit=alike))
     card = finding_card(replace(found, search=replace(found.search, steps=steps)), found.missing[0])
     assert card.correlations == ["radius with added of platform_mass (0.950)"]
 
@@ -431,7 +431,7 @@ def test_friction_would_need_a_friction_and_not_the_length_that_it_is_looked_for
     friction = term(made.robot(), "exit_friction", friction=0.2, length_m=100.0)
     first = found.search.steps[0]
     candidates = (Candidate(friction.layout, alone=friction),)
-    first = replace(first, node=replace(first.node, candidates=candidates))
+    first = replace(first, candidates=candidates)
     tried = NotListed("exit_friction", "rubs", 1.0, Reason(Why.NOT_NEEDED))
     search = replace(found.search, steps=(first, *found.search.steps[1:]))
     (row,) = candidate_rows(replace(found, search=search, candidates=(tried,)))
@@ -445,7 +445,7 @@ def test_sizes_that_are_not_plausible_are_named_with_their_effect() -> None:
     assert found.search is not None
     last = found.search.steps[-1]
     at_bound = replace(last.fit, at_bound=np.array([True]))
-    stuck = replace(last, node=replace(last.node, fit=at_bound))
+    stuck = replace(last, fit=at_bound)
     search = replace(found.search, steps=(*found.search.steps[:-1], stuck))
     (sizes,) = (c for c in checks(replace(found, search=search)) if c.name == "sizes")
     assert sizes.words.endswith("(pulley_radius); at its bound: pulley_radius")

@@ -42,7 +42,10 @@ def truth(n: int = 2, at_rest: Any = True) -> Truth:
     pose = np.concatenate([np.tile([1.0, 2.0, 3.0], (n, 1)), quat], axis=1)
     pulls = np.tile([1.0, 2.0, 3.0, 4.0], (n, 1))
     rest = np.broadcast_to(at_rest, (n,))
-    return Truth(pose, pulls, pose[:, :3], quat, pulls, pulls, rest, ~rest, np.zeros(n))
+    return Truth(
+        pose, pulls, rest, ~rest, np.zeros(n),
+        position=pose[:, :3], quat_wxyz=quat, tension_readings=pulls, rest_lengths=pulls,
+    )  # fmt: skip
 
 
 def measured(case: Measurements, sigma: Sigma, at_rest: Any = True) -> Measured:
