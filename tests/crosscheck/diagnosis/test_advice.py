@@ -206,6 +206,18 @@ def test_what_the_data_do_not_determine_is_not_what_to_expect() -> None:
     assert "error_3_y" in check_of(some, robot, errors)
     errors[some.layout.names.index("error_3_y_m")] = np.inf
     assert "+2 mm (error_1_x" in check_of(some, robot, errors).replace("2.0 mm", "2 mm")
+    hangs = term(robot, "centre_of_mass", shift_x_m=0.003, shift_z_m=0.013)
+    check = check_of(hangs, robot, np.array([1e-4, 1e-4, np.inf]))
+    assert "at (3.00, 0, ?) mm of its frame, not (0, 0, 0)" in check
+    upright = term(robot, "gravity_tilt", tilt_y_rad=0.01)
+    assert "expect ? deg about x and 0.573 deg about y" in check_of(
+        upright, robot, np.array([np.inf, 1e-4])
+    )
+    # a value on its bound is what it is
+    firm = term(robot, "frame_compliance", sideways_m_per_N=8e-6)
+    assert "expect 0.0080 mm per newton sideways, 0 mm upwards" in check_of(
+        firm, robot, np.array([1e-7, np.inf])
+    )
     # where nothing is determined the largest is as good as any
     assert "error_3_y" in check_of(some, robot, np.full(len(errors), np.inf))
 
