@@ -14,6 +14,7 @@ from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.diagnosis.result import MissingEffect
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.measurements.data import Measurements
 from crosscheck.planning.adding import Extension
 from crosscheck.planning.deciding import telling_models_apart
 from crosscheck.planning.extensions import extensions
@@ -183,7 +184,7 @@ def measure_next(
         out.append(_CALIBRATE)
     if verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
         out += [f"to find {what}: {what.advice}" for what in seen if what.advice]
-        out += [_to_find(where), _ALL_AT_ONCE]
+        out += [_to_find(where), *_set_up_anew(found.problem.data, where), _ALL_AT_ONCE]
     if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         out.append("nothing that matters is missing; to find smaller effects, use crosscheck plan")
     return list(dict.fromkeys(out))
@@ -275,6 +276,17 @@ _FIRST = {
     QuantityKind.TIME: _TIME,
     QuantityKind.TEMPERATURE: _TIME,
 }
+
+
+def _set_up_anew(data: Measurements, where: Sequence[Association]) -> list[str]:
+    """How files may have frames of the tracker of their own, if errors go with the run."""
+    goes = any(one.kind is QuantityKind.RUN and one.significant for one in where)
+    if not goes or len(data.files) < 2 or "tracker_frame" in data.free:
+        return []
+    return [
+        "if the tracker was set up anew between the files, its frame may differ: write free = "
+        '["tracker_frame"] into the TOML beside all of them but one, and diagnose again'
+    ]
 
 
 def _to_find(where: Sequence[Association]) -> str:

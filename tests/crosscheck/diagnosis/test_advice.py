@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -55,6 +56,18 @@ def test_the_unknown_is_looked_for_where_it_goes(
     for words in ("commanded z", "the run", "time", "anything"):
         line = advice(found, goes_with(kind, words))
         assert line.startswith(f"the unexplained error depends on {words}: {expected}")
+
+
+def test_files_whose_errors_differ_may_have_other_frames_of_the_tracker(found: Search) -> None:
+    """Two days of a crane had an unknown effect; with a frame each, both effects are found."""
+    data = found.problem.data
+    run, place = goes_with(QuantityKind.RUN, "the run"), goes_with(QuantityKind.PLACE, "x")
+    days = replace(data, files=("monday.csv", "tuesday.csv"))
+    (line,) = what_next._set_up_anew(days, [run])
+    assert 'write free = ["tracker_frame"] into the TOML' in line
+    assert what_next._set_up_anew(data, [run]) == []
+    assert what_next._set_up_anew(days, [place]) == []
+    assert what_next._set_up_anew(replace(days, free=("tracker_frame",)), [run]) == []
 
 
 def test_beside_a_constant_offset_it_is_looked_for_where_the_rest_goes(found: Search) -> None:
