@@ -124,8 +124,8 @@ def command(
 
 
 _PART = (
-    ", with the values that explain most by themselves, not those above, which are nearer to the "
-    "truth beside the other missing effects"
+    ". Its values are fitted without the other missing effects, so that it predicts best; those "
+    "above allow for them and are nearer to the truth"
 )
 
 

@@ -38,11 +38,14 @@ class Coloured:
         scale: its size relative to the assumed one.
         rho: correlation of successive rows of a run.
         outliers: number of outlying rows.
+        open: whether this noise, whose size was not stated, is so much larger than neighbouring
+            rows differ that something missing, which varies smoothly, looks the same.
     """
 
     scale: dict[str, float]
     rho: dict[str, float]
     outliers: int
+    open: bool = False
 
     @property
     def words(self) -> str:
@@ -77,9 +80,8 @@ def coloured_noise(problem: Problem, state: State, factor: Array) -> Coloured | 
         return None
     if unknown_beside(setting, left, len(stated) == len(scale)).is_there:
         return None
-    return Coloured(
-        scale, rho, int(outliers(setting.chain, weight, problem.data.n_rows).sum())
-    )  # fmt: skip
+    far = int(outliers(setting.chain, weight, problem.data.n_rows).sum())
+    return Coloured(scale, rho, far, any(size > _LARGER for size in scale.values()))
 
 
 def _too_small(stated: bool, rho: float) -> float:

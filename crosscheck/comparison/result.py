@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.coloured import Coloured
 from crosscheck.comparison.quantities import channels
-from crosscheck.comparison.sentence import error_size_words, misfit_sentence, noise_sentence
+from crosscheck.comparison.sentence import (
+    coloured_sentence,
+    error_size_words,
+    misfit_sentence,
+    noise_sentence,
+)
 from crosscheck.comparison.tracking import Tracking
 from crosscheck.comparison.travel import Travel
 from crosscheck.fit.least_squares.problem import (
@@ -174,7 +179,12 @@ class Comparison(Result):
         """Whether the data suffice for a verdict and the residuals are noise, white or coloured."""
         if self.whiteness is None or self.refusal is not None:
             return False
-        return self.whiteness.is_noise or self.coloured is not None
+        return self.whiteness.is_noise or (self.coloured is not None and not self.coloured.open)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the residuals may as well be noise, of unstated size, as something missing."""
+        return self.refusal is None and self.coloured is not None and self.coloured.open
 
     @property
     def converged(self) -> bool:
@@ -212,7 +222,7 @@ class Comparison(Result):
         if w.is_noise:
             said = noise_sentence(w, self._known_as, self.associations)
         elif self.coloured is not None:
-            said = f"Model and data agree: the residuals are noise ({self.coloured.words})."
+            said = coloured_sentence(self.coloured.words, self.coloured.open)
         else:
             said = misfit_sentence(w, self.times_noise, self._known_as, self.associations)
         if not self.outliers.any():
@@ -270,6 +280,7 @@ class Comparison(Result):
             "noise_floor": self.floor,
             "tracking": self.tracking,
             "sigma": problem.sigma,
+            "is_open": self.is_open,
             "coloured_noise": self.coloured,
             "residual": None
             if w is None

@@ -30,6 +30,21 @@ def noise_sentence(white: Whiteness, known_as: str, associations: Sequence[Assoc
     return f"Model and data agree: the residuals are noise ({times}){but}."
 
 
+def coloured_sentence(noise: str, is_open: bool) -> str:
+    """That residuals are autocorrelated noise or noise with outliers, or may be.
+
+    Args:
+        noise: its size and correlation in words. is_open: whether its size was not stated, so that
+            something that the model misses would look the same.
+    """
+    if not is_open:
+        return f"Model and data agree: the residuals are noise ({noise})."
+    return (
+        f"The residuals may be noise ({noise}), but as its size was not stated, they may as well "
+        "be something that the model misses and that varies as smoothly: state the noise."
+    )
+
+
 def misfit_sentence(
     white: Whiteness,
     times: Mapping[str, float],

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.calibration.sets.linear_search import Names
 from crosscheck.calibration.unknown.varying import Varying
@@ -13,6 +14,7 @@ from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.diagnosis.result import MissingEffect
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.measurements.data import Measurements
 from crosscheck.planning.adding import Extension
 from crosscheck.planning.deciding import telling_models_apart
 from crosscheck.planning.extensions import extensions
@@ -56,6 +58,13 @@ class _Sure(float):
         return f"+{shown}" if form.startswith("+") and self >= 0.0 else shown
 
 
+class _Unknown(str):
+    """What the data do not determine, instead of a number."""
+
+    def __format__(self, form: str) -> str:
+        return "?"
+
+
 def check_of(term: Term, robot: Robot, stderr: Array | None = None) -> str:
     """An effect's independent check, with what to expect: in mm, degrees and newtons.
 
@@ -74,14 +83,19 @@ def check_of(term: Term, robot: Robot, stderr: Array | None = None) -> str:
     values: dict[str, _Sure | str] = {}
     errors = np.full(len(layout), np.inf) if stderr is None else stderr
     doubts = _errors_of_totals(term, robot, errors)
+    # where nothing is determined the fit's own values are as good as any
+    idle = _undetermined(term, errors) & bool(np.any(np.isfinite(errors)))
+    lost = _errors_of_totals(term, robot, np.where(idle, np.inf, 0.0))
 
     def number(value: float, error: float, unit: str) -> _Sure:
         factor = in_unit(unit)[0]
         least = _LEAST_BY_HAND if unit == "m" else 0.0
         return _Sure(factor * float(value), factor * max(float(error), least))
 
-    for name, unit, value in zip(layout.names, layout.units, term.vector, strict=True):
-        values[parameter_name(name, unit)] = number(value, errors[layout.names.index(name)], unit)
+    rows = zip(layout.names, layout.units, term.vector, errors, idle, strict=True)
+    for name, unit, value, error, unknown in rows:
+        shown = _Unknown() if unknown else number(value, error, unit)
+        values[parameter_name(name, unit)] = shown
     # of several parameters that the data determine, the one that stands out most
     size = np.abs(term.vector - layout.null) / layout.scale * ~layout.shape
     known = np.isfinite(errors)
@@ -91,12 +105,19 @@ def check_of(term: Term, robot: Robot, stderr: Array | None = None) -> str:
     values["largest"] = number(term.vector[k], errors[k], layout.units[k])
     for name, total in term.effect().totals(robot).items():
         key = "total" if name == layout.names[k] and len(layout) > 1 else name
-        values[key] = number(total.value, doubts[name], total.unit)
+        shown = number(total.value, doubts[name], total.unit)
+        values[key] = _Unknown() if np.isinf(lost[name]) else shown
         values[f"{key}_nominal"] = number(total.nominal, doubts[name], total.unit)
     try:
         return layout.effect.advice.format(**values)
     except (KeyError, IndexError, ValueError):
         return layout.effect.advice
+
+
+def _undetermined(term: Term, errors: Array) -> NDArray[np.bool_]:
+    """(k,) which values the data do not determine; those on a bound are what they are."""
+    bound = (term.vector == term.layout.lower) | (term.vector == term.layout.upper)
+    return np.asarray(~np.isfinite(errors) & ~bound)
 
 
 def _errors_of_totals(term: Term, robot: Robot, errors: Array) -> dict[str, float]:
@@ -163,7 +184,7 @@ def measure_next(
         out.append(_CALIBRATE)
     if verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
         out += [f"to find {what}: {what.advice}" for what in seen if what.advice]
-        out += [_to_find(where), _ALL_AT_ONCE]
+        out += [_to_find(where), *_set_up_anew(found.problem.data, where), _ALL_AT_ONCE]
     if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         out.append("nothing that matters is missing; to find smaller effects, use crosscheck plan")
     return list(dict.fromkeys(out))
@@ -255,6 +276,17 @@ _FIRST = {
     QuantityKind.TIME: _TIME,
     QuantityKind.TEMPERATURE: _TIME,
 }
+
+
+def _set_up_anew(data: Measurements, where: Sequence[Association]) -> list[str]:
+    """How files may have frames of the tracker of their own, if errors go with the run."""
+    goes = any(one.kind is QuantityKind.RUN and one.significant for one in where)
+    if not goes or len(data.files) < 2 or "tracker_frame" in data.free:
+        return []
+    return [
+        "if the tracker was set up anew between the files, its frame may differ: write free = "
+        '["tracker_frame"] into the TOML beside all of them but one, and diagnose again'
+    ]
 
 
 def _to_find(where: Sequence[Association]) -> str:

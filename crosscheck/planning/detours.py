@@ -13,6 +13,7 @@ from crosscheck.planning.extensions import PAYLOAD, named_again
 from crosscheck.planning.planned import Planned
 from seecr.commands.loads import Loads
 from seecr.pose import Array
+from seecr.units import short
 from seecr.workspace.zones import feasible
 
 # Distance of an off-centre payload from the centre of mass, relative to the widest horizontal
@@ -38,8 +39,8 @@ def _aside(plan: Planned, data: Measurements) -> Iterator[Extension]:
     there = Loads(np.full(n, mass), np.tile(place, (n, 1)), np.zeros((n, 6)))
     yield Extension(
         Adding.PAYLOAD_ASIDE,
-        f"repeat the poses with a known extra {mass:.2g} kg off the centre, at ({where}) m in the "
-        "platform's frame (payload_kg, payload_x_m, payload_y_m, payload_z_m)",
+        f"repeat the poses with a known extra {short(mass, 2)} kg off the centre, at ({where}) m "
+        "in the platform's frame (payload_kg, payload_x_m, payload_y_m, payload_z_m)",
         like(plan, replace(data, loads=there, run=named_again(data))),
     )
 

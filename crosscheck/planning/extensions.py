@@ -20,6 +20,7 @@ from crosscheck.planning.planned import (
 from seecr.commands.loads import Loads
 from seecr.description.robot import Robot
 from seecr.pose import Array
+from seecr.units import short
 
 # A known payload, relative to the platform's mass.
 PAYLOAD = 0.25
@@ -73,8 +74,8 @@ def _payload(plan: Planned, data: Measurements) -> Iterator[Extension]:
     if robot.mass > 0:
         yield Extension(
             Adding.PAYLOAD,
-            f"repeat the poses with a known extra {PAYLOAD * robot.mass:.2g} kg at the centre of "
-            "mass (payload_kg)",
+            f"repeat the poses with a known extra {short(PAYLOAD * robot.mass, 2)} kg at the "
+            "centre of mass (payload_kg)",
             like(plan, replace(data, loads=_heavier(data, robot, PAYLOAD * robot.mass))),
         )
 

@@ -123,8 +123,15 @@ def _plots(recording: Recording, index: Index, found: Comparison, kind: Kind) ->
         plots.line_by_runs(recording, entity, index, raw[:, k], starts, _short(name), colour, 1.5)
 
 
+def _noise_words(found: Comparison) -> str:
+    """Whether the errors are noise, as a headline."""
+    if found.is_open:
+        return "Noise, or something missing"
+    return "Noise" if found.is_noise else "Not noise"
+
+
 def _verdict(recording: Recording, found: Comparison, shown: Misfit | None) -> None:
-    parts = [f"# {'Noise' if found.is_noise else 'Not noise'}\n{plain(found.sentence)}\n"]
+    parts = [f"# {_noise_words(found)}\n{plain(found.sentence)}\n"]
     if found.terms:
         parts.append("Model: SEECR + " + ", ".join(map(plain, found.terms.names)) + ".\n")
     if shown is not None:

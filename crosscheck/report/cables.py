@@ -91,10 +91,15 @@ def walls_of(problem: Problem, before: Drawn, after: Drawn) -> list[Wall]:
     if problem.counted[:, TENSION].any():
         shown = np.where(problem.counted[:, TENSION], raw[:, TENSION], np.nan)
         part = np.where(np.isfinite(shown), change[:, TENSION], np.nan)
-        level = np.full(len(names), problem.sigma.tension_N or 0.0)
+        seen = np.flatnonzero(np.isfinite(shown).any(axis=0))
+        level = np.full(len(seen), problem.sigma.tension_N or 0.0)
+        against = [
+            (name, values[:, seen] if values.ndim == 2 else values)
+            for name, values in _of_cables(problem, prediction)
+        ]
         out.append(
-            Wall("Errors of tension", names, shown, part, level, "N",
-                 _of_cables(problem, prediction))
+            Wall("Errors of tension", [names[k] for k in seen], shown[:, seen], part[:, seen],
+                 level, "N", against)
         )  # fmt: skip
     return out
 

@@ -65,6 +65,8 @@ def _verdict(found: Comparison) -> tuple[str, str]:
         return "no_verdict", "No verdict"
     if found.is_noise:
         return "no_effect_missing", "Model and data agree"
+    if found.is_open:
+        return "no_verdict", "Noise, or something that the model misses"
     return "unknown_effect", "The model is off"
 
 

@@ -39,8 +39,10 @@ def why_not(found: Addition, forced: bool = False) -> str:
 
 def _left(found: Addition) -> str:
     if found.is_noise:
-        kind = "" if found.coloured is None else f" ({found.coloured.words})"
-        return f"the residuals are noise{kind}"
+        if found.coloured is None:
+            return "the residuals are noise"
+        may = "may be" if found.coloured.open else "are"
+        return f"the residuals {may} noise ({found.coloured.words})"
     return (
         f"the residuals are {found.whiteness.scale:.3g} times the noise: find what else is "
         "missing with crosscheck diagnose"

@@ -26,6 +26,8 @@ _STYLE = {
     DiagnosisVerdict.NO_VERDICT: "bold red",
 }
 _MOST_CANDIDATES, _MOST_PARAMETERS = 6, 9
+# Effects that are not listed are named with their probability from here on.
+_PROBABLE = 0.5
 
 
 def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None) -> None:
@@ -79,14 +81,28 @@ def _print_candidates(console: Console, found: Diagnosis) -> None:
     # what the user left out need not be said
     rows = [row for row in found.candidates if row.why_not.why is not Why.EXCLUDED]
     for row in rows[:_MOST_CANDIDATES]:
-        say(console, f"not {row.effect}: {row.why_not}", "dim")
+        say(console, f"not {row.effect}: {row.why_not}{_all_the_same(found, row)}", "dim")
     if len(rows) > _MOST_CANDIDATES:
         say(console, _others(found, rows[_MOST_CANDIDATES:]), "dim")
 
 
+def _all_the_same(found: Diagnosis, row: NotListed) -> str:
+    """That an effect is probable, where its reason has it listed no more and does not say so."""
+    chance = 0.0 if found.chances is None else found.chances.effect.get(row.effect, 0.0)
+    if chance < _PROBABLE or "{chance}" in row.why_not.why.value:
+        return ""
+    return f" ({probability_name(found)} {probability_words(chance)})"
+
+
 def _others(found: Diagnosis, rows: Sequence[NotListed]) -> str:
-    """How probable the effects are at most that are not printed, and where they are."""
+    """How probable the effects are that are not printed, the probable ones by name."""
     chances = {} if found.chances is None else found.chances.effect
-    likely = [chances[row.effect] for row in rows if row.effect in chances]
-    most = f" (probability {probability_words(max(likely))} or less)" if likely else ""
+    likely = {row.effect: chances[row.effect] for row in rows if row.effect in chances}
+    named = sorted((p, name) for name, p in likely.items() if p >= _PROBABLE)[::-1]
+    rest = [p for p in likely.values() if p < _PROBABLE]
+    said = [f"{name} {probability_words(p)}" for p, name in named]
+    if rest:
+        said.append(f"{'others ' if named else ''}{probability_words(max(rest))} or less")
+    of = f" ({probability_name(found)}: {', '.join(said)})" if named else ""
+    most = f" (probability {said[0]})" if said and not named else of
     return f"nor {counted(len(rows), 'other')}{most}: see candidates in diagnosis.json"

@@ -40,7 +40,13 @@ from seecr.compiled.columns import (
     WINCH_SIDE,
 )
 from seecr.compiled.jit import jit_allocating, jit_inner
-from seecr.compiled.law import dahl, series_length, strain_of_tension, winch_tension
+from seecr.compiled.law import (
+    dahl,
+    series_length,
+    strain_of_tension,
+    tension_of_strain,
+    winch_tension,
+)
 from seecr.compiled.yielding import along
 
 # Most rounds for a length that changes its own hysteresis, of which the first are secant steps: it
@@ -196,6 +202,14 @@ def stretched_lengths(cables, tensions, out):
             behind = winch_tension(row, tension)[0]
             out[r, i] = row[REST] * (1.0 + _strain(row, tension))
             out[r, i] += row[COMPLIANCE] * tension + row[WINCH_SIDE] / row[EA] * behind
+
+
+@jit_allocating
+def tensions_at_strain(cables, strain, out):
+    """Tensions (n, m) [N] that strain each cable itself by ``strain``, without what has crept."""
+    for r in range(cables.shape[0]):
+        for i in range(cables.shape[1]):
+            out[r, i] = tension_of_strain(cables[r, i], strain)[0]
 
 
 @jit_inner

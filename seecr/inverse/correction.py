@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr.commands.data import Commands
-from seecr.compiled.columns import RADIUS
+from seecr.compiled.columns import RADIUS, STRAIN
 from seecr.counted import between, counted, rows_words
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
@@ -174,7 +174,8 @@ class Correction(Result):
                 "no highest tension was given: nearest poses are sought with cables strained by "
                 f"at most {100.0 * self.strain_limit:g} %"
             )
-        strains = np.where(self.found, (self.solution.tensions / self.robot.ea).max(axis=1), 0.0)
+        states = self.solution.evaluation.states
+        strains = np.where(self.found, states[..., STRAIN].max(axis=1), 0.0)
         beyond = strains > _STRAIN * (1.0 + 1e-6)
         if np.any(beyond):
             k, many = int(np.argmax(strains)), int(beyond.sum())
@@ -338,9 +339,13 @@ class _Limits:
         """Those of some rows."""
         return replace(self, aim=self.aim[some])
 
-    def strained(self, robot: Robot) -> _Limits:
-        """The same, and strains within theirs where no highest tension is given."""
-        most = _STRAIN * robot.ea
+    def strained(self, tables: Tables) -> _Limits:
+        """The same, and strains within theirs where no highest tension is given.
+
+        A model's cables may be softer than the robot's, or soften as they are stretched: it is
+        their own law that says at which tension they are strained so much.
+        """
+        most = _tensions_at(_STRAIN, tables)
         ends = np.isinf(self.high) & (self.low < most)
         return replace(self, high=np.where(ends, most, self.high))
 
@@ -358,7 +363,7 @@ class _Search:
         held, tables = self._held(self.given)
         found, aimed, settled = held.fine.copy(), self.given.pose.copy(), held.fine.copy()
         lost = np.flatnonzero(~held.fine)
-        strained = self.limits.strained(self.robot)
+        strained = self.limits.strained(tables)
         high = np.where(held.fine[:, None], self.limits.high, strained.high)
         if len(lost):
             near = replace(self, limits=strained)
@@ -475,6 +480,15 @@ class _Search:
         """Told lengths that pay out the rest lengths of ``held``, and the prediction with them."""
         limits = self.limits.aim, self.limits.low, self.limits.high
         return lengths_with_history(self.robot, commands, self.effects, held, limits)
+
+
+def _tensions_at(strain: float, tables: Tables) -> Array:
+    """(m,) [N] tensions that strain no cable by more, in any row; infinite without rows."""
+    from seecr.compiled.lengthening import tensions_at_strain  # takes a while to import
+
+    out = np.empty(tables.cables.shape[:2])
+    tensions_at_strain(tables.cables, strain, out)
+    return np.asarray(out.min(axis=0, initial=np.inf))
 
 
 def _largest(moved: Array) -> float:

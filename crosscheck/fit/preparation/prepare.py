@@ -19,6 +19,7 @@ from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.fit.suspect_data.another_robot import another_robot_doubts
 from crosscheck.fit.suspect_data.conventions import Misread, misread_orientations
 from crosscheck.fit.suspect_data.exchanged_columns import exchange_doubts
+from crosscheck.fit.suspect_data.stuck import stuck_doubts
 from crosscheck.fit.suspect_data.tension_unit import tension_doubts
 from crosscheck.measurements.data import Measurements
 from seecr.description.robot import Robot
@@ -104,6 +105,7 @@ def prepare(
     odd = [
         *([misread.words] if misread is not None and not misread.certain else []),
         *another_robot_doubts(problem, plain.readings),
+        *stuck_doubts(problem, plain.pose[:, :3]),
         *tension_doubts(problem, plain),
         *exchange_doubts(problem, plain),
         *oversized(problem, plain),

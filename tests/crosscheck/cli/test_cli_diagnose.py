@@ -6,12 +6,15 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import made_diagnoses as made
 import numpy as np
 import pytest
 from made_data import case, refused, run, term
 
+from crosscheck.cli.diagnose import _keep
 from crosscheck.diagnosis import verdict as verdict_module
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.fit.effects.gauss_newton import FitStatus
@@ -209,3 +212,17 @@ def test_without_a_verdict_no_model_is_written(tmp_path: Path) -> None:
     done = run("diagnose", xml, data, "--model-out", model, "--fail-on", "no_verdict", *out)
     assert done.exit_code == 1 and not model.exists()
     assert "not written: there is no verdict" in done.stdout
+
+
+def test_a_part_of_many_effects_is_written_with_a_word_on_its_values(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Values "that explain most by themselves, not those above" told nobody which to use."""
+    monkeypatch.setattr("crosscheck.save_model", lambda _path, _model: None)
+    found: Any = SimpleNamespace(
+        model=object(), missing=[SimpleNamespace(effect="tracker_frame")], refitted=(),
+        verdict=DiagnosisVerdict.EFFECTS_FOUND,
+    )  # fmt: skip
+    assert _keep(found, tmp_path / "m.toml").endswith("m.toml: tracker_frame")
+    found.verdict = DiagnosisVerdict.MANY_EFFECTS
+    assert "predicts best; those above" in _keep(found, tmp_path / "m.toml")

@@ -11,7 +11,7 @@ from made_data import COGIRO, SIGMA, measured
 from crosscheck.comparison.coloured import Coloured
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
-from crosscheck.measurements.data import Measurements
+from crosscheck.measurements.data import Measurements, Sigma
 from seecr.description.mjcf import load_robot
 from seecr.files import plain
 from seecr.pose import Array
@@ -79,3 +79,16 @@ def test_noise_in_words_tells_what_is_more_than_its_size() -> None:
         "tension 0.50 times the assumed noise; 1 outlier"
     )
     assert replace(noise, outliers=0).words.endswith("tension 0.50 times the assumed noise")
+
+
+def test_smooth_noise_of_unstated_size_may_as_well_be_something_missing() -> None:
+    """Cables that sag were "noise, 2.59 times the assumed", where diagnose saw structure."""
+    data = data_of(drifting(0.9, 4.0 * SIGMA.position_m))
+    found = compare(ROBOT, replace(data, sigma=replace(data.sigma, position_m=None)))
+    assert found.coloured is not None and found.coloured.scale["position"] > 1.5
+    assert found.is_open and not found.is_noise
+    assert found.sentence.startswith("The residuals may be noise (position ")
+    assert found.sentence.endswith("that varies as smoothly: state the noise.")
+    assert plain(found.as_json())["is_open"] is True
+    white = compare(ROBOT, replace(data_of(np.zeros((rows(), 3))), sigma=Sigma()))
+    assert white.is_noise and not white.is_open

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -55,6 +56,18 @@ def test_the_unknown_is_looked_for_where_it_goes(
     for words in ("commanded z", "the run", "time", "anything"):
         line = advice(found, goes_with(kind, words))
         assert line.startswith(f"the unexplained error depends on {words}: {expected}")
+
+
+def test_files_whose_errors_differ_may_have_other_frames_of_the_tracker(found: Search) -> None:
+    """Two days of a crane had an unknown effect; with a frame each, both effects are found."""
+    data = found.problem.data
+    run, place = goes_with(QuantityKind.RUN, "the run"), goes_with(QuantityKind.PLACE, "x")
+    days = replace(data, files=("monday.csv", "tuesday.csv"))
+    (line,) = what_next._set_up_anew(days, [run])
+    assert 'write free = ["tracker_frame"] into the TOML' in line
+    assert what_next._set_up_anew(data, [run]) == []
+    assert what_next._set_up_anew(days, [place]) == []
+    assert what_next._set_up_anew(replace(days, free=("tracker_frame",)), [run]) == []
 
 
 def test_beside_a_constant_offset_it_is_looked_for_where_the_rest_goes(found: Search) -> None:
@@ -206,6 +219,18 @@ def test_what_the_data_do_not_determine_is_not_what_to_expect() -> None:
     assert "error_3_y" in check_of(some, robot, errors)
     errors[some.layout.names.index("error_3_y_m")] = np.inf
     assert "+2 mm (error_1_x" in check_of(some, robot, errors).replace("2.0 mm", "2 mm")
+    hangs = term(robot, "centre_of_mass", shift_x_m=0.003, shift_z_m=0.013)
+    check = check_of(hangs, robot, np.array([1e-4, 1e-4, np.inf]))
+    assert "at (3.00, 0, ?) mm of its frame, not (0, 0, 0)" in check
+    upright = term(robot, "gravity_tilt", tilt_y_rad=0.01)
+    assert "expect ? deg about x and 0.573 deg about y" in check_of(
+        upright, robot, np.array([np.inf, 1e-4])
+    )
+    # a value on its bound is what it is
+    firm = term(robot, "frame_compliance", sideways_m_per_N=8e-6)
+    assert "expect 0.0080 mm per newton sideways, 0 mm upwards" in check_of(
+        firm, robot, np.array([1e-7, np.inf])
+    )
     # where nothing is determined the largest is as good as any
     assert "error_3_y" in check_of(some, robot, np.full(len(errors), np.inf))
 

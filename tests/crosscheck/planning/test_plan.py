@@ -17,6 +17,7 @@ from crosscheck.measurements.together import together
 from crosscheck.planning.adding import MORE_POSES, Adding
 from crosscheck.planning.choosing import choose_poses
 from crosscheck.planning.design import make_plan
+from crosscheck.planning.detours import detours
 from crosscheck.planning.extensions import extensions
 from crosscheck.planning.greedy import Wanted, chosen_poses
 from crosscheck.planning.places import more_poses, taut_first
@@ -269,6 +270,16 @@ def test_what_tells_two_effects_of_a_model_apart_is_proposed_by_the_same_means(r
     words = {s.kind: s.words for s in make_plan(robot, few).suggestions}
     payload = next(s for s in found if s.kind is Adding.PAYLOAD)
     assert payload.words == words[Adding.PAYLOAD]
+
+
+def test_the_payload_of_a_heavy_crane_has_no_exponent(robot, few):
+    """It was "a known extra 1e+02 kg" of a platform of 420 kg."""
+    heavy = replace(robot, mass=420.0, ea=robot.ea * 1000.0)
+    here = planned(heavy, few, SIGMA, Reads.whole(robot.n_cables))
+    kinds = (Adding.PAYLOAD, Adding.PAYLOAD_ASIDE)
+    every = [*extensions(here), *detours(here)]
+    said = [one.words for one in every if one.kind in kinds]
+    assert len(said) == 2 and all("a known extra 105 kg " in words for words in said)
 
 
 def _later(robot, data):

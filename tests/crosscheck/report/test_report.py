@@ -338,6 +338,21 @@ def test_the_wall_overlays_what_the_effect_accounts_for() -> None:
     assert np.all(walls_of(nothing.search.problem, first, last)[0].predicted == 0.0)
 
 
+def test_cables_whose_tension_was_not_read_have_no_panels() -> None:
+    """Three of six rows were empty where three of six cables had load cells."""
+    found = diagnosis("pulleys")
+    assert found.search is not None
+    problem, stages = found.search.problem, shown_stages(found)
+    tensions = problem.data.tensions.copy()
+    tensions[:, 1::2] = np.nan
+    some = replace(problem, data=replace(problem.data, tensions=tensions))
+    whole, wall = walls_of(problem, *stages)[-1], walls_of(some, *stages)[-1]
+    assert wall.names == list(problem.robot.cable_names)[::2]
+    assert np.array_equal(wall.measured, whole.measured[:, ::2])
+    assert np.array_equal(wall.abscissae[0][1], whole.abscissae[0][1][:, ::2])
+    draw_wall(wall, BEFORE)
+
+
 def test_paid_out_is_the_commanded_change_within_a_run() -> None:
     found = diagnosis("pulleys")
     assert found.search is not None

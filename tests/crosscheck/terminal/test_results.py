@@ -168,6 +168,28 @@ def test_a_diagnosis_says_how_probable_what_it_does_not_print_is_at_most() -> No
         assert lines == ([f"{text}candidates in diagnosis.json"] if text else [])
 
 
+def test_what_is_probable_and_not_listed_is_named_with_its_probability() -> None:
+    """Of a tracker's frame at > 99 % one read "nor 21 others (probability > 99 % or less)"."""
+    whole = made.pulleys()
+    assert whole.chances is not None
+    asked = [row for row in whole.candidates if row.why_not.why is not Why.EXCLUDED]
+    first, second, other = asked[0], asked[1], asked[-1].effect
+    rows = [
+        replace(first, why_not=Reason(Why.PROMISES_LESS)),
+        replace(second, why_not=Reason(Why.NOT_SURE, p=0.7)),
+        *asked[2:],
+    ]
+    likely = {first.effect: 0.999, second.effect: 0.7, other: 0.998}
+    effect = dict.fromkeys(whole.chances.effect, 0.02) | likely
+    screen, out = console()
+    chances = replace(whole.chances, effect=effect)
+    print_diagnosis(replace(whole, candidates=rows, chances=chances), Path("here"), screen)
+    lines = [line for line in out.getvalue().splitlines() if line.startswith(("not ", "nor "))]
+    assert lines[0].endswith("explain less than the others (probability > 99 %)")
+    assert lines[1] == f"not {second.effect}: probable (70 %) but not certain"
+    assert f"(probability: {other} > 99 %, others 2 % or less)" in lines[-1]
+
+
 def test_a_diagnosis_begins_with_what_shows_and_then_its_verdict() -> None:
     screen, out = console()
     found = made.pulleys()

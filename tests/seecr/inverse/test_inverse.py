@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 
 from seecr.commands.data import Commands, play
 from seecr.commands.loads import Loads
+from seecr.compiled.columns import STRAIN
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
@@ -482,3 +483,23 @@ def test_lengths_are_found_where_poses_are_repeated_with_every_history(name: str
     poses = np.repeat(curve.pose[::4], 4, axis=0)
     found = correct(robot, Commands(poses, time=curve.time), effects=effects)
     assert found.held.all() and found.reached.all()
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("stiffness", [0.4]), ("nonlinear_elasticity", [0.0, -1200.0])],
+)
+def test_the_strain_that_ends_the_search_is_by_the_law_of_the_models_cables(
+    name: str, values: list[float]
+) -> None:
+    """Cables that soften were strained by 357 % at 5 % of E S, and wound in accordingly."""
+    robot = robot_named("camera")
+    poses = np.tile(robot.reference_pose, (2, 1))
+    poses[:, 2] = 26.0, 40.0
+    poses[0, 0] = 90.0
+    softer = Term(layout_of(catalogue()[name], robot), np.array(values))
+    found = correct(robot, poses, effects=[softer])
+    states = found.solution.evaluation.states
+    assert not found.held.any() and found.stays.all()
+    assert states[..., STRAIN].max() <= 0.05 * (1.0 + 1e-6)
+    assert "strains a cable by more" not in "\n".join(found.lines())
