@@ -59,7 +59,8 @@ Examples:
     type=Number(),
     multiple=True,
     metavar="FX FY FZ MX MY MZ",
-    help="The platform must also be held under this wrench [N, N m]; may be repeated for a set.",
+    help="External wrench [N, N m] under which the platform must be held, besides weight; may be "
+    "repeated for a set. 0 0 0 0 0 0 is none, and is only in the set if it is given.",
 )
 @click.option(
     "--at-least",
