@@ -207,7 +207,7 @@ def _lines(
     lines = [*found.lines(), *softest_line(found), *likely_lines(found, at_least)]
     lines += sag_lines_of(found, effects)
     if places is not None and edge is not None:
-        lines.append(edge_line(places, edge))
+        lines.append(edge_line(found, places, edge, at_least))
     return lines
 
 
