@@ -162,7 +162,7 @@ def command(
     for line in [
         *notes,
         *found.lines(),
-        *chance_lines(found, kept, aim == "minimum"),
+        *chance_lines(found, kept, aim == "minimum", highest is not None),
         f"Results in {out}/",
         then,
     ]:

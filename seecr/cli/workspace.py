@@ -60,7 +60,8 @@ Examples:
     type=Number(),
     multiple=True,
     metavar="FX FY FZ MX MY MZ",
-    help="The platform must also be held under this wrench [N, N m]; may be repeated for a set.",
+    help="External wrench [N, N m] under which the platform must be held, besides weight; may be "
+    "repeated for a set. 0 0 0 0 0 0 is none, and is only in the set if it is given.",
 )
 @click.option(
     "--at-least",
@@ -207,7 +208,7 @@ def _lines(
     lines = [*found.lines(), *softest_line(found), *likely_lines(found, at_least)]
     lines += sag_lines_of(found, effects)
     if places is not None and edge is not None:
-        lines.append(edge_line(places, edge))
+        lines.append(edge_line(found, places, edge, at_least))
     return lines
 
 

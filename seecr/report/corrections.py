@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seecr.columns.command_file import CommandFile
 from seecr.columns.written import table_text
@@ -44,30 +45,50 @@ def corrected_toml(wanted: CommandFile) -> str:
     return toml_beside(True, wanted.commands)
 
 
-def chance_lines(found: Correction, kept: Array | None, minimum: bool = False) -> Iterator[str]:
+def chance_lines(
+    found: Correction, kept: Array | None, minimum: bool = False, limited: bool = True
+) -> Iterator[str]:
     """The probability that tensions stay within their limits, if the model has a covariance.
+
+    Poses that are reached and the nearest of others are counted apart: the latter lie at the edge
+    of what the limits allow, so that no other distribution of tensions helps there.
 
     Args:
         found: the correction.
         kept: (n,) probability of each row.
         minimum: whether tensions were to be as small as possible.
+        limited: whether there is a highest tension, and so a middle of the limits.
     """
-    if kept is None or not np.isfinite(kept).any():
+    if kept is None:
         return
-    worst = int(np.nanargmin(kept))
-    many = int(np.sum(kept[np.isfinite(kept)] < _LIKELY))
+    known, reached = np.isfinite(kept), found.reached
+    at, near = np.flatnonzero(known & reached), np.flatnonzero(known & ~reached)
+    if len(at):
+        many, all_of_them = int(np.sum(kept[at] < _LIKELY)), len(at) == len(kept)
+        yield (
+            f"tensions stay within the limits {_least_chance(found, kept, at)}; "
+            f"below {_LIKELY:g} at {many} of {'' if all_of_them else 'the '}{len(at)} reached"
+        )
+        # without more cables than degrees of freedom there is nothing to distribute
+        if minimum and many and found.robot.n_cables > found.robot.n_dof:
+            yield (
+                "  --aim minimum puts a cable at its lowest tension, where it stays within the "
+                f"limits with about 0.5; --aim middle{'' if limited else ' with --highest'} "
+                "keeps away from them as far as the balance leaves a choice"
+            )
+    if len(near):
+        yield (
+            "at the nearest poses, on the edge of what can be held, they stay within them "
+            f"{_least_chance(found, kept, near)}"
+        )
+
+
+def _least_chance(found: Correction, kept: Array, rows: NDArray[np.intp]) -> str:
+    """The smallest probability at some rows, and at which."""
+    worst = int(rows[np.argmin(kept[rows])])
     # as 1.00 it would read as certain
     least = f"above {_SURE:g}" if kept[worst] > _SURE + 0.005 else f"of at least {kept[worst]:.2f}"
-    yield (
-        f"tensions stay within the limits with a probability {least}, "
-        f"lowest at {found.place(worst)}; below {_LIKELY:g} at {many} of {len(found.wanted)}"
-    )
-    # without more cables than degrees of freedom there is nothing to distribute
-    if minimum and many and found.robot.n_cables > found.robot.n_dof:
-        yield (
-            "  --aim minimum puts a cable at its lowest tension, where it stays within the limits "
-            "with about 0.5; --aim middle keeps away from them"
-        )
+    return f"with a probability {least}, lowest at {found.place(worst)}"
 
 
 def turned_words(found: Correction) -> str:

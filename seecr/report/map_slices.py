@@ -63,13 +63,14 @@ def map_figure(
         found: the workspace, with two or three axes of more than one value.
         most: most slices drawn; they are normal to the last axis, or to the one with a single
             value. The title states how many there are in all.
-        edge: (k, 7) poses at the edge of the workspace; those in a slice are drawn as dots.
-        at_least: the probability to which that edge belongs, if any.
+        edge: (k, 7) poses at the edge of the workspace; those in a slice are drawn as dots, instead
+            of the line between the poses of the grid.
+        at_least: the probability to which that edge belongs, if any; the line is drawn, too.
 
     Raises:
         InputError: a grid with fewer than two axes of more than one value.
     """
-    cut = _cut(found, most)
+    cut = _cut(found, most, edge is None or at_least is not None)
     panels = [_held_panel]
     if found.chance is not None:
         panels.append(_chance_panel)
@@ -112,6 +113,7 @@ class _Cut:
         picked: (k,) indices of the slices along the first of these.
         slices: indices of the poses of each.
         unit, per_metre: for the axes.
+        outlined: whether a line is drawn between the poses that can be held and the others.
     """
 
     found: Workspace
@@ -122,6 +124,7 @@ class _Cut:
     slices: list[NDArray[np.intp]]
     unit: str
     per_metre: float
+    outlined: bool
 
     @property
     def poses(self) -> NDArray[np.intp]:
@@ -132,9 +135,13 @@ class _Cut:
         """Margins of each slice, for the contour at zero between them.
 
         An infinite margin does not say where between two poses the contour is, nor does that of
-        cables which hold a pose loosely, zero; both are replaced by a typical value.
+        cables which hold a pose loosely, zero; both are replaced by a typical value. Where margins
+        only tell yes or no, it is half way between.
         """
         found = self.found
+        if _yes_or_no(found):
+            sides = np.where(found.feasible, 1.0, -1.0).ravel()
+            return [sides[one] for one in self.slices]
         inside = np.where(found.feasible, np.maximum(found.margin, 0.0), found.margin).ravel()
         known = np.abs(inside[np.isfinite(inside) & (inside != 0.0)])
         far = float(np.median(known)) if len(known) else 1.0
@@ -153,7 +160,7 @@ class _Cut:
         return [np.abs(across - axis[k]) <= near for k in self.picked]
 
 
-def _cut(found: Workspace, most: int) -> _Cut:
+def _cut(found: Workspace, most: int, outlined: bool) -> _Cut:
     """At most so many slices of a map."""
     lengths = [len(axis) for axis in found.axes]
     if sum(n > 1 for n in lengths) < 2:
@@ -164,7 +171,8 @@ def _cut(found: Workspace, most: int) -> _Cut:
     number = np.arange(found.margin.size).reshape(lengths)
     slices = [np.take(number, k, across) for k in picked]
     metres = max(float(np.ptp(axis)) for axis in found.axes) > _LARGE
-    return _Cut(found, across, wide, high, picked, slices, *(("m", 1.0) if metres else ("mm", 1e3)))
+    unit = ("m", 1.0) if metres else ("mm", 1e3)
+    return _Cut(found, across, wide, high, picked, slices, *unit, outlined)
 
 
 def _height(cut: _Cut) -> float:
@@ -185,7 +193,7 @@ def _words(cut: _Cut, edge: Array | None, at_least: float | None) -> Iterator[st
     if cut.found.rests.any():
         yield "arrows: what is beyond a bar's end has its last colour"
     dots = edge is not None and bool(np.any(cut.with_dots(edge)))
-    if any(map(_has_edge, cut.inside())) or (dots and at_least is None):
+    if (cut.outlined and any(map(_has_edge, cut.inside()))) or (dots and at_least is None):
         yield "orange: the edge of the poses that tensions within the limits can hold"
     if dots and at_least is not None:
         yield f"white dots: the edge of the poses held with a probability of {at_least:g}"
@@ -367,7 +375,7 @@ def _colours(
             shading="nearest",
             rasterized=True,  # otherwise lines show between the cells of an SVG
         )  # fmt: skip
-        if _has_edge(inside):
+        if cut.outlined and _has_edge(inside):
             ax.contour(x, y, inside.T, levels=[0.0], colors=_EDGE, linewidths=1.2)
         ax.set_aspect("equal", anchor="W")
         ax.grid(False)
@@ -391,5 +399,5 @@ def _stripes(cut: _Cut, row: Any) -> None:
 
 
 def _has_edge(inside: Array) -> bool:
-    """Whether the margins of a slice change sign; those of robots with few cables never do."""
+    """Whether a slice has poses on both sides of the edge."""
     return bool(inside.min() < 0.0 < inside.max())

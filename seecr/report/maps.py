@@ -68,8 +68,21 @@ def sag_lines_of(found: Workspace, effects: Collection[str]) -> Iterator[str]:
         yield SAGS
 
 
-def edge_line(edge: Array, tolerance: float) -> str:
-    """The number of poses on the edge, and how accurately they are known."""
+def edge_line(
+    found: Workspace, edge: Array, tolerance: float, at_least: float | None = None
+) -> str:
+    """The number of poses on the edge, and how accurately they are known; or why there is none.
+
+    Args:
+        found: the workspace.
+        edge: (k, 7) poses.
+        tolerance: [m].
+        at_least: the probability to which that edge belongs, if any.
+    """
+    if len(edge) == 0 and at_least is not None:
+        every = bool(found.likely(at_least).all())
+        which = "all poses of the grid are" if every else "no pose of the grid is"
+        return f"no edge was found: {which} held with that probability"
     if len(edge) == 0:
         return "no edge was found: all poses of the grid can be held"
     return f"edge, to within {tolerance:g} m: {counted(len(edge), 'point')}"

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seecr.counted import counted
 from seecr.curves import alike
-from seecr.pose import Array
+from seecr.pose import Array, pose_difference
 from seecr.prediction.uncertainty import Spread
 from seecr.report.drawing import COLOURS, figure
 from seecr.statics.solution import Solution
@@ -32,6 +32,8 @@ _MOST_NAMED = 24
 # Zones are yellow with the fewest slack cables and red with more, as in the paper's Figs 7 and 11.
 _FEW, _MANY = (COLOURS[1], 0.18), (COLOURS[4], 0.22)
 _BAND: dict[str, Any] = {"alpha": 0.2, "linewidth": 0.8}
+# Where the platform jumps.
+_JUMP: dict[str, Any] = {"color": "black", "linestyle": (0, (1, 2)), "linewidth": 1.2}
 
 
 def sweep_figure(
@@ -47,7 +49,7 @@ def sweep_figure(
     """Deviation, rotation if it can turn, tensions and slack cables along a sweep.
 
     If it can turn and hangs on two pairs of parallel cables in a plane, also how far the paper's
-    point V or H is beside the line of the weight.
+    point V or H is beside the line of the weight. If it was followed, dotted lines mark its jumps.
 
     Args:
         path: the file.
@@ -74,7 +76,9 @@ def sweep_figure(
     if bar is not None:
         panels.append(partial(_tilts, bar=bar))
     with figure(path, len(panels), 1, sharex=True, figsize=(7.4, 2.1 * len(panels))) as axes:
-        for panel, ax in zip(panels, axes[:, 0], strict=True):
+        for i, (panel, ax) in enumerate(zip(panels, axes[:, 0], strict=True)):
+            for k, place in enumerate(whole.jumps()):
+                ax.axvline(place, label=None if i or k else "jump", **_JUMP)
             panel(ax, whole)
         axes[0, 0].set_title(solution.robot.name)
         axes[-1, 0].set_xlabel(label)
@@ -118,6 +122,25 @@ class _Sweep:
     def ends(self, zone: SlackSpan) -> Array:
         """Horizontal positions (2,) of a zone's ends."""
         return np.interp(zone.rows, np.arange(len(self.at)), self.at)
+
+    def jumps(self) -> Array:
+        """Horizontal positions of the jumps on the path that was followed.
+
+        Those on the way from the reference pose to the first row of a run are at that row; where
+        lengths were commanded, half way between rows.
+        """
+        out, solution = [], self.solution
+        starts = {0, *self.starts.tolist()}
+        for i, jumps in enumerate(solution.jumps or ()):
+            last = i if i in starts else i - 1
+            for jump in jumps:
+                whole, part = (
+                    float(np.linalg.norm(pose_difference(to, solution.command[last])))
+                    for to in (solution.command[i], jump.command)
+                )
+                share = min(part / whole, 1.0) if whole > 0.0 and np.isfinite(part) else 0.5
+                out.append(self.at[last] + share * (self.at[i] - self.at[last]))
+        return np.array(out)
 
     def shade(self, ax: Any) -> None:
         """Shade the zones in which cables are slack."""

@@ -364,7 +364,7 @@ def _more_energy(more: float) -> str:
 
 
 def jump_lines(solution: Solution) -> Iterator[str]:
-    """Where the platform jumps on the path that was followed."""
+    """Where the platform jumps on the path that was followed, two lines each."""
     if solution.jumps is None:
         return
     if not any(solution.jumps):
@@ -377,6 +377,9 @@ def jump_lines(solution: Solution) -> Iterator[str]:
                 angles = np.degrees(rotvec_from_quat(jump.command[3:]))
                 command += f", turned by {_three(angles, '.2f')} deg about x y z"
             yield f"on the path to {solution.place(i)}, at command {command}: {jump.words}"
+            last, then = (f"{_three(1e3 * one[:3], '.1f')} mm" for one in (jump.before, jump.after))
+            landed = np.isfinite(jump.after).all()
+            yield f"  from {last} to {then}" if landed else f"  it was last at {last}"
 
 
 def _turns(solution: Solution) -> bool:

@@ -190,6 +190,23 @@ class Workspace(Result):
         """Size of the part of the grid's box that belongs to some poses (nx, ny, nz)."""
         return float(self.shares[poses].sum())
 
+    def size_between(self, poses: NDArray[np.bool_]) -> tuple[float, float]:
+        """Between which sizes the part that belongs to some poses (nx, ny, nz) lies.
+
+        Cells between neighbouring poses count if all their corners are among the poses, or if any
+        is. Nothing is known of what is smaller than a cell.
+        """
+        every, some, sides = poses, poses, []
+        for k, axis in enumerate(self.axes):
+            if len(axis) > 1:
+                first, last = ([slice(None)] * 3 for _ in range(2))
+                first[k], last[k] = slice(None, -1), slice(1, None)
+                every = every[tuple(first)] & every[tuple(last)]
+                some = some[tuple(first)] | some[tuple(last)]
+            sides.append(np.abs(np.diff(axis)) if len(axis) > 1 else np.ones(1))
+        cells = np.einsum("i,j,k->ijk", *sides)
+        return float(cells[every].sum()), float(cells[some].sum())
+
     @property
     def softest_at(self) -> tuple[int, ...] | None:
         """Index of the pose with the smallest stiffness among those that can be held."""
@@ -199,10 +216,18 @@ class Workspace(Result):
         return tuple(map(int, np.unravel_index(np.nanargmin(stiffness), stiffness.shape)))
 
     def size_words(self, poses: NDArray[np.bool_]) -> str:
-        """The size of some poses (nx, ny, nz) of the grid, as text; "" of a single pose's grid."""
+        """The size of some poses (nx, ny, nz) of the grid, as text; "" of a single pose's grid.
+
+        What the grid leaves open is told, if it is more than the size's last digit.
+        """
         along = sum(len(axis) > 1 for axis in self.axes)
         unit = {1: " m", 2: " m^2", 3: " m^3"}.get(along)
-        return "" if unit is None else f"{self.size(poses):.4g}{unit}"
+        if unit is None:
+            return ""
+        size, (low, high) = f"{self.size(poses):.4g}", self.size_between(poses)
+        if size == f"{low:.4g}" == f"{high:.4g}":
+            return f"{size}{unit}"
+        return f"{size}{unit} ({low:.3g} to {high:.3g} at this spacing)"
 
     def lines(self) -> list[str]:
         """How much of the grid can be held, and how far off the elastic robot is there."""
@@ -288,7 +313,11 @@ class Workspace(Result):
         if at_least is not None:
             some = self.likely(at_least)
             size = None if alone else self.size(some)
-            likely = {"at_least": at_least, "poses": int(some.sum()), "size": size}
+            sizes = None if alone else self.size_between(some)
+            likely = {
+                "at_least": at_least, "poses": int(some.sum()), "size": size,
+                "size_between": sizes,
+            }  # fmt: skip
         where = self.rests & self.feasible
         worst = {
             "deviation_m": np.linalg.norm(self.deviation[where], axis=-1),
@@ -306,6 +335,7 @@ class Workspace(Result):
             "feasible": int(self.feasible.sum()),
             "cell": None if alone else self.cell,
             "size_feasible": None if alone else self.size(self.feasible),
+            "size_feasible_between": None if alone else self.size_between(self.feasible),
             "likely": likely,
             "rests": int(self.rests.sum()),
             "not_at_rest": [

@@ -95,7 +95,11 @@ def test_where_a_rest_ends_the_platform_jumps() -> None:
     settler = Settler(model_path("demobot_parallel"))
     settled = settler.settle(jump.before, robot.commanded_lengths(after[None])[0])
     assert np.abs(pose_difference(settled.pose, jump.after)).max() < 1e-4
-    (line,) = jump_lines(led)
+    line, places = jump_lines(led)
+    there = [", ".join(f"{1e3 * x:.1f}" for x in one[:3]) for one in (jump.before, jump.after)]
+    assert places == f"  from {there[0]} mm to {there[1]} mm"
+    lost = replace(led, jumps=((), (replace(jump, after=np.full(7, np.nan)),)))
+    assert list(jump_lines(lost))[1] == f"  it was last at {there[0]} mm"
     assert line.startswith(
         f"on the path to pose 1, at command 400.0, 250.0, 150.0 mm, turned by {angle:.2f}, 0.00, "
         "0.00 deg about x y z: its equilibrium ends"

@@ -99,6 +99,15 @@ def test_margins_without_numbers_are_drawn_as_yes_or_no(drawn: Drawn, name: str)
     assert ("cables can be tightened without limit" in title(one)) == (yes > 0.0)
 
 
+def test_the_edge_of_a_map_of_yes_and_no_is_half_way(drawn: Drawn) -> None:
+    """It was drawn by margins of which only the sign is shown, through cells that can be held."""
+    found = few(-np.inf, 0.0)
+    margin = np.where(found.feasible, np.array([0.1, 1.0, 5.0]), -np.inf)
+    one = drawn(replace(found, margin=margin))
+    (line,) = one.axes[0].collections[1].get_paths()
+    np.testing.assert_allclose(line.vertices[:, 0], 350.0)
+
+
 def few(no: float, yes: float) -> Workspace:
     """A map of a robot with fewer cables than freedoms."""
     robot = load_robot(model_path("planar_two_cable"))
@@ -112,8 +121,10 @@ def test_the_edge_with_a_probability_is_told_from_that_without(drawn: Drawn) -> 
     edge = np.array([[0.37, 0.4, 0.1, 1.0, 0.0, 0.0, 0.0]])
     plain, likely = drawn(found, edge=edge), drawn(found, edge=edge, at_least=0.95)
     own, other = (one.axes[0].lines[0].get_markerfacecolor() for one in (plain, likely))
-    orange = to_hex(plain.axes[0].collections[1].get_edgecolor()[0])
+    orange = to_hex(likely.axes[0].collections[1].get_edgecolor()[0])
     assert to_hex(own) == orange and other == "white"
+    # the dots are where the edge is; a line beside them was up to a cell off it
+    assert len(plain.axes[0].collections) == 1
     assert "orange: the edge of the poses that tensions" in title(plain) and "dots" not in title(
         plain
     )

@@ -70,21 +70,41 @@ def test_rows_of_a_file_are_told_by_their_lines(tmp_path: Path) -> None:
     lost = replace(found, status=np.array([Status.FALLING] * 3, dtype=object))
     assert lost.lines()[1].startswith("lines 3, 5, 6: no equilibrium found")
     assert any(line.startswith("  line 6: cable1 would have to push") for line in wanted.lines())
-    (said,) = chance_lines(wanted, np.array([0.9, 0.2, 0.7]))
-    assert "with a probability of at least 0.20, lowest at line 5" in said
-    least = list(chance_lines(wanted, np.array([0.9, 0.2, 0.7]), minimum=True))
-    assert least[0] == said and "--aim middle" in least[1]
-    hung = replace(wanted, robot=replace(robot, joints=()))  # four cables, six degrees of freedom
-    assert len(list(chance_lines(hung, np.array([0.9, 0.2, 0.7]), minimum=True))) == 1
-    (sure,) = chance_lines(wanted, np.array([1.0, 0.9951, 1.0]), minimum=True)
-    assert "with a probability above 0.99, lowest at line 5; below 0.95 at 0 of 3" in sure
-    (nearly,) = chance_lines(wanted, np.array([1.0, 0.9949, 1.0]))
-    assert "of at least 0.99, lowest" in nearly  # never 1.00, which reads as certain
     assert [row["line"] for row in wanted.as_json()["rows"]] == [3, 5, 6]
     assert [row["line"] for row in SweepRows(found).as_json()] == [3, 5, 6]
     # without a file they count as they do in Python
     assert "command: pose 2, " in solve(robot, commands.pose).lines()[1]
     assert "line" not in SweepRows(solve(robot, commands.pose)).as_json()[0]
+
+
+def test_chances_of_poses_reached_are_told_apart_from_those_of_the_nearest() -> None:
+    """The nearest poses lie at the limits: they were counted as if another aim could help there."""
+    robot = load_robot("planar_vertical")
+    poses = [[0.4, 0, 0.15, 1, 0, 0, 0], [0.42, 0, 0.25, 1, 0, 0, 0], [0.9, 0, 0.25, 1, 0, 0, 0]]
+    wanted = correct(robot, poses)
+    assert wanted.reached.tolist() == [True, True, False]
+    chances = np.array([0.9, 0.2, 0.07])
+    said, aim, near = chance_lines(wanted, chances, minimum=True)
+    assert said.endswith("of at least 0.20, lowest at pose 1; below 0.95 at 2 of the 2 reached")
+    assert "; --aim middle keeps away" in aim and "leaves a choice" in aim
+    assert near.startswith("at the nearest poses") and "of at least 0.07, lowest at pose 2" in near
+    # without a highest tension there is no middle: the advice alone ended in an error
+    assert (
+        "--aim middle with --highest keeps" in list(chance_lines(wanted, chances, True, False))[1]
+    )
+    hung = replace(wanted, robot=replace(robot, joints=()))  # four cables, six degrees of freedom
+    assert not any("--aim" in line for line in chance_lines(hung, chances, minimum=True))
+
+
+def test_a_chance_is_never_told_as_certain() -> None:
+    robot = load_robot("planar_vertical")
+    wanted = correct(robot, [[x, 0, 0.2, 1, 0, 0, 0] for x in (0.39, 0.4, 0.41)])
+    assert wanted.reached.all()
+    (sure,) = chance_lines(wanted, np.array([1.0, 0.9951, 1.0]), minimum=True)
+    assert "with a probability above 0.99, lowest at pose 1; below 0.95 at 0 of 3" in sure
+    (nearly,) = chance_lines(wanted, np.array([1.0, 0.9949, 1.0]))
+    assert "of at least 0.99, lowest" in nearly
+    assert not list(chance_lines(wanted, None))
 
 
 def test_words_of_a_pose(sweep: Solution) -> None:

@@ -18,6 +18,7 @@ from slab import slides
 from seecr.cli import main
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
+from seecr.equilibrium.following import Jump
 from seecr.equilibrium.solving import solve
 from seecr.prediction.uncertainty import Spread, spread_of
 from seecr.report.sweep_panels import sweep_figure
@@ -180,6 +181,25 @@ def test_slack_cables_break_between_runs_and_where_the_platform_does_not_rest(dr
     slack = drawn(solution, zones=zones, runs=[0, 0, 1, 1])[3]
     np.testing.assert_array_equal(slack.lines[0].get_xdata(), [0, 1, np.nan, 2, 2.5, 2.5, 3])
     np.testing.assert_array_equal(slack.lines[0].get_ydata(), [0, 0, np.nan, 0, 0, np.nan, np.nan])
+
+
+def test_jumps_are_marked_where_they_are(drawn: Drawn, sweep: Solution) -> None:
+    """They had been steep lines from row to row like any other."""
+    at = sweep.command[1].copy()
+    at[0] = 0.36
+    jump = Jump(at, sweep.pose[1], sweep.pose[2], 1e-3, True)
+    led = replace(sweep, jumps=((), (), (jump,), ()))
+    for axes, place in (
+        (drawn(led), 360.0),
+        # on the way to the first row of a run there is nothing to the left of it
+        (drawn(led, runs=[0, 0, 1, 1]), 400.0),
+        (drawn(replace(led, line=np.array([2, 3, 5, 6])), commanded=False), 3.4),
+    ):
+        marks = [[one for one in ax.lines if len(one.get_xdata()) == 2] for ax in axes]
+        assert [one.get_xdata() for (one,) in marks] == [pytest.approx([place] * 2)] * len(axes)
+        assert [text.get_text() for text in axes[0].get_legend().texts].count("jump") == 1
+    plain = drawn(sweep)[0].get_legend().texts
+    assert "jump" not in [text.get_text() for text in plain]
 
 
 def test_the_tilt_of_a_bar_is_drawn_beside_the_manifold(drawn: Drawn) -> None:

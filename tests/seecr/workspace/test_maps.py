@@ -31,7 +31,7 @@ from seecr.planar import bar_tilt
 from seecr.pose import quat_from_rotvec
 from seecr.recording.workspace import write_map_recording
 from seecr.report.map_slices import map_figure
-from seecr.report.maps import softest_line, write_arrays
+from seecr.report.maps import edge_line, softest_line, write_arrays
 from seecr.workspace import maps
 from seecr.workspace.edges import boundary
 from seecr.workspace.grid import Workspace
@@ -552,6 +552,35 @@ def test_the_size_of_a_ball_is_that_of_a_ball() -> None:
         found = workspace_map(robot, 0.4, 0.25, 0.1, elastic=False)
         ball = replace(found, axes=axes, margin=1.0 - np.sqrt(x**2 + y**2 + z**2))
         assert ball.size(ball.feasible) == pytest.approx(part * 4.0 / 3.0 * np.pi, rel=0.01)
+
+
+def test_a_grid_tells_between_which_sizes_the_true_one_lies() -> None:
+    """Four digits had been printed of areas that are a tenth off."""
+    bar = robot_named("planar_two_cable")
+    held = [workspace_map(bar, *default_axes(bar, n), elastic=False) for n in (7, 41)]
+    coarse, fine = (one.size(one.feasible) for one in held)
+    low, high = held[0].size_between(held[0].feasible)
+    assert low < fine < high and abs(coarse / fine - 1.0) > 0.05
+    words = held[0].size_words(held[0].feasible)
+    assert words.endswith(f" m^2 ({low:.3g} to {high:.3g} at this spacing)")
+    assert held[0].as_json()["size_feasible_between"] == (low, high)
+    # a whole box is known to all digits
+    every = np.ones(held[1].margin.shape, bool)
+    assert held[1].size_between(every) == pytest.approx((held[1].size(every),) * 2)
+    assert "spacing" not in held[1].size_words(every)
+
+
+def test_why_there_is_no_edge_of_a_probability() -> None:
+    """Where no pose is that likely, all of them "can be held" had been the reason."""
+    found = workspace_map(robot_named("demobot_cogiro"), [0.4, 0.5], 0.25, [0.1], elastic=False)
+    none = np.zeros((0, 7))
+    for chance, reason in (
+        (0.5, "no pose of the grid is held"),
+        (0.99, "all poses of the grid are"),
+    ):
+        likely = replace(found, chance=np.full(found.margin.shape, chance, np.float32))
+        assert f"no edge was found: {reason}" in edge_line(likely, none, 1e-3, 0.95)
+    assert edge_line(found, none, 1e-3).endswith("all poses of the grid can be held")
 
 
 def test_effects_with_a_memory_have_no_elastic_map() -> None:
