@@ -105,8 +105,7 @@ def search_sets(
     else:
         classes = _about_listed(found, seen, by_sets, sizes, problem.robot, terms)
         said = seen.with_sure_ones(found, classes)
-    # what outweighs something unknown is there, however much of its worth that could take
-    outdone = _outdone(found, in_place) - set(() if said.imitated else said.sure)
+    said, outdone = _still_there(said, _outdone(found, in_place))
     return SetSearch(
         every.whole, found, every.catalogue,
         _less_unknown(classes.at_most(best.names, every.without), said, in_place, outdone),
@@ -177,6 +176,16 @@ def _varying(unknown: UnknownOdds, in_place: Imitated) -> tuple[Varying, ...]:
     if unknown.likeliest:
         return (unknown.likeliest,)
     return in_place.seen if in_place.chance else ()
+
+
+def _still_there(said: Judgement, outdone: Names) -> tuple[Judgement, Names]:
+    """The judgement without what is outdone, and what is, which may be listed no more.
+
+    What outweighs something unknown is there, however much of its worth that could take.
+    """
+    if said.imitated is None:
+        return said, outdone - set(said.sure)
+    return said.without(outdone), outdone
 
 
 def _outdone(found: ComparedSets, in_place: Imitated) -> Names:

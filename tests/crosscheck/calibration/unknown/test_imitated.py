@@ -13,10 +13,11 @@ from scipy import special, stats
 
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting, settle
 from crosscheck.calibration.judgement.probability import Classes
+from crosscheck.calibration.judgement.verdict import Judgement
 from crosscheck.calibration.linear_evidence.gram import ColumnGroup, gram_of
 from crosscheck.calibration.linear_evidence.priors import widths_of
 from crosscheck.calibration.noise.colour import WHITE, chain_of
-from crosscheck.calibration.search import _outdone, search_sets
+from crosscheck.calibration.search import _outdone, _still_there, search_sets
 from crosscheck.calibration.sets.linear_search import Scores, log_prior
 from crosscheck.calibration.unknown.field import FIELD_WIDTHS, UNKNOWN, field_of
 from crosscheck.calibration.unknown.imitated import (
@@ -336,3 +337,14 @@ def test_what_keeps_hardly_anything_of_its_worth_beside_something_unknown_is_not
     lag = Imitated(173.0, frozenset(), (Varying.LAG,), {"backlash": 11.4, "tilt": 171.0})
     assert _outdone(found, lag) == {"backlash"}
     assert _outdone(found, NOT_ASKED) == frozenset()
+
+
+def test_what_has_no_probability_left_is_not_listed() -> None:
+    """Beside winches that turn with others a platform's mass was, with a probability of zero."""
+    lag = Imitated(173.0, frozenset({"pulley_radius"}), (Varying.LAG,))
+    said = Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, ("backlash", "tilt"), 0.0, imitated=lag)
+    left, gone = _still_there(said, frozenset({"backlash"}))
+    assert left.sure == ("tilt",) and gone == {"backlash"}
+    # where nothing is in place of known effects, what outweighs the unknown stays
+    alone = Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, ("tilt",), 0.0)
+    assert _still_there(alone, frozenset({"tilt", "backlash"})) == (alone, {"backlash"})
