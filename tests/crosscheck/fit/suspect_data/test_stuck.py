@@ -55,5 +55,8 @@ def test_stretches_end_where_the_platform_moves_again() -> None:
     assert _stretches(read, there, 0.1) == [(3, 7)]
     # far less than the whole way is no standstill that could be told from backlash
     assert _stretches(read, there, 0.6) == []
+    # and begin where commands leave the place, and end where they are back: those rows are right
+    back = np.repeat([0.0, 1.0, 0.0], 4)[:, None] * [1.0, 0.0, 0.0]
+    assert _stretches(np.zeros_like(back), back, 0.1) == [(3, 7)]
     # readings of one place under one command
     assert _stretches(np.repeat(there, 5, axis=0), np.repeat(there, 5, axis=0), 0.1) == []
