@@ -99,7 +99,12 @@ class Addition(Result):
     @property
     def is_noise(self) -> bool:
         """Whether the residuals are noise, white or coloured."""
-        return self.whiteness.is_noise or self.coloured is not None
+        return self.whiteness.is_noise or (self.coloured is not None and not self.coloured.open)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the residuals may as well be noise, of unstated size, as something missing."""
+        return self.coloured is not None and self.coloured.open
 
     @property
     def terms(self) -> Terms:
@@ -141,6 +146,7 @@ class Addition(Result):
             "chi2_fall_a_block": self.fall[0],
             "chi2_fall_stderr": self.fall[1],
             "is_noise": self.is_noise,
+            "is_open": self.is_open,
             "coloured_noise": self.coloured,
             "residual": vars(self.whiteness),
             "warnings": list(self.warnings),

@@ -62,7 +62,7 @@ def weigh(
     own = np.isin([effect for effect, _key in best.terms.labels], list(names))
     white = whiteness_of(problem, best)
     coloured = None if white.is_noise else coloured_noise(problem, best.state, factor)
-    noise = white.is_noise or coloured is not None
+    noise = white.is_noise or (coloured is not None and not coloured.open)
     # standard errors are too small if the noise is larger than stated or autocorrelated, and also
     # if another effect is still missing
     moved = np.zeros(len(own)) if noise else moved_by_others(problem, best)

@@ -38,11 +38,11 @@ def why_not(found: Addition, forced: bool = False) -> str:
 
 
 def _left(found: Addition) -> str:
-    if found.is_noise:
-        if found.coloured is None:
-            return "the residuals are noise"
-        may = "may be" if found.coloured.open else "are"
+    if found.coloured is not None:
+        may = "may be" if found.is_open else "are"
         return f"the residuals {may} noise ({found.coloured.words})"
+    if found.is_noise:
+        return "the residuals are noise"
     return (
         f"the residuals are {found.whiteness.scale:.3g} times the noise: find what else is "
         "missing with crosscheck diagnose"

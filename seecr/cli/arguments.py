@@ -275,8 +275,10 @@ def check_count(option: str, poses: int) -> None:
         raise InputError(f"{option}: expected at most {_MOST_POSES:.0e} poses, got {poses:.1e}")
 
 
-def axes_of(texts: Sequence[str], robot: Robot) -> list[NDArray[np.float64]]:
-    """The axes of a grid.
+def axes_of(
+    texts: Sequence[str], robot: Robot, directions: NDArray[np.float64] | None = None
+) -> list[NDArray[np.float64]]:
+    """The axes of a grid, along x, y and z or along directions (3, 3) in rows.
 
     Raises:
         InputError: one that is none, or far outside the robot; more poses than can be solved.
@@ -285,13 +287,10 @@ def axes_of(texts: Sequence[str], robot: Robot) -> list[NDArray[np.float64]]:
 
     import numpy as np
 
-    from seecr.workspace.extent import own_directions
-
     axes = [_axis_of(text) for text in texts]
     total = math.prod(len(axis) for axis in axes)
     check_count("--grid", total)
     places = np.array([[axis[k] for axis in axes] for k in (0, -1)])
-    directions = own_directions(robot)
     check_places(places if directions is None else places @ directions, robot)
     return axes
 

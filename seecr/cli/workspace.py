@@ -124,10 +124,15 @@ def command(
     from seecr.report.map_slices import map_figure
     from seecr.report.maps import beyond_line, write_arrays
     from seecr.report.scalar_last import scalar_last
+    from seecr.workspace.extent import own_directions
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
-    axes = axes_of(grid, machine) if grid else list(default_axes(machine, None, turned or None))
+    axes = (
+        axes_of(grid, machine, own_directions(machine))
+        if grid
+        else list(default_axes(machine, None, turned or None))
+    )
     total = int(np.prod([len(axis) for axis in axes]))
     asked: dict[str, Any] = {
         "lowest": lowest, "highest": np.inf if highest is None else highest,

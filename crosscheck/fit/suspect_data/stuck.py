@@ -49,19 +49,30 @@ def _thinned(rows: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _stretches(read: Array, there: Array, least: float) -> list[tuple[int, int]]:
-    """First and last rows between which positions read (n, k) stay, and those predicted do not."""
+    """First and last rows between which positions read (n, k) stay, and those predicted do not.
+
+    Rows at either end at which the platform should be where it is read are left out.
+    """
+    apart, expected = _apart(read), _apart(there)
+    moved, should = (np.maximum.accumulate(table, axis=1) for table in (apart, expected))
+    still = (expected > least) & (moved < _STILL * should)
+    away = apart < _STILL * expected
     out, first = [], 0
     while first + _LEAST_ROWS < len(read):
-        moved, should = (
-            np.maximum.accumulate(np.linalg.norm(table[first:] - table[first], axis=1))
-            for table in (read, there)
-        )
-        still = np.flatnonzero((should > least) & (moved < _STILL * should))
-        if len(still) and still[-1] >= _LEAST_ROWS:
-            out.append((first, first + int(still[-1])))
-            first += int(still[-1])
+        if still[first].any():
+            start = int(np.argmax(away[first])) - 1
+            last = int(np.flatnonzero(still[first])[-1])
+            if last - start >= _LEAST_ROWS:
+                out.append((start, last))
+                first = last
         first += 1
     return out
+
+
+def _apart(places: Array) -> Array:
+    """(n, n) distances of places (n, k) from each other; zero from those before."""
+    squares = ((axis[:, None] - axis) ** 2 for axis in places.T)
+    return np.asarray(np.triu(np.sqrt(sum(squares))))
 
 
 def _said(problem: Problem, read: Array, there: Array, at: np.intp, rows: NDArray[np.intp]) -> str:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from made_data import measured
+from made_data import COGIRO, measured
 from made_diagnoses import POINTS, SIGMA, readings, robot
 
 import crosscheck.add.fit
 from crosscheck.add import add_effect, add_effects, weigh
+from crosscheck.comparison.residuals import compare
 from crosscheck.errors import CrosscheckError, UnsolvedError
 from crosscheck.fit.effects.gauss_newton import fit
 from crosscheck.fit.preparation.prepare import prepare
@@ -48,6 +50,22 @@ def test_autocorrelated_noise_is_no_effect_that_is_missing(shared_data: Path) ->
     null = shared_data / "labs" / "B01"
     found = add_effect(null / "robot.xml", null / "measured.csv", "stiffness")
     assert found.is_noise and found.p > 1e-4
+
+
+@pytest.mark.slow
+def test_smooth_noise_of_unstated_size_is_as_open_as_in_a_comparison() -> None:
+    """It was noise here, with the advice to compare, where compare saw what may be missing."""
+    cogiro = load_robot(COGIRO)
+    data = measured(cogiro, points=12, seed=5)
+    noise = np.random.default_rng(3).normal(size=(data.n_rows, 3))
+    for k in range(1, len(noise)):
+        noise[k] = 0.9 * noise[k - 1] + np.sqrt(1.0 - 0.9**2) * noise[k]
+    data = replace(
+        data, position=data.position + 1.2e-4 * noise, sigma=replace(data.sigma, position_m=None)
+    )
+    found = add_effect(cogiro, data, "platform_mass")
+    assert compare(cogiro, data, found.model).is_open
+    assert found.is_open and not found.is_noise and found.as_json()["is_open"]
 
 
 @pytest.mark.slow

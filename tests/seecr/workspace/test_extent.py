@@ -82,14 +82,19 @@ def test_a_line_has_a_grid_along_itself(climbs: bool) -> None:
 
 
 def test_the_floor_ends_an_oblique_grid_too() -> None:
-    other, _turn = turned(PLANAR, [0.4, 0, 0])
+    aside = np.array([0.0, 0.05, 0.0])
+    pose = PLANAR.reference_pose + np.concatenate([aside, np.zeros(4)])
+    there = replace(PLANAR, reference_pose=pose, exit_points=PLANAR.exit_points + aside)
+    other, _turn = turned(there, [0.4, 0, 0])
     other = replace(other, floor=-0.05)
     directions = own_directions(other)
     assert directions is not None
-    u, v, w = (axis[0] for axis in default_axes(other, 3))
+    axes = default_axes(other, 3)
+    u, v, w = (axis[0] for axis in axes)
     assert (np.array([u, v, w]) @ directions)[2] == pytest.approx(
         other.standing_height(other.reference_pose[3:])
     )
+    assert workspace_map(other, *axes, elastic=False).region.endswith(", down to the floor")
 
 
 def test_joints_that_only_turn_have_no_grid() -> None:

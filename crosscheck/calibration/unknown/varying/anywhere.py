@@ -141,7 +141,9 @@ def _by_others(lengths: Array, turned: Array) -> Iterator[Array]:
     others = [np.roll(turned, k, axis=1) for k in range(1, turned.shape[1])]
     if not others:
         return
-    alike = [np.sum(lengths * other, axis=1) for other in (others[0], others[-1])]
+    # of two cables each has the other as its only neighbour
+    beside = [others[0], others[-1]][: len(others)]
+    alike = [np.sum(lengths * other, axis=1) for other in beside]
     yield in_units_of_noise(np.stack(alike, axis=1))
     if turned.shape[1] <= _MOST_CABLES:
         yield in_units_of_noise(np.hstack([lengths * other for other in others]))

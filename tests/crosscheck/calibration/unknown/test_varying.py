@@ -12,6 +12,7 @@ from crosscheck.calibration.joint_fit.joint import JointFit, Setting, settle
 from crosscheck.calibration.linear_evidence.priors import widths_of
 from crosscheck.calibration.noise.colour import WHITE, chain_of
 from crosscheck.calibration.unknown.varying import SMOOTH, Varying, varying, varying_in_time
+from crosscheck.calibration.unknown.varying.anywhere import _by_others
 from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.fit.preparation.prepare import prepare
 from seecr.commands.loads import Loads
@@ -221,6 +222,15 @@ def test_winches_that_turn_with_their_neighbours(fit: tuple[Setting, JointFit]) 
     assert unexplained(each, signal) < 1e-3 < 0.1 < unexplained(alike, signal)
     # by their own turning: drums that are all of another size
     assert unexplained(alike, lengthened(setting, joint, LITTLE * change)) > 0.05
+
+
+@pytest.mark.parametrize(("cables", "neighbours"), [(1, 0), (2, 1), (3, 2), (8, 2)])
+def test_a_winch_has_no_neighbour_twice(cables: int, neighbours: int) -> None:
+    lengths, turned = np.random.default_rng(0).normal(size=(2, 80, cables))
+    every = list(_by_others(lengths, turned))
+    assert len(every) == (2 if neighbours else 0)
+    for columns, count in zip(every, (neighbours, cables * (cables - 1)), strict=False):
+        assert columns.shape[1] == np.linalg.matrix_rank(columns) == count
 
 
 def test_a_cable_that_touches_an_edge_is_too_short_somewhere(fit: tuple[Setting, JointFit]) -> None:

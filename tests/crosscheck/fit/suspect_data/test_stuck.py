@@ -32,11 +32,14 @@ def stuck_notes(data: Measurements) -> list[str]:
     return [note for note in prepare(ROBOT, data, Terms()).notes if "tracker stop" in note]
 
 
-def test_rows_after_a_crash_are_named(data: Measurements) -> None:
-    run = np.flatnonzero(data.run == data.run[0])
+@pytest.mark.parametrize("row", [0, -1], ids=["first run", "last run"])
+def test_rows_after_a_crash_are_named(data: Measurements, row: int) -> None:
+    run = np.flatnonzero(data.run == data.run[row])
     (note,) = stuck_notes(stops(data, run[2], run[-1]))
     at, first, last = data.line[[run[2], run[3], run[-1]]]
-    assert note.startswith(f"Lines {first} to {last}, run {data.run[0]}: the position stays within")
+    assert note.startswith(
+        f"Lines {first} to {last}, run {data.run[row]}: the position stays within"
+    )
     assert f"of that at line {at}, where" in note
 
 
@@ -55,5 +58,8 @@ def test_stretches_end_where_the_platform_moves_again() -> None:
     assert _stretches(read, there, 0.1) == [(3, 7)]
     # far less than the whole way is no standstill that could be told from backlash
     assert _stretches(read, there, 0.6) == []
+    # and begin where commands leave the place, and end where they are back: those rows are right
+    back = np.repeat([0.0, 1.0, 0.0], 4)[:, None] * [1.0, 0.0, 0.0]
+    assert _stretches(np.zeros_like(back), back, 0.1) == [(3, 7)]
     # readings of one place under one command
     assert _stretches(np.repeat(there, 5, axis=0), np.repeat(there, 5, axis=0), 0.1) == []
