@@ -247,11 +247,9 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
         x, y = 100 * p[some].mean(), 100 * true[some].mean()
         axes.plot([x, x], [100 * edges.low, 100 * edges.high], color="#0072B2", linewidth=1.5)
         axes.plot(x, y, "o", color="#0072B2")
-        right = x < 50
-        axes.annotate(f"{some.sum()}", (x, y), (8 if right else -8, -4), fontsize=9,
-                      textcoords="offset points", ha="left" if right else "right")  # fmt: skip
+        axes.annotate(f"{some.sum()}", (x, y), (8, -4), textcoords="offset points", fontsize=9)
     axes.set(xlabel="stated probability [%]", ylabel="true [% of these statements]",
-             xlim=(-3, 103), ylim=(-3, 103), aspect="equal")  # fmt: skip
+             xlim=(-3, 112), ylim=(-3, 103), aspect="equal")  # fmt: skip
     axes.legend(loc="upper left")
     figure.savefig(path)
 
