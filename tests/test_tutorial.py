@@ -3,20 +3,38 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from shown import Page, assert_shown
 
+import crosscheck.report
+
 TUTORIAL = Path(__file__).resolve().parents[1] / "docs" / "tutorial.md"
 
 
+@pytest.fixture
+def pages_of_diagnoses(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Of seven pages the two richest alone are drawn; the list has their names."""
+    drawn, write = list[str](), crosscheck.report.write_page
+
+    def only_diagnoses(found: Any, path: Path, made: Any) -> None:
+        if path.name == "diagnosis.html":
+            write(found, path, made)
+            drawn.append(path.name)
+
+    monkeypatch.setattr(crosscheck.report, "write_page", only_diagnoses)
+    return drawn
+
+
 @pytest.mark.slow
-def test_the_tutorial_works_as_written(tmp_path: Path) -> None:
+def test_the_tutorial_works_as_written(tmp_path: Path, pages_of_diagnoses: list[str]) -> None:
     page = Page(tmp_path)
     page.run(TUTORIAL.read_text(encoding="utf-8"))
     used = {tuple(command.split()[:2]) for command in page.commands}
     assert used >= {("crosscheck", c) for c in ("plan", "compare", "diagnose", "add", "twin")}
     assert ("seecr", "correct") in used
+    assert pages_of_diagnoses == 2 * ["diagnosis.html"]
 
 
 def test_what_was_not_printed_is_seen() -> None:

@@ -10,7 +10,7 @@ from tempfile import mkdtemp
 import numpy as np
 import pytest
 from made_data import measured, term
-from made_diagnoses import SIGMA
+from made_diagnoses import SIGMA, SLOW
 
 import crosscheck
 import seecr
@@ -35,7 +35,7 @@ def data_file() -> Path:
 
 @cache
 def found() -> crosscheck.Diagnosis:
-    return crosscheck.diagnose(ROBOT, data_file())
+    return crosscheck.diagnose(ROBOT, data_file(), exclude=SLOW)
 
 
 @cache
@@ -51,7 +51,7 @@ def result_of(name: str) -> Result:
         "Comparison": lambda: crosscheck.compare(str(ROBOT), str(data_file())),
         "Diagnosis": found,
         "Addition": lambda: crosscheck.add_effect(ROBOT, data_file(), "pulley_radius"),
-        "Calibrated": lambda: crosscheck.calibrate(ROBOT, data_file()),
+        "Calibrated": lambda: crosscheck.calibrate(ROBOT, data_file(), exclude=SLOW),
         "Plan": lambda: crosscheck.make_plan(ROBOT, data_file()),
         "Twin": lambda: crosscheck.make_twin(ROBOT, 1, points=4),
         "CaseResult": lambda: crosscheck.run_suite([case()]).results[0],
@@ -127,7 +127,7 @@ def test_what_was_found_is_the_next_model() -> None:
     )
     for model in (path, str(path), seecr.load_model(path, robot)):
         assert crosscheck.compare(ROBOT, data_file(), model).rms == left.rms
-    assert crosscheck.diagnose(ROBOT, data_file(), path).missing == ()
+    assert crosscheck.diagnose(ROBOT, data_file(), path, exclude=SLOW).missing == ()
 
 
 def test_what_was_fitted_is_a_model_to_keep(tmp_path: Path) -> None:

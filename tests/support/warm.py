@@ -27,6 +27,7 @@ def compile_all() -> None:
     """Each compiled function has one signature."""
     compile_rests()
     compile_margins()
+    compile_lengths()
 
 
 def compile_rests() -> None:
@@ -53,6 +54,19 @@ def compile_margins() -> None:
     can_balance(few[None], one, 0.0 * few, 2.0 * few, one[0])
     innermost(few[None], one, 0.0 * few, 2.0 * few, one[0])
     compile_turning()
+
+
+def compile_lengths() -> None:
+    """Lengths for poses, one of them out of reach, of cables that hang or stick; a softest way."""
+    robot = seecr.load_robot(seecr.model_path("planar_vertical"))
+    poses = np.tile(robot.reference_pose, (2, 1))
+    poses[1, 2] += 9.0
+    heavy = seecr.Term.of(robot, "cable_weight", weight_N_per_m=1e-3)
+    sticking = seecr.Term.of(robot, "exit_friction", friction=0.1, length_m=1.0)
+    for effects in ([], [heavy], [sticking]):
+        seecr.correct(robot, poses, effects=effects)
+    free = seecr.load_robot(seecr.model_path("demobot_parallel"))
+    _ = seecr.solve(free, free.reference_pose).softest_direction
 
 
 def compile_turning() -> None:

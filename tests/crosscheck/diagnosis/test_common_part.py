@@ -35,7 +35,7 @@ def diagnosed(gains: np.ndarray, only: tuple[str, ...], far: float = 0.015) -> D
         hidden.append(term(robot, EXITS, **errors))
         offsets = {f"offset_{i}_m": size * rng.normal() for i in range(1, 5)}
         hidden.append(term(robot, OFFSETS, **offsets))
-    data = measured(robot, hidden, points=36, sigma=SIGMA)
+    data = measured(robot, hidden, points=18, sigma=SIGMA)
     return diagnose(robot, data, only=only)
 
 

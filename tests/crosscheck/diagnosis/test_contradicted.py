@@ -43,7 +43,7 @@ def test_fits_from_nearby_values_do_not_move_fixed_ones() -> None:
 
 
 def test_fixed_values_that_the_data_contradict_are_doubted() -> None:
-    found = diagnose(ROBOT, DATA, Terms([WRONG.fixed()]))
+    found = diagnose(ROBOT, DATA, Terms([WRONG.fixed()]), exclude=made.SLOW)
     assert found.search is not None
     for step in found.search.steps:
         assert step.fit.terms["centre_of_mass"].vector.tolist() == WRONG.vector.tolist()
@@ -57,7 +57,7 @@ def test_fixed_values_that_the_data_contradict_are_doubted() -> None:
 def test_only_values_that_are_known_are_doubted(known: bool) -> None:
     """What was measured to 0.1 mm is doubted, where the data say 15 mm; what is free is fitted."""
     model = WRONG.measured(shift_x_m=(0.005, 1e-4)) if known else WRONG
-    found = diagnose(ROBOT, DATA, Terms([model]))
+    found = diagnose(ROBOT, DATA, Terms([model]), exclude=made.SLOW)
     notes = contradicted_values(found)
     assert list(notes) == ["centre_of_mass"] * known
     told = " ".join(notes.values())
@@ -94,15 +94,15 @@ def test_readings_of_values_count_in_the_evidence_beside_them() -> None:
     readings = zip(read.tolist(), (0.01 * scale).tolist(), strict=True)
     model = plain.measured(**dict(zip(plain.layout.names, readings, strict=True)))
     mass = term(ROBOT, "platform_mass", added_kg=0.1)
-    found = diagnose(ROBOT, measured(ROBOT, [mass, true], points=3, seed=3), Terms([model]))
+    data = measured(ROBOT, [mass, true], points=3, seed=3)
+    found = diagnose(ROBOT, data, Terms([model]), exclude=made.SLOW)
     assert found.missing and not list(contradicted_values(found))
 
 
 def test_values_that_the_data_confirm_are_not_doubted() -> None:
     mass = term(ROBOT, "platform_mass", added_kg=0.1)
-    found = diagnose(
-        ROBOT, measured(ROBOT, [HIDDEN, mass], points=4, seed=3), Terms([HIDDEN.fixed()])
-    )
+    data = measured(ROBOT, [HIDDEN, mass], points=4, seed=3)
+    found = diagnose(ROBOT, data, Terms([HIDDEN.fixed()]), exclude=made.SLOW)
     assert [one.effect for one in found.missing] and not list(contradicted_values(found))
 
 

@@ -24,6 +24,8 @@ from seecr.pose import transform_points
 from seecr.report.scalar_last import scalar_last
 
 PLACE = ["0.17", "0.25", "0.1"]
+# A figure and a recording take most of the time of a command: where nobody looks at them, none.
+BARE = ("--figure", "none", "--no-recording")
 
 
 def run(*args: str | Path) -> Result:
@@ -50,7 +52,7 @@ def test_the_papers_points_are_printed(name: str) -> None:
 
 def test_a_sweep_tells_the_zones_of_slack_cables_and_the_papers_points(tmp_path: Path) -> None:
     """Figs 7, 9 and 11 of the paper, from the command line alone."""
-    way = ("--line", "0.17", "0", "0.2", "0.63", "0", "0.2", "--out", tmp_path / "v")
+    way = ("--line", "0.17", "0", "0.2", "0.63", "0", "0.2", *BARE, "--out", tmp_path / "v")
     got = run("sweep", "planar_vertical", *way)
     lines = got.output.splitlines()
     at = lines.index(next(x for x in lines if x.startswith("zones of slack cables on the way")))
@@ -83,7 +85,7 @@ def test_a_sweep_tells_the_zones_of_slack_cables_and_the_papers_points(tmp_path:
     assert lines[at : at + 6] == [
         x for x in followed.splitlines() if x.startswith("zones") or " mm wide: " in x
     ]
-    eight = ("--line", "0.17", "0.25", "0.1", "0.63", "0.25", "0.1", "--json", "--out", tmp_path)
+    eight = ("--line", *PLACE, "0.63", "0.25", "0.1", "--json", *BARE, "--out", tmp_path)
     document = json.loads(run("sweep", "demobot_parallel", *eight).stdout)
     assert [zone["slack_cables"] for zone in document["zones"]] == [4, 2, 0, 2, 4]
     assert [round(1e3 * zone["width_m"], 1) for zone in document["zones"][:2]] == [141.3, 15.5]
@@ -94,7 +96,8 @@ def test_a_sweep_of_a_bar_is_compared_with_the_manifold(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Figs 3 and 4 of the paper."""
-    line = ("--line", "0.2", "0", "0.5", "0.5", "0", "0.5", "--count", "3", "--out", tmp_path / "v")
+    ends = ("--line", "0.2", "0", "0.5", "0.5", "0", "0.5", "--count", "3")
+    line = (*ends, *BARE, "--out", tmp_path / "v")
     bar = run("sweep", "planar_two_cable", *line).output
     assert "the bar is tilted by -34.86 to +0.00 deg" in bar
     assert "to rest where it was commanded to it would tilt by -49.61 to +0.00 deg" in bar
@@ -103,7 +106,8 @@ def test_a_sweep_of_a_bar_is_compared_with_the_manifold(
     assert first["tilt_rad"] == pytest.approx(-first["rotation_rad"][1], abs=1e-12)
     assert first["manifold_there_rad"] == pytest.approx(first["tilt_rad"], abs=1e-9)
     (tmp_path / "len.csv").write_text("length_1_m,length_2_m\n0.6,0.7\n")
-    out = run("sweep", "planar_two_cable", tmp_path / "len.csv", "--out", tmp_path / "l").output
+    told = ("sweep", "planar_two_cable", tmp_path / "len.csv", *BARE, "--out", tmp_path / "l")
+    out = run(*told).output
     assert "the bar is tilted by" in out and "where it was commanded to" not in out
     monkeypatch.setattr("seecr.cli.sweep._MOST_TILTS", 2)
     many = run("sweep", "planar_two_cable", *line).output
@@ -112,17 +116,18 @@ def test_a_sweep_of_a_bar_is_compared_with_the_manifold(
 
 
 def test_columns_of_a_grid_are_ways_of_their_own_and_many_zones_are_counted(tmp_path: Path) -> None:
-    grid = ("--grid", "0.17:0.63:8", "0.25", "0.1:0.2:3", "--out", tmp_path)
+    grid = ("--grid", "0.17:0.63:8", "0.25", "0.1:0.2:3", *BARE, "--out", tmp_path)
     text = run("sweep", "demobot_parallel", *grid).output
     zones = json.loads((tmp_path / "sweep.json").read_text())["zones"]
     assert {zone["run"] for zone in zones} == set(range(8)) and len(zones) == 10
     assert text.count(" mm wide: ") == 10
-    finer = ("--grid", "0.17:0.63:16", "0.25", "0.1:0.2:3", "--out", tmp_path)
+    finer = ("--grid", "0.17:0.63:16", "0.25", "0.1:0.2:3", *BARE, "--out", tmp_path)
     text = run("sweep", "demobot_parallel", *finer).output
     zones = json.loads((tmp_path / "sweep.json").read_text())["zones"]
     assert f"{len(zones)} zones of slack cables, with their widths, in sweep.json" in text
     assert " mm wide: " not in text
-    one = run("sweep", "demobot_parallel", "--grid", "0.2", "0.25", "0.1", "--out", tmp_path)
+    single = ("--grid", "0.2", "0.25", "0.1", *BARE, "--out", tmp_path)
+    one = run("sweep", "demobot_parallel", *single)
     assert json.loads((tmp_path / "sweep.json").read_text())["zones"] is None
     assert "zones" not in one.output and "whole way" not in one.output
 
@@ -131,7 +136,7 @@ def test_too_many_changes_are_said_and_not_searched(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("seecr.cli.sweep._MOST_CHANGES", 3)
-    way = ("--line", "0.17", "0", "0.2", "0.63", "0", "0.2", "--out", tmp_path)
+    way = ("--line", "0.17", "0", "0.2", "0.63", "0", "0.2", *BARE, "--out", tmp_path)
     text = run("sweep", "planar_vertical", *way).output
     assert "Zones of slack cables are not computed: more than 3 poses differ from the one" in text
     assert json.loads((tmp_path / "sweep.json").read_text())["zones"] is None
@@ -206,6 +211,7 @@ def test_a_bar_is_told_what_is_done(command: str, tmp_path: Path, monkeypatch: A
     poses = tmp_path / "poses.csv"
     poses.write_text("cmd_x_m,cmd_y_m,cmd_z_m\n0.4,0.25,0.2\n0.45,0.25,0.2\n")
     given = ("0.4", "0.25", "0.2") if command == "pose" else (poses, "--out", tmp_path / "out")
+    given += BARE if command == "sweep" else ()
     got = run(command, "demobot_cogiro", *given)
     assert got.exit_code == 0, got.output
     assert said[-1][0] in ("solved", "corrected")
@@ -408,7 +414,8 @@ def test_map_writes_its_files_or_says_why_not(tmp_path: Path) -> None:
     result = run("map", "demobot_cogiro", *grid, "--out", out, "--json")
     assert result.exit_code == 0 and json.loads(result.stdout)["feasible"] == 6
     assert {file.name for file in out.iterdir()} == {"map.json", "map.npz", "map.png", "map.rrd"}
-    edge = run("map", "planar_vertical", "--edge", "0.001", "--no-elastic", "--out", out)
+    quick = ("--no-recording", "--out", out)
+    edge = run("map", "planar_vertical", "--edge", "0.001", "--no-elastic", *quick)
     places = json.loads((out / "map.json").read_text())["edge"]["places"]
     assert (
         edge.exit_code == 0
@@ -419,15 +426,15 @@ def test_map_writes_its_files_or_says_why_not(tmp_path: Path) -> None:
     assert np.load(out / "map.npz")["edge"].shape == (places, 7)
     endless = run("map", "demobot_cogiro", "--edge", "nan", "--out", out)
     assert endless.exit_code == 2 and "'--edge': nan is not a finite number" in endless.output
-    none = run("map", "demobot_cogiro", *grid, "--edge", "0.001", "--no-elastic", "--out", out)
+    none = run("map", "demobot_cogiro", *grid, "--edge", "0.001", "--no-elastic", *quick)
     assert (
         none.exit_code == 0
         and "no edge was found: all poses of the grid can be held" in none.output
     )
     assert "no figure" not in none.output
-    line = run("map", "demobot_cogiro", "--grid", "0.3:0.5:3", "0.2", "0.1", "--out", out)
+    line = run("map", "demobot_cogiro", "--grid", "0.3:0.5:3", "0.2", "0.1", *quick)
     assert "no figure: the grid has more than one value along fewer than two axes" in line.output
-    soft = run("map", "demobot_cogiro", *grid, "--cable", "0.001", "--out", out)
+    soft = run("map", "demobot_cogiro", *grid, "--cable", "0.001", *BARE, "--out", out)
     assert "elastic robot: at rest at 0 of 6 commands" in soft.output and soft.exit_code == 3
     assert json.loads((out / "map.json").read_text())["exit_status"] == 3
     lost = run("map", "demobot_cogiro", *grid, "--lowest", "90", "--out", tmp_path / "lost")
@@ -481,17 +488,16 @@ def test_answers_beyond_the_data_of_a_model_are_told(tmp_path: Path) -> None:
         "position_m = [[0.3, 0.2, 0.1], [0.5, 0.3, 0.2]]\ntension_N = [0.2, 1.5]\n"
     )
     quiet = ("--model", model, "--out", tmp_path / "out")
-    bare = ("--figure", "none", "--no-recording")
     poses = tmp_path / "poses.csv"
     poses.write_text("cmd_x_m,cmd_y_m,cmd_z_m\n0.4,0.25,0.15\n0.17,0.25,0.1\n")
     beyond = "beyond the data that the model was fitted to"
     robot = "demobot_cogiro"
     for args, words in (
         (("pose", robot, *PLACE, "--alone", *quiet), f"{beyond}: up to"),
-        (("sweep", robot, poses, *quiet, *bare), f"{beyond} at 1 of 2 poses"),
+        (("sweep", robot, poses, *quiet, *BARE), f"{beyond} at 1 of 2 poses"),
         (("correct", robot, poses, *quiet), f"{beyond} at 1 of 2 poses"),
         (
-            ("map", robot, "--grid", "0.1:0.7:3", "0.25", "0.15", "--no-elastic", *quiet, *bare),
+            ("map", robot, "--grid", "0.1:0.7:3", "0.25", "0.15", "--no-elastic", *quiet, *BARE),
             f"{beyond}: 2 poses of those that can be held are up to 200 mm outside",
         ),
     ):
@@ -545,7 +551,7 @@ def test_incomplete_wanted_poses_are_read_again_as_they_were_stated(tmp_path: Pa
     lengths = ",".join(repr(float(one)) for one in robot.rest_lengths)
     given, out = tmp_path / "given.csv", tmp_path / "out"
     given.write_text(f"want_x_m,want_z_m,{','.join(names)}\n{x!r},,{lengths}\n,,{lengths}\n")
-    swept = run("sweep", "planar_vertical", given, "--no-recording", "--out", out, "--json")
+    swept = run("sweep", "planar_vertical", given, *BARE, "--out", out, "--json")
     assert swept.exit_code == 0, swept.output
     said = json.loads(swept.stdout)
     assert any("no deviations are given" in note for note in said["notes"])
@@ -580,7 +586,7 @@ def test_told_lengths_and_loads_are_read_again_as_they_were_given(tmp_path: Path
     np.testing.assert_array_equal(again.loads.wrench, first.loads.wrench)
     # of an older list that was told nothing is left beside one that is not
     line = ["--line", "0.4", "0", "0.2", "0.5", "0", "0.2"]
-    assert run("sweep", "planar_vertical", *line, "--no-recording", "--out", out).exit_code == 0
+    assert run("sweep", "planar_vertical", *line, *BARE, "--out", out).exit_code == 0
     assert not (out / "sweep.toml").exists()
 
 

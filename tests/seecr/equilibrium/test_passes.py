@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term, effect_named, layout_of
 from seecr.equilibrium import passes
@@ -24,13 +25,19 @@ from seecr.statics.solution import Solution
 from seecr.statics.tables import take
 
 
-@pytest.mark.slow
-def test_the_pass_between_the_two_rests_of_the_tilted_command() -> None:
+@cache
+def tilted() -> tuple[Robot, np.ndarray, Solution, Solution, Solution]:
+    """A robot, a command with two rests, its own, both by energy, and the other one."""
     robot = load_robot(model_path("demobot_parallel"))
     pose = np.array([0.351, 0.216, 0.109, 0.943, 0.163, -0.288, -0.038])
     pose[3:] /= np.linalg.norm(pose[3:])
     own, every = solve(robot, pose), equilibria(robot, pose)
-    other = every.rows(elsewhere(own, every))
+    return robot, pose, own, every, every.rows(elsewhere(own, every))
+
+
+@pytest.mark.slow
+def test_the_pass_between_the_two_rests_of_the_tilted_command() -> None:
+    robot, pose, own, every, other = tilted()
     (way,) = barriers(own, other)
     assert way.exact and not way.twisted
     assert way.energy == pytest.approx(6.80e-5, rel=1e-3)
@@ -66,9 +73,7 @@ def test_the_pass_between_the_two_rests_of_the_tilted_command() -> None:
 
 @pytest.mark.slow
 def test_cables_that_stiffen_have_energies_and_a_pass_between_rests() -> None:
-    robot = load_robot(model_path("demobot_parallel"))
-    pose = np.array([0.351, 0.216, 0.109, 0.943, 0.163, -0.288, -0.038])
-    pose[3:] /= np.linalg.norm(pose[3:])
+    robot, pose, *_rests = tilted()
     for part, apart in ((1e-3, 2e-3), (1.0, 1.0)):
         stiffer = layout_of(effect_named("nonlinear_elasticity"), robot)
         model = [Term(stiffer, part * stiffer.scale)]
@@ -97,11 +102,8 @@ def test_mirrored_rests_are_twisted_and_as_far_up() -> None:
 @pytest.mark.slow
 def test_where_there_is_no_energy_no_way_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     """Hundreds of rounds ended with the highest of numbers that were none."""
-    robot = load_robot(model_path("demobot_parallel"))
-    pose = np.array([0.351, 0.216, 0.109, 0.943, 0.163, -0.288, -0.038])
-    pose[3:] /= np.linalg.norm(pose[3:])
-    own, every = solve(robot, pose), equilibria(robot, pose)
-    other = every.rows(elsewhere(own, every))
+    _robot, _pose, own, _every, other = tilted()
+    own, other = own.rows([0]), other.rows([0])  # which are changed below
     monkeypatch.setattr(passes, "strings", pytest.fail)
     for energy in (own, other):
         energy.energy[:] = np.nan
@@ -182,11 +184,7 @@ def test_full_turns_under_a_moment_are_not_counted() -> None:
 
 
 def test_the_work_of_a_moment_that_depends_on_the_way_is_said_in_words() -> None:
-    robot = load_robot(model_path("demobot_parallel"))
-    pose = np.array([0.351, 0.216, 0.109, 0.943, 0.163, -0.288, -0.038])
-    pose[3:] /= np.linalg.norm(pose[3:])
-    other = solve(robot, pose, others=True).others
-    assert other is not None
+    robot, pose, *_rests = tilted()
     for acting, why in (
         ([Term.of(robot, "external_wrench", moment_y_Nm=1e-4)], "what a moment does on a platform"),
         ([Term.of(robot, "hysteresis", amplitude_N=0.1)], "what its cables take"),
