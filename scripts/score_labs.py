@@ -17,7 +17,7 @@ import json
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -96,8 +96,8 @@ def asked(folder: Path, out: Path, name: str) -> Lab:
     true = out / "true.toml"
     terms = true_terms(answer["values"], load_robot(robot))
     true.write_text(as_toml(terms), encoding="utf-8")
-    there = [_elsewhere(case, out, one) for one in (true, model, None)]
-    return Lab(name, answer, found, rows, spent, *(_over(one, there[0]) for one in there[1:]))
+    best, found_there, plain = (_elsewhere(case, out, one) for one in (true, model, None))
+    return replace(lab, ratio=_over(found_there, best), plain=_over(plain, best))
 
 
 def _elsewhere(case: Path, out: Path, model: Path | None) -> dict[str, float]:
@@ -114,25 +114,41 @@ def _over(errors: dict[str, float], true: dict[str, float]) -> dict[str, float]:
 
 def line(lab: Lab) -> str:
     """A case as a line of the terminal."""
-    return f"{lab.name}: " + "; ".join(filter(None, (*_cells(lab), f"{lab.seconds:.1f} s")))
+    return f"{lab.name}: {'; '.join(filter(None, _cells(lab)))}; {lab.seconds:.1f} s"
 
 
 def row(lab: Lab) -> str:
-    """A case as a row of a table."""
-    return f"| {lab.name} | {' | '.join(_cells(lab))} | {lab.seconds:.0f} s |"
+    """A case as a row of the table in docs/diagnosis.md."""
+    return f"| {lab.name} | {' | '.join(cell or _NONE for cell in _cells(lab))} |"
 
 
 def _cells(lab: Lab) -> tuple[str, ...]:
-    hidden = ", ".join(lab.answer["hidden"])
-    options = ", ".join(f"{key} {value}" for key, value in lab.answer["options"].items())
-    named = ", ".join(" or ".join(names) for names in lab.named) or "none"
-    plain = ", ".join(f"{value:.2f}" for value in lab.plain.values())
-    ratio = ", ".join(f"{value:.2f}" for value in lab.ratio.values())
-    return hidden, options, f"`{lab.verdict}`", named, plain, ratio
+    hidden = lab.answer["hidden"]
+    options = [_OPTIONS[key].get(value, "") for key, value in lab.answer["options"].items()]
+    return (
+        _HIDDEN.get(hidden[0]) or ", ".join(f"`{name}`" for name in hidden),
+        ", ".join(filter(None, options)),
+        f"`{lab.verdict}`",
+        ", ".join(" or ".join(f"`{name}`" for name in names) for names in lab.named),
+        ", ".join(f"{value:.2f}" for value in lab.plain.values()),
+        ", ".join(f"{value:.2f}" for value in lab.ratio.values()),
+    )
 
 
-HEADER = (
-    "| case | hidden | options | verdict | named | ratio without effects | with the model | time |"
+_NONE = "–"
+_HIDDEN = {"null": "nothing", "sink": "all tolerances"}
+# What was done to readings and noise, in words.
+_OPTIONS: dict[str, dict[Any, str]] = {
+    "noise": {"ar1": "autocorrelated", "outliers": "outliers", "t3": "heavy tails"},
+    "stated": {0: "not stated", 0.5: "half stated", 2: "twice stated"},
+    "read": {"position": "positions alone"},
+    "tensions": {True: "tensions too"},
+    "n": {5: "30 rows"},
+    "rich": {},
+}
+_HEADER = (
+    "| case | hidden | readings and noise | verdict | listed or sure | error ratio without effects "
+    "| with the model found |"
 )
 
 
@@ -144,7 +160,7 @@ def main() -> None:
     chosen = parser.parse_args()
     answers = json.loads((chosen.folder / "answers.json").read_text(encoding="utf-8"))
     if chosen.markdown:
-        print(HEADER, "|---" * HEADER.count(" | ") + "|---|", sep="\n")
+        print(_HEADER, "|---" * (_HEADER.count("|") - 1) + "|", sep="\n")
     for name in chosen.cases or sorted(answers):
         with tempfile.TemporaryDirectory() as out:
             lab = asked(chosen.folder, Path(out), name)

@@ -175,9 +175,13 @@ def _searched(robot: Robot, poses: Array, values: Array, off: Array) -> Array:
 
 def _far(robot: Robot, poses: Array, values: Array) -> Array:
     """How far (n,) [robot's length, rad] joint values are from bringing the platform to poses."""
-    miss = np.abs(pose_difference(poses, pose_of_values(robot, values)[0]))
-    far = (miss / np.repeat([robot.length, 1.0], 3)).max(axis=1)
-    return np.where(np.isnan(far), np.inf, far)
+    return np.asarray(_missed(robot, poses, pose_of_values(robot, values)[0]).max(axis=1))
+
+
+def _missed(robot: Robot, poses: Array, reached: Array) -> Array:
+    """How far (n, 6) [robot's length, rad] parts of poses are off; infinite without a number."""
+    miss = np.abs(pose_difference(poses, reached)) / np.repeat([robot.length, 1.0], 3)
+    return np.where(np.isnan(miss), np.inf, miss)
 
 
 def _by_newton(robot: Robot, poses: Array, values: Array) -> Array:
@@ -212,8 +216,7 @@ def reachable(robot: Robot, poses: Array) -> Array:
 
 def _off_joints(robot: Robot, poses: Array, reached: Array) -> tuple[int, str] | None:
     """The row farthest from what the joints can reach, and its distance; None if none is."""
-    miss = np.abs(pose_difference(poses, reached)) / np.repeat([robot.length, 1.0], 3)
-    miss = np.where(np.isnan(miss), np.inf, miss)
+    miss = _missed(robot, poses, reached)
     if not np.any(miss > _OFF_MANIFOLD):
         return None
     row, part = np.unravel_index(np.argmax(miss), miss.shape)
