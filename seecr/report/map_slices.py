@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -37,6 +38,8 @@ _LARGE = 5.0
 _PANEL, _ROOM, _LOWEST, _HIGHEST = 2.4, 0.35, 1.7, 2.3
 # Letters of a title that fit into an inch.
 _LETTERS = 13
+# A vector in such a title, which stays on one line.
+_UNBROKEN = re.compile(r"\([-\d.e, ]+\)")
 # Logarithmic colours end where so much of what can be held is softer, or stiffer.
 _ENDS = (0.05, 0.95)
 # Their ends are at least so far apart, as a ratio: otherwise they would show rounding.
@@ -98,9 +101,13 @@ def map_figure(
             ax.set_title(f"{found.axis_names[cut.across]} = {at:.4g} {cut.unit}")
         for ax in axes[-1]:
             ax.set_xlabel(f"{found.axis_names[cut.wide]} [{cut.unit}]")
-        words = "; ".join(_words(cut, edge, at_least))
+        words = _UNBROKEN.sub(_on_one_line, "; ".join(_words(cut, edge, at_least)))
         title = [found.robot.name, *textwrap.wrap(words, int(_LETTERS * size[0]))]
         axes[0, 0].figure.suptitle("\n".join(title), fontsize=9)
+
+
+def _on_one_line(vector: re.Match[str]) -> str:
+    return vector[0].replace(" ", "\N{NO-BREAK SPACE}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -230,12 +230,12 @@ def direction_words(robot: Robot, direction: Array) -> str:
 
 
 def _axis_words(axis: Array, joints: Sequence[Joint]) -> str:
-    """The letters of a unit vector, or the name of the joint whose axis it is."""
+    """The letters of a unit vector, or the joint whose oblique axis it is, which may be named x."""
     letters = [a for a, v in zip("xyz", axis, strict=True) if abs(v) > 2 * _PART]
     if len(letters) > 1:
         for joint in joints:
             if np.linalg.norm(np.cross(joint.axis, axis)) < _PART:
-                return joint.name
+                return f"joint {joint.name}"
     return " and ".join(letters)
 
 

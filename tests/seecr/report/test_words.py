@@ -101,7 +101,7 @@ def test_joints_move_along_slides_and_turn_about_hinges() -> None:
     askew = replace(slides[0], axis=np.array([0.6, 0.0, 0.8]), name="ramp")
     ramp = replace(robot, joints=(askew, *robot.joints[1:]))
     up = np.array([-0.6, 0.0, -0.8, 0.0, 0.0, 0.0])
-    assert direction_words(ramp, up) == "move along ramp"
+    assert direction_words(ramp, up) == "move along joint ramp"
     assert direction_words(ramp, sloping) == "move along x and z"
 
 
