@@ -55,9 +55,10 @@ def _brought_back(
     This occurs with fewer cables than degrees of freedom. Tried are those with small residuals that
     differ in rotation, and an even selection of all.
     """
-    many = np.bincount(candidates.rows[held], minlength=len(problem.wanted))
+    rows, place = np.unique(candidates.rows, return_inverse=True)
+    many = np.bincount(place[held], minlength=len(rows))
     chosen: list[int] = []
-    for row in np.flatnonzero(many < most):
+    for row in rows[many < most]:
         mine = np.flatnonzero(~held & (candidates.rows == row))
         lack = problem.lack(candidates.away[mine], candidates.rows[mine])[0]
         best = mine[np.argsort(lack)[: _LEAST * most]]

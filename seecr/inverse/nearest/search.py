@@ -23,6 +23,8 @@ from seecr.pose import Array
 
 # Searches per row from the sample, and from the solutions of other rows.
 _FIRST, _SHARED = 14, 4
+# Rows searched at once: each takes up to 8 MB meanwhile.
+_AT_ONCE = 64
 # Firm poses are sought if a search ended nearer by this part, but at an unstable pose.
 _NEARER = 0.01
 # Step towards the wanted pose [of the distance], and the part of it that a local minimum may gain.
@@ -108,11 +110,12 @@ class Best:
 
     def search(self, candidates: Candidates, most: int) -> None:
         """Search from the best candidates, ``most`` of each row."""
-        spots = screened(self.problem, candidates, most)
-        if spots.tensions.shape[1] < self.problem.robot.n_dof:
-            # few poses are held at all, and from stable ones searches may go on to unstable ones
-            self.keep(spots)
-        self.keep(inward(self.problem, spots))
+        for lot in candidates.in_lots(_AT_ONCE):
+            spots = screened(self.problem, lot, most)
+            if spots.tensions.shape[1] < self.problem.robot.n_dof:
+                # few poses are held at all; from stable ones searches may go on to unstable ones
+                self.keep(spots)
+            self.keep(inward(self.problem, spots))
 
     def keep(self, other: Spots) -> None:
         """Take results that are nearer, and stable ones rather than unstable ones."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +37,12 @@ class Candidates:
         return Candidates(
             np.concatenate([self.away, other.away]), np.concatenate([self.rows, other.rows])
         )
+
+    def in_lots(self, count: int) -> Iterator[Candidates]:
+        """The same, those of ``count`` rows at a time."""
+        lots = np.searchsorted(np.unique(self.rows), self.rows) // count
+        for lot in range(lots.max(initial=-1) + 1):
+            yield Candidates(self.away[lots == lot], self.rows[lots == lot])
 
 
 def sample(problem: Reaching) -> Array:

@@ -15,8 +15,9 @@ from seecr.errors import InputError
 from seecr.inverse.correction import correct
 from seecr.inverse.nearest import search
 from seecr.inverse.nearest.motion import PlatformMotion
-from seecr.inverse.nearest.problem import Curved, Reaching
+from seecr.inverse.nearest.problem import Curved, Reaching, Spots
 from seecr.inverse.nearest.screen import spread
+from seecr.inverse.nearest.seeds import Candidates
 from seecr.planar import bar_equilibria
 from seecr.pose import pose_difference, transform_points
 from seecr.prediction.model import load_model
@@ -298,3 +299,27 @@ def test_where_a_cable_would_have_no_length_there_is_no_answer() -> None:
     found = correct(robot, wanted, effects=[offset], lowest=0.2, highest=40.0)
     assert found.held.all() and found.found.tolist() == [True, False]
     assert np.isnan(found.lengths[1]).all() and found.reached.tolist() == [True, False]
+
+
+def test_poses_searched_in_lots_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """2,000 poses at once took 0.7 GB, and with heavy cables 15 GB."""
+    robot = load_robot(model_path("demobot_parallel"))
+    wanted = np.zeros((7, 7))
+    wanted[:, 0], wanted[:, 1], wanted[:, 2] = np.linspace(0.54, 0.62, 7), 0.25, 0.1
+    wanted[:, 3] = 1.0
+    whole = correct(robot, wanted)
+    lots: list[list[int]] = []
+    screened = search.screened
+
+    def noted(problem: Reaching, candidates: Candidates, most: int) -> Spots:
+        lots.append(sorted(set(candidates.rows.tolist())))
+        return screened(problem, candidates, most)
+
+    monkeypatch.setattr(search, "screened", noted)
+    monkeypatch.setattr(search, "_AT_ONCE", 3)
+    parts = correct(robot, wanted)
+    assert (~whole.held).sum() == 7 and lots[:3] == [[0, 1, 2], [3, 4, 5], [6]]
+    unit = np.repeat([1.0, robot.length], 3)
+    far = [np.linalg.norm(pose_difference(c.aimed, wanted) * unit, axis=1) for c in (whole, parts)]
+    assert far[1] == pytest.approx(far[0], rel=1e-3)
+    assert parts.found.all() and parts.solution.converged.all()
