@@ -227,7 +227,7 @@ def test_a_seed_makes_the_same_twin_again():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 4, 7])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.sweep) for k in (4, 7))])
 def test_poses_are_the_same_with_and_without_tensions(seed):
     alone, both = (make_twin(COGIRO, seed, points=POINTS, tensions=read) for read in (False, True))
     np.testing.assert_array_equal(alone.measured.position, both.measured.position)
