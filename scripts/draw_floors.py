@@ -20,10 +20,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / "docs" / "pictures" / "floors.svg"
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "support")]
 
 from layered import Layout, arrange  # noqa: E402
-from test_imports import FLOORS, imports, modules, name_of, place  # noqa: E402
+from sources import imports, modules, name_of  # noqa: E402
+from test_imports import FLOORS, place  # noqa: E402
 
 PACKAGES = ("crosscheck", "seecr")
 """From the upper to the lower one."""

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from test_imports import modules, name_of, tree_of
+from sources import modules, name_of, tree_of
 
 import crosscheck
 import seecr

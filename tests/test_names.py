@@ -6,7 +6,7 @@ import ast
 import re
 from importlib import import_module
 
-from test_imports import ROOT, modules, name_of, tree_of
+from sources import ROOT, modules, name_of, tree_of
 
 import crosscheck
 import seecr

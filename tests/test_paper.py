@@ -12,7 +12,7 @@ import numpy as np
 import paper_search
 import paper_stiffness
 import pytest
-from matplotlib.figure import Figure
+from kept_figures import keep_figures
 
 
 @pytest.mark.slow
@@ -53,19 +53,14 @@ def test_every_figure_is_on_the_page() -> None:
 
 @pytest.fixture
 def kept(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """Axes of each figure that is written."""
-    out: list[Any] = []
-    write = Figure.savefig
-    monkeypatch.setattr(
-        Figure, "savefig", lambda f, *a, **b: (out.append(f.axes), write(f, *a, **b))
-    )
-    return out
+    """Figures that would be written."""
+    return keep_figures(monkeypatch)
 
 
 @pytest.mark.slow
 def test_figure_3_says_which_end_of_a_drift_is_soft(kept: list[Any], tmp_path: Path) -> None:
     make_paper.figure_3(tmp_path / "3.png")
-    (_limit, ax, *_bar) = kept[0]
+    (_limit, ax, *_bar) = kept[0].axes
     said = [text.get_text() for text in ax.get_legend().texts]
     assert said == ["commanded", "at rest, stiff: k_c = 100,000 N", "at rest, soft: k_c = 12 N"]
     at = {name: [line.get_xydata()[0] for line in ax.lines if line.get_label() == name]
@@ -79,12 +74,12 @@ def test_figure_3_says_which_end_of_a_drift_is_soft(kept: list[Any], tmp_path: P
 def test_figure_12_shows_what_was_measured_where_it_was(kept: list[Any], tmp_path: Path) -> None:
     """Lines across all x had said that it was so everywhere."""
     make_paper.figure_12(tmp_path / "12.png")
-    for ax in kept[0]:
+    for ax in kept[0].axes:
         pieces = [line.get_xydata() for line in ax.lines if "measured" in line.get_label()]
         assert len(pieces) == 2 and len(ax.lines) == 4 + 2
         for piece, end in zip(pieces, make_paper.ENDS, strict=True):
             assert piece[:, 0].mean() == pytest.approx(end) and np.ptp(piece[:, 0]) < 0.05
-    assert sum(len(ax.get_legend().texts) for ax in kept[0] if ax.get_legend()) == 5
+    assert sum(len(ax.get_legend().texts) for ax in kept[0].axes if ax.get_legend()) == 5
 
 
 @pytest.mark.slow
@@ -94,7 +89,7 @@ def test_figure_9_shows_where_equal_tensions_of_a_pair_pull(
     """Their moment about the centre of mass is their lift at the distance that the title says."""
     make_paper.figure_9(tmp_path / "9.png")
     titles = []
-    for ax, (name, x) in zip(kept[0], make_paper.LEVEL, strict=True):
+    for ax, (name, x) in zip(kept[0].axes, make_paper.LEVEL, strict=True):
         one = make_paper.robot(name)
         arms = one.anchor_points[:, [0, 2]]
         ways = one.exit_points[:, [0, 2]] - arms - [x, 0.2]
@@ -114,7 +109,7 @@ def test_curves_of_what_explains_figure_12_have_no_kinks_of_few_points(
 ) -> None:
     far = explain_figure_12.explain(("nonlinear_elasticity",))
     explain_figure_12.picture(tmp_path / "explained.png", [far])
-    (ax,) = kept[0]
+    (ax,) = kept[0].axes
     curve, dots = (line.get_xydata() for line in ax.lines[:2])
     over = np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
     assert np.linalg.norm(np.diff(curve, axis=0) / over, axis=1).max() < 0.05

@@ -25,10 +25,18 @@ def test_the_site_leads_to_every_page() -> None:
 
 
 @pytest.mark.slow
-def test_the_site_builds_without_warnings(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "notebook",
+    [
+        "off",  # test_examples.py runs its cells, and compares what they show
+        pytest.param("force", marks=pytest.mark.sweep),
+    ],
+)
+def test_the_site_builds_without_warnings(notebook: str, tmp_path: Path) -> None:
     for package in ("sphinx", "myst_nb", "furo"):
         pytest.importorskip(package, reason="the site is built with: pip install '.[docs]'")
     build = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-c", "docs"]
+    build += ["-D", f"nb_execution_mode={notebook}"]
     run = subprocess.run(
         [*build, "-d", str(tmp_path / "read"), ".", str(tmp_path / "site")],
         cwd=ROOT,

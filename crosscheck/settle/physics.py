@@ -169,7 +169,7 @@ class Physics:
     @property
     def steers(self) -> bool:
         """Whether something has to be done at every step: here, a wrench to be applied."""
-        return bool(self.wrench.any())
+        return bool(np.count_nonzero(self.wrench))
 
     def set_cables(self, rest_lengths: Array, ea: Array) -> None:
         """Make each cable a spring that only pulls, of stiffness EA/l0 (paper, step 8).
@@ -238,11 +238,12 @@ class Physics:
         MuJoCo's inverse dynamics at zero velocity and acceleration gives the force that would hold
         the platform there; the part that the external wrench does not supply is the residual.
         """
-        self.data.qvel[:] = 0.0
-        self.data.qacc[:] = 0.0
-        mujoco.mj_inverse(self.model, self.data)
+        data = self.data
+        data.qvel[:] = 0.0
+        data.qacc[:] = 0.0
+        mujoco.mj_inverse(self.model, data)
         self.push()
-        return np.asarray(self.mass_unit * (self.data.qfrc_applied - self.data.qfrc_inverse))
+        return np.asarray(self.mass_unit * (data.qfrc_applied - data.qfrc_inverse))
 
     def push(self) -> None:
         """Apply the constant wrench at the present pose, as MuJoCo's generalised force."""
@@ -250,7 +251,8 @@ class Physics:
         # follow the offset as the platform rotates; nor by a constant qfrc_applied, since the free
         # joint's torque is in body axes.
         self.data.qfrc_applied[:] = 0.0
-        if self.wrench.any():
+        # a third of the time of any(), once for every step and every difference
+        if np.count_nonzero(self.wrench):
             where = self.data.xpos[self.body]
             force, torque = self.wrench[:3] / self.mass_unit, self.wrench[3:] / self.mass_unit
             mujoco.mj_applyFT(

@@ -60,6 +60,7 @@ class World(Physics):
         mujoco.mju_mat2Quat(upright, np.stack([self._ahead, self._side, up], axis=1).ravel())
         # followed by half a turn about the sheave's own vertical
         self._swivel = np.stack([upright, quat_multiply(upright, np.array([0.0, 0.0, 0.0, 1.0]))])
+        self._turn = np.empty((self.n_cables, 2))
 
     @property
     def n_cables(self) -> int:
@@ -169,7 +170,9 @@ class World(Physics):
         """Turn each sheave about the vertical until it faces its cable."""
         reach = self.data.site_xpos[self.places.top_next] - self.true.exit_points
         half = 0.5 * np.arctan2(reach @ self._side, reach @ self._ahead)
-        self.data.mocap_quat[:] = np.stack([np.cos(half), np.sin(half)], axis=1) @ self._swivel
+        np.cos(half, out=self._turn[:, 0])
+        np.sin(half, out=self._turn[:, 1])
+        np.matmul(self._turn, self._swivel, out=self.data.mocap_quat)
 
     @contextmanager
     def frozen_slack(self, taut: NDArray[np.bool_]) -> Iterator[None]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,7 @@ import numpy as np
 from seecr.counted import counted
 from seecr.description.hindrances import hindrances
 from seecr.description.robot import ABSURD, Joint, Robot
-from seecr.description.shipped import robot_file
+from seecr.description.shipped import is_shipped, robot_file
 from seecr.errors import RobotError, SeecrError
 from seecr.files import no_text, read_bytes
 from seecr.pose import Array, quat_rotate, quat_to_matrix
@@ -80,6 +81,21 @@ def load_robot(path: str | Path) -> Robot:
             the message names the file and the element.
     """
     path = robot_file(path)
+    if is_shipped(path):
+        return _read_once(path, path.stat().st_mtime_ns)
+    return _read(path)
+
+
+@lru_cache
+def _read_once(path: Path, _written: int) -> Robot:
+    """A shipped robot, as long as its file stays: to compile it takes longer than to solve poses.
+
+    A file of the user's own may include others, which may change.
+    """
+    return _read(path)
+
+
+def _read(path: Path) -> Robot:
     model = _compile(path)
     body = _moving_body(model, path)
     _refuse_other_forces(model, body, path)

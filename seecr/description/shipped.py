@@ -8,7 +8,7 @@ from pathlib import Path
 from seecr.errors import InputError
 from seecr.files import path_of
 
-__all__ = ["CABLES", "model_names", "model_path", "robot_file"]
+__all__ = ["CABLES", "is_shipped", "model_names", "model_path", "robot_file"]
 
 CABLES: dict[str, float] = {"vectran": 3000.0, "fishing": 300.0}
 """k_c = E S [N] of the paper's two cables (eq 10), by name.
@@ -62,6 +62,11 @@ def robot_file(given: str | Path) -> Path:
         f"{given}: neither a file nor a shipped robot; expected an MJCF file or one of "
         f"{_names_near(str(given))}"
     )
+
+
+def is_shipped(path: Path) -> bool:
+    """Whether a file is that of a shipped robot, as :func:`model_path` gives it."""
+    return path.parent.parent in _PLACES and path.stem == path.parent.name and path.is_file()
 
 
 def _names_near(name: str) -> str:

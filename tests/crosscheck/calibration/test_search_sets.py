@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -41,6 +42,11 @@ def sought(terms: list[Term]) -> SetSearch:
     ready = prepare(ROBOT, data, Terms(), considered(FEW))
     assert ready.refusal is None
     return search_sets(ready.problem, SIGMA)
+
+
+@cache
+def with_pulleys() -> SetSearch:
+    return sought([term(ROBOT, "pulley_radius", radius_m=0.006)])
 
 
 def test_where_nothing_is_missing_nothing_is_named() -> None:
@@ -130,7 +136,7 @@ def test_what_a_set_leaves_is_asked_of_a_field(monkeypatch: pytest.MonkeyPatch) 
 
 def test_what_is_within_its_error_of_nothing_is_not_sure() -> None:
     """However probable that something of its class is missing; and the others stay."""
-    found = sought([term(ROBOT, "pulley_radius", radius_m=0.006)])
+    found = with_pulleys()
     setting = found.calibration.setting
     both = Judgement(DiagnosisVerdict.EFFECTS_FOUND, ("stiffness", "pulley_radius"), 0.0)
     assert nothing_by_themselves(setting, found.found, both) == {"stiffness"}
@@ -148,7 +154,7 @@ def test_what_its_set_needs_stays_sure_however_near_nothing_it_seems(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Errors are those of a linear model, which may not hold there."""
-    found = sought([term(ROBOT, "pulley_radius", radius_m=0.006)])
+    found = with_pulleys()
     both = Judgement(DiagnosisVerdict.EFFECTS_FOUND, ("stiffness", "pulley_radius"), 0.0)
     near = {"pulley_radius": 0.1, "stiffness": 0.2}
     monkeypatch.setattr(

@@ -98,6 +98,7 @@ def test_what_is_asked_of_a_plan_wrongly_is_said(poses, tmp_path):
     assert "can be held at 0 of" in text and "ask for fewer rows, a wider range of tensions" in text
 
 
+@pytest.mark.usefixtures("unpaged")
 def test_a_plan_replaces_an_older_one_but_not_what_it_reads(tmp_path):
     """The user's commands were overwritten, and files of the older plan stayed beside the new."""
     xml = model_path("planar_vertical")

@@ -30,6 +30,7 @@ def rough(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return xml, data
 
 
+@pytest.mark.usefixtures("unpaged")
 @pytest.mark.parametrize(
     ("command", "options"),
     [

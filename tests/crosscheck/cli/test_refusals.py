@@ -21,6 +21,7 @@ def stiff(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return case(tmp_path_factory.mktemp("stiff"), {"stiffness": {"factor": 1.4}})
 
 
+@pytest.mark.usefixtures("unpaged")
 def test_sizes_that_nothing_measures(stiff: tuple[Path, Path], tmp_path: Path) -> None:
     """Their squares are nought or without end, and no noise can be made of them."""
     for size in ("1e-300mm", "1e-9mm", "1e300mm"):

@@ -20,9 +20,10 @@ from seecr.description.robot import Robot
 from seecr.files import json_text
 
 # In a sweep, since every run asks it of other data as well: an unknown effect (L09) and pulleys
-# (L04) in test_unknown_effects.py, hysteresis (L06) and several at once (L10) in the laboratories
-# B06 and B10 of the same simulator.
-IN_SWEEP = ("L04", "L06", "L09", "L10")
+# (L04) in test_unknown_effects.py, a centre of mass (L03) in README's diagnosis, and in
+# laboratories of the same simulator nothing (L12, as L01) in B03, hysteresis (L06) in B06, a
+# misplaced start (L05) and several at once (L10) in B10.
+IN_SWEEP = ("L03", "L04", "L05", "L06", "L09", "L10", "L12")
 CASES = [
     pytest.param(name, marks=[pytest.mark.sweep] if name in IN_SWEEP else [])
     for name in (f"L{k:02d}" for k in range(1, 13))

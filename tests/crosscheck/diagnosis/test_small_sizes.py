@@ -27,7 +27,7 @@ pytestmark = pytest.mark.slow
                 "rotation_z_rad": -6.3e-5,
             },
         ),
-        (
+        pytest.param(
             "cable_length_offset",
             {
                 "offset_1_m": -1.7e-5,
@@ -37,6 +37,7 @@ pytestmark = pytest.mark.slow
                 "offset_7_m": -1e-5,
                 "offset_8_m": -4.5e-6,
             },
+            marks=pytest.mark.sweep,
         ),
     ],
 )
@@ -50,7 +51,11 @@ def test_many_small_numbers_are_not_taken_for_few_of_another_effect(name, values
 
 
 @pytest.mark.parametrize(
-    ("name", "parameter"), [("pulley_radius", "radius_m"), ("length_scale", "factor")]
+    ("name", "parameter"),
+    [
+        ("pulley_radius", "radius_m"),
+        pytest.param("length_scale", "factor", marks=pytest.mark.sweep),
+    ],
 )
 def test_what_a_plan_says_is_named_is_named(name, parameter):
     """Nine in ten of the curve in docs/diagnosis.md; two of which a test can see."""

@@ -78,7 +78,9 @@ def test_compare_diagnose_add_compare(
     robot, data = case
     model, limit = tmp_path / "model.toml", ("--max-position", "0.1mm", "--no-recording")
     out = tmp_path / "out"
-    assert crosscheck("compare", robot, data, "--out", out, *limit) == 1
+    with monkeypatch.context() as unpaged:
+        unpaged.setattr("crosscheck.report.write_page", lambda _found, _path, _made: None)
+        assert crosscheck("compare", robot, data, "--out", out, *limit) == 1
     assert crosscheck("diagnose", robot, data, *FEW, "--out", out) == 0
     found = json.loads((out / "diagnosis.json").read_text())
     assert [m["effect"] for m in found["missing"]] == ["pulley_radius"]

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from made_data import term
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from PIL import Image
 from written_pages import figures_of, text_of
 
@@ -60,7 +61,8 @@ def diagnosis(name: str) -> Diagnosis:
 
 @pytest.fixture
 def words_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Figures of a page are not drawn, which takes most of the time."""
+    """Figures of a page are neither laid out nor drawn, which takes most of the time."""
+    monkeypatch.setattr(ConstrainedLayoutEngine, "execute", lambda *_args: None)
     monkeypatch.setattr(Figure, "savefig", lambda *_args, **_named: None)
 
 

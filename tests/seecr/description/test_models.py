@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import os
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -459,3 +460,19 @@ def test_the_other_one_has_its_centre_of_mass_off() -> None:
     body = compiled("demobot_off_centre").body("platform")
     np.testing.assert_array_equal(body.ipos, [0.012, -0.007, -0.015])
     assert np.all(compiled("demobot_cogiro").body("platform").ipos == 0.0)
+
+
+def test_a_shipped_robot_is_read_once_and_again_if_its_file_is_written_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert load_robot("ipanema") is load_robot(model_path("ipanema"))
+    path = tmp_path / "own" / "own.xml"
+    path.parent.mkdir()
+    path.write_bytes(model_path("ipanema").read_bytes())
+    assert load_robot(path) is not load_robot(path), "what a user's file includes may change"
+    monkeypatch.setattr(shipped, "_PLACES", (tmp_path,))
+    before = load_robot("own")
+    assert load_robot("own") is before
+    path.write_bytes(model_path("own").read_bytes().replace(b"ipanema", b"other"))
+    os.utime(path, ns=(0, 0))
+    assert load_robot("own") is not before and load_robot("own").name == "other"

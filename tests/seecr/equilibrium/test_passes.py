@@ -216,7 +216,9 @@ def test_no_barrier_is_lower_than_one_of_its_ends() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["demobot_cogiro", "ipanema", "cogiro_large"])
+@pytest.mark.parametrize(
+    "name", ["demobot_cogiro", pytest.param("ipanema", marks=pytest.mark.sweep), "cogiro_large"]
+)
 def test_barriers_of_random_commands_are_as_high_as_both_ends(name: str) -> None:
     robot, random = load_robot(model_path(name)), np.random.default_rng(5)
     low, high = robot.exit_points.min(axis=0), robot.exit_points.max(axis=0)

@@ -205,7 +205,11 @@ def pushed(text: str) -> tuple[Array, int]:
 
 
 @pytest.mark.parametrize(
-    "weight", [0.05, *(pytest.param(w, marks=pytest.mark.slow) for w in (0.01, 0.02, 0.2))]
+    "weight",
+    [
+        0.05,
+        *(pytest.param(w, marks=[pytest.mark.slow, pytest.mark.sweep]) for w in (0.01, 0.02, 0.2)),
+    ],
 )
 def test_a_pushed_platform_on_hanging_cables_comes_back(weight: float) -> None:
     """With steps of 2 ms such files ran away: their cables' parts swing faster."""

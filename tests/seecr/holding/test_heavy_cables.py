@@ -42,8 +42,18 @@ def inside_of(robot: Robot, tables: Tables, high: float = np.inf) -> Inside:
     return farthest_inside(tables, np.zeros(robot.n_cables), np.full(robot.n_cables, high))
 
 
-@pytest.mark.parametrize("high", [3000.0, np.inf])
-@pytest.mark.parametrize(("robot", "weight"), [(CAMERA, 0.5), (CAMERA, 3.0), (COGIRO, 2.0)])
+# The large robot with either limit at one of its weights each; with both at both in a sweep.
+@pytest.mark.parametrize(
+    ("robot", "weight", "high"),
+    [
+        (CAMERA, 0.5, np.inf),
+        (CAMERA, 3.0, 3000.0),
+        (COGIRO, 2.0, np.inf),
+        (COGIRO, 2.0, 3000.0),
+        pytest.param(CAMERA, 0.5, 3000.0, marks=pytest.mark.sweep),
+        pytest.param(CAMERA, 3.0, np.inf, marks=pytest.mark.sweep),
+    ],
+)
 def test_what_has_a_margin_is_held_and_what_is_held_has_one(
     robot: Robot, weight: float, high: float
 ) -> None:

@@ -441,8 +441,17 @@ def test_lengths_over_sticking_exit_points_are_found_in_a_few_rounds(
     assert rounds <= 5
 
 
-@pytest.mark.parametrize("stands", [1, 4])
-@pytest.mark.parametrize(("name", "n"), [("ipanema", 200), ("ipanema", 300), ("cogiro_large", 240)])
+@pytest.mark.parametrize(
+    ("name", "n", "stands"),
+    [
+        ("ipanema", 200, 1),
+        ("ipanema", 300, 1),
+        ("cogiro_large", 240, 1),
+        pytest.param("ipanema", 200, 4, marks=pytest.mark.sweep),
+        pytest.param("ipanema", 300, 4, marks=pytest.mark.sweep),
+        ("cogiro_large", 240, 4),
+    ],
+)
 def test_lengths_are_found_where_cables_slip_only_on_the_way(
     name: str, n: int, stands: int
 ) -> None:
@@ -471,7 +480,7 @@ def test_lengths_that_go_to_and_fro_come_to_rest(n: int, names: tuple[str, ...])
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["ipanema", "cogiro_large"])
+@pytest.mark.parametrize("name", ["ipanema", pytest.param("cogiro_large", marks=pytest.mark.sweep)])
 def test_lengths_are_found_where_poses_are_repeated_with_every_history(name: str) -> None:
     """A third of these rows was not reached: each change disturbed all that come after it."""
     robot = robot_named(name)

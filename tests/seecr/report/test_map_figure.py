@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kept_figures import keep_figures
 from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
 from slab import slides
 
 from seecr.description.mjcf import load_robot
@@ -28,10 +28,8 @@ AXIS = np.linspace(0.3, 0.5, 3)
 
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Drawn:
-    """The figure of a map."""
-    kept: list[Any] = []
-    write = Figure.savefig
-    monkeypatch.setattr(Figure, "savefig", lambda f, *a, **b: (kept.append(f), write(f, *a, **b)))
+    """The figure of a map, not written."""
+    kept = keep_figures(monkeypatch)
 
     def of(found: Workspace, **more: Any) -> Any:
         map_figure(tmp_path / "map.png", found, **more)
@@ -144,6 +142,7 @@ def test_labels_of_a_wall_are_whole(drawn: Drawn) -> None:
     """
     x, z = np.linspace(0.0861, 0.5719, 5), np.linspace(-0.0431, 0.3351, 4)
     one = drawn(workspace_map(load_robot("planar_vertical"), x, 0.0, z))
+    one.draw_without_rendering()  # finds the labels' places as writing does
     labels = [text for ax in one.axes for text in (ax.xaxis.label, ax.yaxis.label, ax.title)]
     for text in (one._suptitle, *labels):
         box = text.get_window_extent(one.canvas.get_renderer())

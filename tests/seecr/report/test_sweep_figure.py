@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from calibrated import KEPT, MODEL, ROBOT, model_of
 from click.testing import CliRunner
-from matplotlib.figure import Figure
+from kept_figures import keep_figures
 from slab import slides
 
 from seecr.cli import main
@@ -40,11 +40,8 @@ def sweep() -> Solution:
 
 @pytest.fixture
 def kept(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """Figures that are written, the last one last."""
-    out: list[Any] = []
-    write = Figure.savefig
-    monkeypatch.setattr(Figure, "savefig", lambda f, *a, **b: (out.append(f), write(f, *a, **b)))
-    return out
+    """Figures that would be written, the last one last."""
+    return keep_figures(monkeypatch)
 
 
 @pytest.fixture

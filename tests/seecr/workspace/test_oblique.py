@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
+from kept_figures import keep_figures
 from turned import turned
 
 from seecr.description.mjcf import load_robot
@@ -73,9 +72,7 @@ def test_the_edge_of_an_oblique_map_is_that_of_the_other(maps: tuple[Workspace, 
 def test_the_figure_names_u_and_w_and_has_the_edge_in_its_place(
     maps: tuple[Workspace, Workspace], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    kept: list[Any] = []
-    write = Figure.savefig
-    monkeypatch.setattr(Figure, "savefig", lambda f, *a, **b: (kept.append(f), write(f, *a, **b)))
+    kept = keep_figures(monkeypatch)
     for found in maps:
         edge = boundary(found.robot, *found.crossings(found.feasible), tolerance=1e-4)
         map_figure(tmp_path / "map.png", found, edge=edge)

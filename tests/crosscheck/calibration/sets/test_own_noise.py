@@ -33,7 +33,7 @@ SIGMA = Sigma(position_m=1e-4)
 def correlated() -> Measurements:
     """Positions of few rows, beside a pulley, with correlated noise of half the stated size."""
     quiet = Sigma(position_m=1e-12, orientation_rad=1e-12)
-    data = measured(ROBOT, [term(ROBOT, "pulley_radius", radius_m=0.006)], points=12, sigma=quiet)
+    data = measured(ROBOT, [term(ROBOT, "pulley_radius", radius_m=0.006)], points=8, sigma=quiet)
     noise = 0.5 * SIGMA.position_m * alike(np.random.default_rng(3), data.n_rows, 3, data.run)
     return replace(data, position=data.position + noise, quat_wxyz=None, sigma=SIGMA)
 
