@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from remembered_twins import remember_twins
 from shown import Page, assert_shown
 
 import crosscheck.report
@@ -28,7 +29,10 @@ def pages_of_diagnoses(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 @pytest.mark.slow
-def test_the_tutorial_works_as_written(tmp_path: Path, pages_of_diagnoses: list[str]) -> None:
+def test_the_tutorial_works_as_written(
+    tmp_path: Path, pages_of_diagnoses: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    remember_twins(monkeypatch)
     page = Page(tmp_path)
     page.run(TUTORIAL.read_text(encoding="utf-8"))
     used = {tuple(command.split()[:2]) for command in page.commands}

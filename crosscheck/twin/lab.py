@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import pickle
-from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
-from copy import deepcopy
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +17,6 @@ from crosscheck.twin.answer import Moves
 from crosscheck.twin.hidden import times
 from crosscheck.twin.measure import Truth, measure
 from crosscheck.twin.trajectory import trajectory
-from seecr.commands.data import Commands
 from seecr.commands.loads import Loads
 from seecr.description.robot import Robot
 from seecr.effects import Effect, Term
@@ -39,9 +35,6 @@ _TOLD = 9
 # Part of the rows at which the platform has to rest; the others are left out.
 _AT_REST = 0.95
 
-# Answers along sweeps that are remembered: of half a dozen twins, a tenth of a megabyte each.
-_REMEMBERED = 24
-
 Progress = Callable[[int, str], None]
 
 
@@ -51,9 +44,7 @@ class Lab:
 
     Attributes:
         robot, seed: of the twin. stated: noise. tensions: whether they are read.
-        tell: called with progress. commanded: seeds of the noise besides the twin's, if it is not
-            measured along its sweeps.
-        recalls: take answers that are remembered from earlier twins, if there are any.
+        tell: called with progress. commanded: seeds of the noise besides the twin's.
     """
 
     robot: Robot
@@ -62,7 +53,6 @@ class Lab:
     tensions: bool
     tell: Progress
     commanded: tuple[int, ...] = ()
-    recalls: bool = False
 
     def measure(self, case: Measurements, effects: Sequence[Effect], now: str) -> Truth:
         """The truth at commands, with lengths off by the noise of the winches."""
@@ -72,34 +62,10 @@ class Lab:
                 (case.n_rows, case.n_cables)
             )
             errors = self.stated.length_m * noise
-        commands = case.as_commands(self.robot)
-        key = _key_of_question(self.robot, commands, effects, errors)
-        if self.recalls and key in _answers:
-            self.tell(case.n_rows, now)
-            return _answers[key]
-        truth = measure(
-            self.robot, commands, effects, length_errors=errors,
+        return measure(
+            self.robot, case.as_commands(self.robot), effects, length_errors=errors,
             progress=lambda rows: self.tell(rows, now),
         )  # fmt: skip
-        if not self.commanded:
-            # whoever gets the truth may write into it
-            _answers[key] = deepcopy(truth)
-            if len(_answers) > _REMEMBERED:
-                _answers.popitem(last=False)
-        return truth
-
-
-# MuJoCo's answers along sweeps, the oldest first. A robot that is measured along other commands has
-# effects as large as along its sweeps: whoever goes on with a twin asks for those time and again.
-_answers: OrderedDict[bytes, Truth] = OrderedDict()
-
-
-def _key_of_question(
-    robot: Robot, commands: Commands, effects: Sequence[Effect], errors: Array | None
-) -> bytes:
-    """What MuJoCo's answer depends on."""
-    own = [getattr(robot, field.name) for field in fields(robot)]
-    return hashlib.sha256(pickle.dumps((own, commands, list(effects), errors))).digest()
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +122,7 @@ def sized(lab: Lab, points: int, hidden: list[Term]) -> list[Term]:
     So a seed measured along corrected commands is the robot that was measured before. Where the
     platform does not rest along sweeps, sizes are as drawn.
     """
-    own = replace(lab, commanded=(), recalls=True)
+    own = replace(lab, commanded=())
     cases = [sweeps(lab.robot, points, extent, lab.seed) for extent in EXTENTS]
     try:
         return [one for one, _ in rest_of(own, cases, hidden).alone] if hidden else []

@@ -11,7 +11,6 @@ import pytest
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.twin import lab
 from crosscheck.twin.lab import (
     Lab,
     Measured,
@@ -22,7 +21,6 @@ from crosscheck.twin.lab import (
     rest_of,
     sweeps,
 )
-from crosscheck.twin.make import Twin, make_twin
 from crosscheck.twin.measure import Truth
 from seecr.commands.loads import Loads
 from seecr.description.mjcf import load_robot
@@ -174,36 +172,3 @@ def test_where_nothing_rests_it_is_said_of_which_commands() -> None:
         rested({10: 0.9})
     with pytest.raises(CrosscheckError, match="along the twin's commands, however close"):
         rested({10: 0.9, 20: 0.9})
-
-
-def twin_of(**given: Any) -> Twin:
-    return make_twin("planar_vertical", 13, effects=["centre_of_mass"], **given)
-
-
-def test_what_mujoco_said_along_sweeps_is_remembered_for_other_commands(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Whoever goes on with a twin waited for its sweeps each time."""
-    own, rows = lab.measure, list[int]()
-
-    def counted(robot: Any, told: Any, *rest: Any, **more: Any) -> Truth:
-        rows.append(len(told))
-        return own(robot, told, *rest, **more)
-
-    monkeypatch.setattr(lab, "measure", counted)
-    poses = np.tile(ROBOT.reference_pose, (3, 1))
-    first = twin_of(points=2)
-    first.truth.pose[:] = np.nan  # the caller's own
-    rows.clear()
-    again = twin_of(points=2, poses=poses)
-    assert set(rows) == {3}
-    twin_of(points=4, poses=poses)
-    assert len(set(rows)) == 2, "other sweeps"
-    monkeypatch.setattr(lab, "_answers", type(lab._answers)())
-    afresh = twin_of(points=2, poses=poses)
-    np.testing.assert_array_equal(again.truth.position, afresh.truth.position)
-    np.testing.assert_array_equal(again.hidden[0].vector, afresh.hidden[0].vector)
-    # measured along its sweeps, a twin is measured
-    rows.clear()
-    twin_of(points=2)
-    assert len(rows) > 1

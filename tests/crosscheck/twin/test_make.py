@@ -11,6 +11,7 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from remembered_twins import remember_twins
 from scipy.stats import chi2
 
 from crosscheck.cli import main
@@ -491,8 +492,9 @@ def test_effects_that_cannot_be_hidden_are_refused():
         make_twin(COGIRO, 1, n_effects=99)
 
 
-def test_measured_again_along_other_commands_it_is_the_same_robot():
+def test_measured_again_along_other_commands_it_is_the_same_robot(monkeypatch):
     """Level poses in the middle hardly show a tilted frame: it had been tilted twice as far."""
+    remember_twins(monkeypatch)
     path = model_path("demobot_parallel")
     poses = np.tile([0.4, 0.25, 0.15, 1.0, 0.0, 0.0, 0.0], (6, 1))
     poses[:, 0] = np.linspace(0.37, 0.43, 6)
@@ -508,8 +510,9 @@ def test_measured_again_along_other_commands_it_is_the_same_robot():
     assert again[1].measured.told and again[1].measured.command_pose is None
 
 
-def test_what_sweeps_enlarge_is_as_large_along_other_commands():
+def test_what_sweeps_enlarge_is_as_large_along_other_commands(monkeypatch):
     """A coarse tracker sees a tilt only if it is three times as large as drawn."""
+    remember_twins(monkeypatch)
     path, coarse = model_path("demobot_parallel"), Sigma(3e-3, 0.03)
     poses = np.tile([0.4, 0.25, 0.15, 1.0, 0.0, 0.0, 0.0], (2, 1))
     drawn = make_twin(path, 13, points=4)
