@@ -16,7 +16,7 @@ from crosscheck.fit.effects.evidence import FALSE_ALARM, p_value
 from crosscheck.fit.effects.gauss_newton import Fit, fit
 from crosscheck.fit.effects.held_out import HeldOut, hold_out, improves, pays, unfitted
 from crosscheck.fit.effects.nothing import distance_from_nothing, is_nothing
-from crosscheck.fit.effects.systematic import moved_by_others
+from crosscheck.fit.effects.systematic import moved_together
 from crosscheck.fit.least_squares.known import firmer
 from crosscheck.fit.least_squares.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.least_squares.state import evaluate
@@ -65,10 +65,10 @@ def weigh(
     noise = white.is_noise or (coloured is not None and not coloured.open)
     # standard errors are too small if the noise is larger than stated or autocorrelated, and also
     # if another effect is still missing
-    moved = np.zeros(len(own)) if noise else moved_by_others(problem, best)
+    moved = np.zeros_like(best.covariance) if noise else moved_together(problem, best)
     inflation = max(white.inflation, firmness)
     known = firmer(best.terms, 1.0 / firmness)
-    covariance = _no_wider(known, inflation**2 * best.covariance + np.diag(moved**2))
+    covariance = _no_wider(known, inflation**2 * best.covariance + moved)
     fitted = _split(known, best, np.sqrt(np.diag(covariance)))
     # autocorrelated noise looks like an effect more easily than white noise of its size
     larger = max(1.0, white.scale) if coloured is None else white.inflation
@@ -94,7 +94,10 @@ def weigh(
         is_nothing=is_nothing(distance, count),
         whiteness=white,
         coloured=coloured,
-        warnings=(*_warnings(problem.robot, best, fitted, own), *_widened(best, moved, own)),
+        warnings=(
+            *_warnings(problem.robot, best, fitted, own),
+            *_widened(best, np.sqrt(np.diag(moved)), own),
+        ),
         notes=tuple(dict.fromkeys(notes)),
         model=_model(problem, basis, fitted, names, errors, best.with_idle(covariance)),
     )

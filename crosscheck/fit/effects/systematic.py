@@ -23,22 +23,33 @@ _PART_OF_BEST = 0.5
 
 
 def moved_by_others(problem: Problem, found: Fit) -> Array:
-    """How far each value moves when an effect is added that explains much of the remainder.
+    """How far each value moves (p,) when an effect is added that explains much of the remainder.
 
-    Effects with several shapes are only tried at the first one.
+    It is the largest move among such effects, in the values' units; 0 for values that are fixed or
+    on a bound. Arguments as in :func:`moved_together`.
+    """
+    return np.sqrt(np.diag(moved_together(problem, found)))
+
+
+def moved_together(problem: Problem, found: Fit) -> Array:
+    """The covariance (p, p) of such moves: what moves values alike leaves their difference known.
+
+    A heavier platform seems to lower the tracker on both of two days by as much, and says nothing
+    of how far it was moved in between. Effects with several shapes are only tried at the first one.
 
     Args:
         problem: the data.
         found: a fit that leaves more than noise.
-
-    Returns:
-        (p,) the largest move among such effects, in the values' units; 0 for values that are fixed
-        or on a bound.
     """
     every = moves_by_effect(problem, found).values()
     most = max((fall for fall, _move in every), default=0.0)
     some = [move for fall, move in every if fall > _PART_OF_BEST * most > 0.0]
-    return np.max(np.abs(some), axis=0) if some else np.zeros(len(found.terms))
+    if not some:
+        return np.zeros((len(found.terms), len(found.terms)))
+    moves = np.array(some)
+    largest, power = np.abs(moves).max(axis=0), np.sqrt((moves**2).sum(axis=0))
+    alike = moves * np.divide(largest, power, out=np.zeros_like(power), where=power > 0.0)
+    return np.asarray(alike.T @ alike)
 
 
 def moves_by_effect(

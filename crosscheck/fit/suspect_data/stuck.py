@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.fit.least_squares.problem import Problem
+from seecr.counted import counted
 from seecr.pose import Array
 
 # The platform stands still if it moves by less than this part of the way it is predicted to move,
@@ -41,7 +42,10 @@ def stuck_doubts(problem: Problem, predicted: Array) -> list[str]:
         for rows in [_thinned(np.flatnonzero(whole & (data.run_index == run)))]
         for first, last in _stretches(read[rows], there[rows], least)
     ]
-    return [_said(problem, read, there, at, rows) for at, rows in found[:_MOST_NAMED]]
+    said = [_said(problem, read, there, at, rows) for at, rows in found[:_MOST_NAMED]]
+    if (more := len(found) - _MOST_NAMED) > 0:
+        said.append(f"The position also stays in {counted(more, 'other part')} of the data.")
+    return said
 
 
 def _thinned(rows: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -85,7 +85,7 @@ def test_errors_cover_what_another_missing_effect_does_to_a_value(
         "the standard errors include by how much another missing effect may shift these values"
     )
     assert any(widened in warning for warning in alone.warnings)
-    monkeypatch.setattr(weigh, "moved_by_others", lambda _problem, best: np.zeros(len(best.terms)))
+    monkeypatch.setattr(weigh, "moved_together", lambda _p, best: np.zeros_like(best.covariance))
     blind = add_effect(parallel, data, "centre_of_mass")
     assert np.max(np.abs(blind.own.term.vector - centre.vector) / blind.own.stderr) > 5.0
     assert not any(widened in warning for warning in blind.warnings)

@@ -12,7 +12,7 @@ from linear_toy import toy
 
 from crosscheck.fit.effects import systematic
 from crosscheck.fit.effects.gauss_newton import Fit
-from crosscheck.fit.effects.systematic import moved_by_others
+from crosscheck.fit.effects.systematic import moved_by_others, moved_together
 from seecr.pose import Array
 
 # Unit vectors: of the fitted effect, of one that shares a part of it, and of one that shares none.
@@ -61,3 +61,17 @@ def test_one_that_explains_less_than_half_of_what_the_best_does_is_no_reason(
 def test_values_on_a_bound_do_not_move(monkeypatch: pytest.MonkeyPatch) -> None:
     stopped = np.ones(1, dtype=bool)
     assert moved(0.8 * np.eye(8)[1], monkeypatch, at_bound=stopped) == 0.0
+
+
+def test_what_moves_two_values_alike_leaves_their_difference_known(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A tracker seems lower on both days beside a platform that is too heavy, and by as much."""
+    moves = {"a": (5.0, np.array([3.0, 3.0, 0.0])), "b": (4.0, np.array([-1.0, -1.0, 2.0]))}
+    monkeypatch.setattr(systematic, "moves_by_effect", lambda _problem, _found: moves)
+    found: Any = SimpleNamespace(terms=range(3))
+    covariance = moved_together(SimpleNamespace(), found)  # type: ignore[arg-type]
+    assert np.sqrt(np.diag(covariance)) == pytest.approx([3.0, 3.0, 2.0])
+    assert np.array([1.0, -1.0, 0.0]) @ covariance == pytest.approx(np.zeros(3))
+    assert covariance[0, 2] == pytest.approx(-3.0 * 2.0 / np.sqrt(10.0))
+    assert np.linalg.eigvalsh(covariance).min() > -1e-12

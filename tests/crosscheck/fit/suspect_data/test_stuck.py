@@ -43,6 +43,19 @@ def test_rows_after_a_crash_are_named(data: Measurements, row: int) -> None:
     assert f"of that at line {at}, where" in note
 
 
+def test_so_many_are_counted_where_more_than_three_stop(data: Measurements) -> None:
+    stopped = data
+    for run in np.unique(data.run_index):
+        rows = np.flatnonzero(data.run_index == run)
+        stopped = stops(stopped, rows[2], rows[-1])
+    assert len(stuck_notes(stopped)) == 3
+    (count,) = [n for n in prepare(ROBOT, stopped, Terms()).notes if "also stays" in n]
+    assert (
+        count
+        == f"The position also stays in {len(np.unique(data.run)) - 3} other parts of the data."
+    )
+
+
 def test_a_run_that_goes_on_has_no_such_note(data: Measurements) -> None:
     assert stuck_notes(data) == []
     lost = data.position.copy()
