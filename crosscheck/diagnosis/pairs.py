@@ -36,6 +36,8 @@ _NEARLY = 0.02
 _POSE = 6
 # Most pairs that are fitted in place of one effect.
 _FITTED = 3
+# Most steps of such a fit.
+_STEPS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +133,8 @@ def _linear(columns: list[Array], white: Array) -> tuple[Array, float]:
 def _fitted(trials: Trials, fit: Fit, start: Terms) -> Terms | None:
     """A model fitted from a start, if it can be and explains as much as another fit."""
     try:
-        out = trials.refit(start, fit.state)
+        # sets are compared later from where this ends: it need not be exact
+        out = trials.refit(start, fit.state, iterations=_STEPS, quick=True)
     except (InputError, np.linalg.LinAlgError):  # a law of the user's own that refuses values
         return None
     good = out.valid and can_be(trials.problem.robot, out.terms, fit.terms)

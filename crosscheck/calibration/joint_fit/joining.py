@@ -22,6 +22,7 @@ from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.least_squares.state import derivatives, evaluate
 from seecr.effects import Term, catalogue, layout_of
 from seecr.effects.base import Layout
+from seecr.effects.setup import Setup
 from seecr.pose import Array
 
 # An effect joins if it gains this much ln evidence.
@@ -57,9 +58,19 @@ def layouts(problem: Problem) -> tuple[list[Layout], list[Layout]]:
 def _waits(problem: Problem, layout: Layout) -> bool:
     if layout.shape.any():
         return True
-    moved = np.clip(layout.null + layout.scale, layout.lower, layout.upper)
-    setup = problem.experiment.setup([layout.build(moved)])
+    setup = _at_its_size(problem, layout)
     return bool(setup.has_history or np.any(setup.cable_weight))
+
+
+def has_history(problem: Problem, layout: Layout) -> bool:
+    """Whether an effect makes rows depend on those before them."""
+    return bool(_at_its_size(problem, layout).has_history)
+
+
+def _at_its_size(problem: Problem, layout: Layout) -> Setup:
+    """The setup with an effect of its plausible size."""
+    moved = np.clip(layout.null + layout.scale, layout.lower, layout.upper)
+    return problem.experiment.setup([layout.build(moved)])
 
 
 def promising_beside(setting: Setting, joint: JointFit, later: Sequence[Layout]) -> list[Promising]:
@@ -120,9 +131,9 @@ class _Beside:
         setting, state, layout = self.setting, self.joint.state, term.layout
         if len(layout.names) != 1 or not amplitudes_at_null(term).all():
             return -np.inf
-        there = term.with_vector(np.clip(layout.null + layout.scale, layout.lower, layout.upper))
-        if setting.problem.experiment.setup([there.effect()]).has_history:
+        if has_history(setting.problem, layout):
             return -np.inf
+        there = term.with_vector(np.clip(layout.null + layout.scale, layout.lower, layout.upper))
         moved = evaluate(setting.problem, self.joint.terms.with_term(there), setting.factor, state)
         if not moved.valid:
             return -np.inf

@@ -7,12 +7,17 @@ set, and the catalogue is linearised about the best of them, until the best set 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from crosscheck.calibration.joint_fit.joining import amplitudes, inside, promising_beside
+from crosscheck.calibration.joint_fit.joining import (
+    amplitudes,
+    has_history,
+    inside,
+    promising_beside,
+)
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting
 from crosscheck.calibration.sets.catalogue import Catalogue
 from crosscheck.calibration.sets.challenge import challenge
@@ -23,6 +28,7 @@ from crosscheck.calibration.sets.linear_search import Names, Scores, explore
 from crosscheck.fit.effects.possible import hardly_happens
 from crosscheck.fit.least_squares.state import State
 from seecr.effects import Terms
+from seecr.effects.base import Layout
 
 # Most sets refitted about one linear model, and how much worse their ln evidence may be.
 _REFITTED, _WITHIN = 20, 12.0
@@ -316,21 +322,35 @@ def containing(exact: Exact, best: Refit) -> list[Names]:
 
 
 def swapped(exact: Exact, scores: Scores, best: Refit) -> Refit:
-    """The best set after exchanging members for effects with a shape that promise about as much.
+    """The best set after exchanging members for effects that the linear model does not do justice.
 
-    The linear model has these at one shape (a reference temperature, a time), which need not be the
-    one that explains what the member does.
+    The linear model has effects with a shape at one shape (a reference temperature, a time), which
+    need not be the one that explains what a member does. And it has what heavy cables do at no
+    weight, as straight lines: several members together may do the rest, and a fit of the weight
+    beside these ends at none. So such effects also take the place of all members but one.
     """
     own = best.names - scores.always
-    shaped = [t.layout for t in exact.catalogue.later if t.layout.shape.any()]
-    for name in sorted(own) if len(own) <= FEW else ():
-        rest = exact.fit(scores, best.names - {name})
-        if rest is None:
-            continue
-        least = best.score - rest.score - LOCAL_MINIMUM
-        absent = [layout for layout in shaped if layout.name not in best.names]
-        for one in promising_beside(exact.setting, rest.joint, absent):
-            if one.gain > max(least, 0.0):
-                exact.report(" + ".join(sorted(rest.names | {one.term.name})))
-                exact.take(scores, Terms([*rest.joint.terms, inside(one.term)]))
+    if len(own) > FEW:
+        return exact.best
+    absent = [t.layout for t in exact.catalogue.later if t.name not in best.names]
+    bent = [a for a in absent if not has_history(exact.setting.problem, a)]
+    shaped = [a for a in absent if a.shape.any() or a in bent]
+    for name in sorted(own):
+        _exchanged(exact, scores, best, best.names - {name}, shaped)
+    for name in sorted(own) if len(own) > 2 else ():
+        _exchanged(exact, scores, best, scores.always | {name}, bent)
     return exact.best
+
+
+def _exchanged(
+    exact: Exact, scores: Scores, best: Refit, kept: Names, absent: Sequence[Layout]
+) -> None:
+    """Fit a part of the best set with each effect that promises about as much as the others do."""
+    rest = exact.fit(scores, kept)
+    if rest is None:
+        return
+    least = max(best.score - rest.score - LOCAL_MINIMUM, 0.0)
+    for one in promising_beside(exact.setting, rest.joint, absent):
+        if one.gain > least:
+            exact.report(" + ".join(sorted(rest.names | {one.term.name})))
+            exact.take(scores, Terms([*rest.joint.terms, inside(one.term)]))

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
+from crosscheck.calibration.joint_fit.joining import Promising
 from crosscheck.calibration.joint_fit.joint import Setting, cost, settle
 from crosscheck.calibration.linear_evidence.priors import widths_of
 from crosscheck.calibration.noise.colour import WHITE, chain_of
+from crosscheck.calibration.sets import refits
 from crosscheck.calibration.sets.catalogue import Catalogue, gram_about
 from crosscheck.calibration.sets.exact import Exact, Refit, scored
 from crosscheck.calibration.sets.linear_search import Scores
@@ -158,3 +162,61 @@ def test_what_a_fit_did_not_find_is_no_evidence() -> None:
         fixed, WHITE, joint.weight, joint.state, joint.width
     )
     assert lost > 1.0 and end - way == pytest.approx(0.5 * lost, rel=0.05)
+
+
+class Toy:
+    """Sets with the scores of a table; taken are the names of those that are fitted from values."""
+
+    def __init__(self, scores: dict[str, float]) -> None:
+        self.setting = SimpleNamespace(problem=None)
+        weight, creep = term(ROBOT, "cable_weight"), term(ROBOT, "creep", amount=0.05, time_s=9.0)
+        self.catalogue = SimpleNamespace(later=Terms([weight, creep]))
+        self.known = {frozenset(names.split()): score for names, score in scores.items()}
+        self.taken: list[str] = []
+        self.best = "best"
+
+    def fit(self, _scores: object, names: frozenset[str]) -> Any:
+        terms = Terms(term(ROBOT, name) for name in sorted(names))
+        joint = SimpleNamespace(terms=terms, names=names)
+        return SimpleNamespace(names=names, score=self.known[names], joint=joint)
+
+    def report(self, text: str) -> None:
+        self.taken.append(text)
+
+    def take(self, _scores: object, start: Terms) -> None:
+        assert self.taken[-1] == " + ".join(sorted(start.names))
+
+
+def test_heavy_cables_are_tried_in_place_of_all_members_but_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Three effects did what a weight does; beside two of them a fit of it ended at none."""
+    toy: Any = Toy(
+        {
+            "drum_gain external_wrench stiffness": -380.0,
+            "drum_gain external_wrench": -390.0, "drum_gain stiffness": -500.0,
+            "external_wrench stiffness": -420.0,
+            "external_wrench": -560.0, "drum_gain": -700.0, "stiffness": -600.0,
+        }
+    )  # fmt: skip
+    asked: dict[tuple[str, ...], list[str]] = {}
+
+    def promising(_setting: object, joint: Any, absent: list[Any]) -> list[Promising]:
+        asked[tuple(sorted(joint.names))] = [layout.name for layout in absent]
+        gain = {("external_wrench",): 188.0, ("drum_gain",): 311.0}.get(tuple(joint.names), -1.0)
+        return [Promising(term(ROBOT, "cable_weight"), gain, 0.0)]
+
+    monkeypatch.setattr(refits, "promising_beside", promising)
+    monkeypatch.setattr(refits, "has_history", lambda _problem, layout: layout.name == "creep")
+    scores: Any = SimpleNamespace(always=frozenset())
+    best: Any = toy.fit(None, frozenset({"drum_gain", "external_wrench", "stiffness"}))
+    assert swapped(toy, scores, best) == "best"
+    assert toy.taken == ["cable_weight + external_wrench"]  # 172 were enough, 312 would have been
+    assert {len(names): some for names, some in asked.items()} == {
+        2: ["cable_weight", "creep"],
+        1: ["cable_weight"],
+    }
+    # of two members, all but one are one
+    asked.clear()
+    swapped(toy, scores, toy.fit(None, frozenset({"drum_gain", "stiffness"})))
+    assert len(asked) == 2
