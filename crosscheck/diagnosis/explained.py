@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from crosscheck.calibration.judgement.alternatives import alternatives, shared
+from crosscheck.calibration.judgement.alternatives import alternatives, is_in_each
 from crosscheck.calibration.judgement.verdict import Judgement
 from crosscheck.calibration.noise.robust import outliers
 from crosscheck.calibration.search import SetSearch
@@ -57,9 +57,8 @@ def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
     chances = chances_of(sought)
     more = sought.judgement.more
     some = [] if more or unknown else alternatives(sought.found, sought.classes)
-    if search.found and (
-        len(some) < 2 or not shared(some, sought.classes).issuperset(search.found)
-    ):
+    listed_in_all = all(is_in_each(name, some, sought.classes) for name in search.found)
+    if search.found and (len(some) < 2 or not listed_in_all):
         some = []
     # effects that are not sure are missing too, and with them in the model values are better;
     # for EFFECTS_FOUND, the listed effects have to be a model by themselves
@@ -179,7 +178,7 @@ def _sentence(
         f"On held-out runs it is {rms_words(together.before)} as the model stands and "
         f"{rms_words(together.held_out)} with all effects that can be fitted together."
     )
-    sure = ", ".join(m.effect for m in missing)
+    sure = ", ".join(_or_in_its_place(m, alternatives) for m in missing)
     if len(alternatives) > 1:
         return (
             "No few effects explain the error with certainty: these data leave open whether it is "
@@ -199,6 +198,13 @@ def _sentence(
         f"{rms_words(together.before)} to {rms_words(together.held_out)} on held-out runs. "
         + (f"Certain among them: {sure}." if sure else "None of them is certain by itself.")
     )
+
+
+def _or_in_its_place(one: MissingEffect, alternatives: Sequence[Names]) -> str:
+    """A listed effect, and what does the same in those sets that do not have it."""
+    lacking = frozenset().union(*(names for names in alternatives if one.effect not in names))
+    also = sorted(lacking.intersection(r.name for r in one.rivals))
+    return f"{one.effect} (or {', '.join(also)})" if also else one.effect
 
 
 def _not_listed(

@@ -16,16 +16,21 @@ _MOST = 3
 
 def shared(some: Sequence[Names], classes: Classes) -> Names:
     """Members of the first of several sets that each of them has, or an equivalent."""
-    if not some:
-        return frozenset()
-    same = {e: frozenset(members) for members in classes.members for e in members}
-    return frozenset(
-        name for name in some[0] if all(same.get(name, {name}) & other for other in some)
-    )
+    first = some[0] if some else frozenset()
+    return frozenset(name for name in first if is_in_each(name, some, classes))
+
+
+def is_in_each(name: str, some: Sequence[Names], classes: Classes) -> bool:
+    """Whether each of several sets has an effect, or an equivalent."""
+    members = next((m for m in classes.members if name in m), (name,))
+    return all(not other.isdisjoint(members) for other in some)
 
 
 def alternatives(found: ComparedSets, classes: Classes) -> list[Names]:
     """Sets of few effects that explain as well as the best one, none a subset of another.
+
+    Two effects may do together what one in a class with the first of them does by itself: a centre
+    of mass elsewhere beside a tilted frame, and a force. Neither set is part of the other then.
 
     Args:
         found: the sets that were compared.
@@ -38,13 +43,24 @@ def alternatives(found: ComparedSets, classes: Classes) -> list[Names]:
     first = {e: members[0] for members in classes.members for e in members}
     if not _is_few(found, found.best):
         return []
-    as_good = [r for r in found.refits.values() if r.score >= found.best.score - EQUAL]
+
+    def is_as_good(refit: Refit | None) -> bool:
+        return refit is not None and refit.score >= found.best.score - EQUAL
+
+    def contains(own: Names, kinds: Names, other: Names) -> bool:
+        """Whether a set has the kinds of another, and these members alone explain as well."""
+        some = frozenset(e for e in own if first.get(e, e) in other)
+        return other <= kinds and (some == own or is_as_good(found.refit(found.always | some)))
+
     out: list[Names] = []
     kept: list[Names] = []
+    as_good = [r for r in found.refits.values() if is_as_good(r)]
     for refit in sorted(as_good, key=lambda r: (len(r.names), -r.score)):
         own = refit.names - found.always
         kinds = frozenset(first.get(e, e) for e in own)
-        if _is_few(found, refit) and not any(kinds <= other or other <= kinds for other in kept):
+        if _is_few(found, refit) and not any(
+            kinds <= other or contains(own, kinds, other) for other in kept
+        ):
             out.append(own)
             kept.append(kinds)
     return out[:_MOST]

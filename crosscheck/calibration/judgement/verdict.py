@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from crosscheck.calibration.judgement.alternatives import alternatives, shared
+from crosscheck.calibration.judgement.alternatives import alternatives, is_in_each, shared
 from crosscheck.calibration.judgement.probability import Classes
 from crosscheck.calibration.sets.equals import BY_CHANCE, SMALL
 from crosscheck.calibration.sets.linear_search import Names
@@ -87,8 +87,7 @@ class Judgement:
         others = alternatives(found, classes)
         if self.verdict is not DiagnosisVerdict.EFFECTS_FOUND or len(others) < 2:
             return self
-        every = shared(others, classes)
-        sure = tuple(n for n in self.sure if n in every or classes.of(n) > SURE)
+        sure = tuple(n for n in self.sure if classes.of(n) > SURE or is_in_each(n, others, classes))
         if len(sure) == len(self.sure):
             return self
         return replace(self, sure=sure, verdict=DiagnosisVerdict.MANY_EFFECTS)

@@ -12,6 +12,7 @@ import pytest
 from crosscheck.calibration.unknown.imitated import NOT_ASKED, Imitated
 from crosscheck.calibration.unknown.varying import Varying
 from crosscheck.diagnosis.chances import Chances, chances_of
+from crosscheck.diagnosis.explained import _or_in_its_place
 from crosscheck.diagnosis.listed import diagnosis_of
 from crosscheck.diagnosis.nearby import _with_equals
 from crosscheck.fit.reasons import DiagnosisVerdict
@@ -53,3 +54,15 @@ def test_a_diagnosis_notes_it_unless_something_unknown_is_there_anyway() -> None
         )  # fmt: skip
         said = [note for note in again.notes if "something else in place of pulley_radius" in note]
         assert again.notes[0] == "first" and bool(said) is told
+
+
+def test_what_does_the_same_in_another_set_is_told_beside_a_listed_effect() -> None:
+    """A force where the other set has a centre of mass elsewhere beside a tilt."""
+    rivals = [SimpleNamespace(name=name) for name in ("external_wrench", "initial_pose_error")]
+    centre: Any = SimpleNamespace(effect="centre_of_mass", rivals=rivals)
+    both = [{"cable_weight", "external_wrench"}, {"cable_weight", "centre_of_mass", "tilt"}]
+    some = [frozenset(names) for names in both]
+    assert _or_in_its_place(centre, some) == "centre_of_mass (or external_wrench)"
+    assert _or_in_its_place(centre, some[1:]) == "centre_of_mass"
+    weight: Any = SimpleNamespace(effect="cable_weight", rivals=rivals)
+    assert _or_in_its_place(weight, some) == "cable_weight"

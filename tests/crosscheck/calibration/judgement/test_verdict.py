@@ -323,6 +323,25 @@ def test_a_swap_within_a_class_is_no_alternative() -> None:
     assert open_sets({"": -900.0, "ab": 0.0, "ac": -0.5, "bc": -400.0}) == [{*"ab"}]
 
 
+def test_two_effects_that_do_what_an_equivalent_of_the_first_does_are_an_alternative() -> None:
+    """A centre of mass elsewhere beside a tilt, or a force: the tilt had 76 % and was found."""
+    scores = {"": -900.0, "abd": 0.0, "ac": -1.0, "ab": -200.0, "cd": -300.0, "acd": -4.0}
+    found = found_of(scores)
+    sure = Classes(
+        {"a": 0.99, "b": 0.65, "c": 0.34, "d": 0.7},
+        [("a",), ("b", "c"), ("d",)], [0.99, 0.99, 0.7], {},
+    )  # fmt: skip
+    found = replace(found, refit=lambda names: found.refits.get(names))
+    assert alternatives(found, sure) == [frozenset("ac"), frozenset("abd")]
+    said = Judgement(DiagnosisVerdict.EFFECTS_FOUND, ("a", "b", "d"), 0.0)
+    left = said.with_sure_ones(found, sure)
+    assert left.verdict is DiagnosisVerdict.MANY_EFFECTS and left.sure == ("a", "b")
+    # where the first of them does without the second, the larger set is no other
+    better = found_of({**scores, "ab": -1.5})
+    better = replace(better, refit=lambda names: better.refits.get(names))
+    assert alternatives(better, sure) == [frozenset("ac")]
+
+
 def test_a_large_best_set_has_no_alternatives_of_few() -> None:
     assert open_sets({"": -900.0, "abcdef": 0.0, "g": -1.0}) == []
     assert open_sets({"": 0.0, "a": -1.0}) == []
