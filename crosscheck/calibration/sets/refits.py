@@ -271,6 +271,8 @@ def looked_about(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Ref
         for names in _beside(exact, scores, best.names):
             exact.fit(scores, names)
             _begin_at(exact, scores, best, names)
+        for names in _beside_equals(exact, scores, best):
+            exact.fit(scores, names)
         better = exact.best_of(scores, containing(exact, exact.best))
         if better.names == best.names:
             return scores, best
@@ -278,8 +280,11 @@ def looked_about(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Ref
         scores = exact.scores_about(best.joint)
 
 
-def _beside(exact: Exact, scores: Scores, names: Names) -> list[Names]:
-    """Sets with one member dropped or exchanged that are as good by linear evidence."""
+def _beside(exact: Exact, scores: Scores, names: Names, known: Names | None = None) -> list[Names]:
+    """Sets with one member dropped or exchanged that are as good by linear evidence.
+
+    If some effects are ``known``, only sets with another one.
+    """
     near, own = scores.neighbours(names), scores.score(names)
 
     def as_good(other: Names) -> bool:
@@ -287,7 +292,24 @@ def _beside(exact: Exact, scores: Scores, names: Names) -> list[Names]:
         return are_equals(own - near[other], gone, come)
 
     some = [other for other in near if len(other) <= len(names) and as_good(other)]
+    if known is not None:
+        some = [other for other in some if not other <= known]
     return sorted(some, key=lambda other: (-near[other], sorted(other)))[:_BESIDE]
+
+
+def _beside_equals(exact: Exact, scores: Scores, best: Refit) -> list[Names]:
+    """New sets with a member exchanged in one that explains as well as the best.
+
+    They differ from the best one by two members, of which neither can be exchanged alone: a frame
+    that yields and another target, or the cable behind the winches and exit points elsewhere. Only
+    what none of these sets has can tell that a member is not as sure as all of them make it.
+    """
+    equals = [r.names for r in exact.possible.values() if r.score > best.score - EQUAL]
+    alike = [names for names in equals if len(names) == len(best.names) and names != best.names]
+    known = best.names.union(*alike)
+    near = {other for names in alike for other in _beside(exact, scores, names, known)}
+    new = [names for names in near if names not in exact.fitted]
+    return sorted(new, key=lambda names: (-scores.score(names), sorted(names)))[:_BESIDE]
 
 
 def _begin_at(exact: Exact, scores: Scores, best: Refit, names: Names) -> None:

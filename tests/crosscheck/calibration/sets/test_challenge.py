@@ -17,7 +17,12 @@ from crosscheck.calibration.sets.catalogue import Catalogue
 from crosscheck.calibration.sets.challenge import challenge, excluding, tried_equals
 from crosscheck.calibration.sets.exact import Exact, Refit
 from crosscheck.calibration.sets.linear_search import Names, Scores, explore
-from crosscheck.calibration.sets.refits import containing, does_nothing, looked_about
+from crosscheck.calibration.sets.refits import (
+    _beside_equals,
+    containing,
+    does_nothing,
+    looked_about,
+)
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms, effect_named, layout_of
@@ -279,3 +284,22 @@ def test_sets_of_up_to_eight_are_fitted_without_each_member(
     monkeypatch.setattr(exact, "fit", lambda _scores, names: exact.fitted.get(names))
     found = refits._thinned(exact, exact.scores, best).names
     assert found == (best.names - {"c"} if size <= 8 else best.names)
+
+
+def test_sets_two_exchanges_away_are_fitted_if_each_alone_is_worse() -> None:
+    """A frame that yields and another target did what exit points and the winch's side did."""
+    linear = {"ab": 0.0, "cb": -0.5, "ad": -1.0, "eb": -15.0, "ed": -1.1, "cd": -1.5, "ef": -9.0}
+    table = {frozenset(names): score for names, score in linear.items()}
+
+    def neighbours(names: Names) -> dict[Names, float]:
+        return {other: score for other, score in table.items() if len(other - names) == 1}
+
+    fitted = {names: SimpleNamespace(names=names, score=table[names]) for names in table}
+    for names in (frozenset("ed"), frozenset("cd"), frozenset("ef")):
+        del fitted[names]
+    exact: Any = SimpleNamespace(possible=fitted, fitted=fitted, size=lambda _name: 1)
+    scores: Any = SimpleNamespace(score=table.__getitem__, neighbours=neighbours)
+    # not what only has members of sets that explain as well: c, or d, in place of a, or b
+    assert _beside_equals(exact, scores, fitted[frozenset("ab")]) == [frozenset("ed")]
+    fitted[frozenset("ed")] = SimpleNamespace(names=frozenset("ed"), score=-1.1)
+    assert frozenset("ed") not in _beside_equals(exact, scores, fitted[frozenset("ab")])
