@@ -300,9 +300,10 @@ def _beside(exact: Exact, scores: Scores, names: Names, known: Names | None = No
 def _beside_equals(exact: Exact, scores: Scores, best: Refit) -> list[Names]:
     """New sets with a member exchanged in one that explains as well as the best.
 
-    They differ from the best one by two members, of which neither can be exchanged alone: a frame
-    that yields and another target, or the cable behind the winches and exit points elsewhere. Only
-    what none of these sets has can tell that a member is not as sure as all of them make it.
+    They differ from the best one by two members, of which one can only be exchanged after the
+    other: beside a frame that yields another target explains what exit points elsewhere do, but not
+    beside cable behind the winches, which does the same as the frame. Only what none of these sets
+    has can tell that a member is not as sure as all of them make it.
     """
     equals = [r.names for r in exact.possible.values() if r.score > best.score - EQUAL]
     alike = [names for names in equals if len(names) == len(best.names) and names != best.names]

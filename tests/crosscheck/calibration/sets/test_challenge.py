@@ -286,7 +286,7 @@ def test_sets_of_up_to_eight_are_fitted_without_each_member(
     assert found == (best.names - {"c"} if size <= 8 else best.names)
 
 
-def test_sets_two_exchanges_away_are_fitted_if_each_alone_is_worse() -> None:
+def test_sets_two_exchanges_away_are_fitted_if_one_is_only_possible_after_the_other() -> None:
     """A frame that yields and another target did what exit points and the winch's side did."""
     linear = {"ab": 0.0, "cb": -0.5, "ad": -1.0, "eb": -15.0, "ed": -1.1, "cd": -1.5, "ef": -9.0}
     table = {frozenset(names): score for names, score in linear.items()}
