@@ -91,7 +91,7 @@ def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
 def _rivals(sought: SetSearch, names: Names, name: str) -> list[Rival]:
     """The other members of an effect's class, each with a fit of the model that has it instead."""
     found = sought.found
-    members = next((m for m in sought.classes.members if name in m), (name,))
+    members = sought.classes.alike(name)
     own = found.refit(names)
     if own is None:
         return []

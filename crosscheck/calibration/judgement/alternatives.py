@@ -22,8 +22,7 @@ def shared(some: Sequence[Names], classes: Classes) -> Names:
 
 def is_in_each(name: str, some: Sequence[Names], classes: Classes) -> bool:
     """Whether each of several sets has an effect, or an equivalent."""
-    members = next((m for m in classes.members if name in m), (name,))
-    return all(not other.isdisjoint(members) for other in some)
+    return all(not other.isdisjoint(classes.alike(name)) for other in some)
 
 
 def alternatives(found: ComparedSets, classes: Classes) -> list[Names]:

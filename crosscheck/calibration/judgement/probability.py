@@ -43,6 +43,10 @@ class Classes:
         """Expected number of open classes and further members: the sum of min(P, 1 - P)."""
         return float(sum(min(p, 1.0 - p) for p in (*self.probability, *self.further.values())))
 
+    def alike(self, name: str) -> tuple[str, ...]:
+        """The members of an effect's class, itself among them."""
+        return next((members for members in self.members if name in members), (name,))
+
     def without(self, imitating: Names, chance: float) -> Classes:
         """The probabilities if, with some chance, something unknown explains what these explain.
 

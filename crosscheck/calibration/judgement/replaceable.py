@@ -44,7 +44,7 @@ class Replaced:
         """Exclude each of these members of the best set in turn."""
         best = self.found.best.names
         for name in sure:
-            members = next(some for some in classes.members if name in some)
+            members = classes.alike(name)
             barred = frozenset(members) - (best - {name})
             for _ in range(_ROUNDS):
                 equals = self._fitted_without(name, barred)

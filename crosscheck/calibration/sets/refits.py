@@ -268,7 +268,7 @@ def looked_about(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Ref
     member would seem sure.
     """
     while True:
-        for names in _beside(exact, scores, best.names):
+        for names in _beside(exact, scores, best.names)[:_BESIDE]:
             exact.fit(scores, names)
             _begin_at(exact, scores, best, names)
         for names in _beside_equals(exact, scores, best):
@@ -280,11 +280,8 @@ def looked_about(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Ref
         scores = exact.scores_about(best.joint)
 
 
-def _beside(exact: Exact, scores: Scores, names: Names, known: Names | None = None) -> list[Names]:
-    """Sets with one member dropped or exchanged that are as good by linear evidence.
-
-    If some effects are ``known``, only sets with another one.
-    """
+def _beside(exact: Exact, scores: Scores, names: Names) -> list[Names]:
+    """Sets with one member dropped or exchanged that are as good by linear evidence, in order."""
     near, own = scores.neighbours(names), scores.score(names)
 
     def as_good(other: Names) -> bool:
@@ -292,9 +289,7 @@ def _beside(exact: Exact, scores: Scores, names: Names, known: Names | None = No
         return are_equals(own - near[other], gone, come)
 
     some = [other for other in near if len(other) <= len(names) and as_good(other)]
-    if known is not None:
-        some = [other for other in some if not other <= known]
-    return sorted(some, key=lambda other: (-near[other], sorted(other)))[:_BESIDE]
+    return sorted(some, key=lambda other: (-near[other], sorted(other)))
 
 
 def _beside_equals(exact: Exact, scores: Scores, best: Refit) -> list[Names]:
@@ -308,8 +303,8 @@ def _beside_equals(exact: Exact, scores: Scores, best: Refit) -> list[Names]:
     equals = [r.names for r in exact.possible.values() if r.score > best.score - EQUAL]
     alike = [names for names in equals if len(names) == len(best.names) and names != best.names]
     known = best.names.union(*alike)
-    near = {other for names in alike for other in _beside(exact, scores, names, known)}
-    new = [names for names in near if names not in exact.fitted]
+    near = {other for names in alike for other in _beside(exact, scores, names)}
+    new = [names for names in near if not names <= known and names not in exact.fitted]
     return sorted(new, key=lambda names: (-scores.score(names), sorted(names)))[:_BESIDE]
 
 
@@ -345,7 +340,7 @@ def containing(exact: Exact, best: Refit) -> list[Names]:
 
 
 def swapped(exact: Exact, scores: Scores, best: Refit) -> Refit:
-    """The best set after exchanging members for effects that the linear model does not do justice.
+    """The best set after exchanging members for effects that the linear model does no justice to.
 
     The linear model has effects with a shape at one shape (a reference temperature, a time), which
     need not be the one that explains what a member does. And it has what heavy cables do at no
