@@ -182,8 +182,9 @@ def measure_next(
         out += _to_decide(list(alternatives))
     if verdict is DiagnosisVerdict.MANY_EFFECTS:
         out.append(_CALIBRATE)
-    if verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
+    if verdict in (DiagnosisVerdict.MANY_EFFECTS, DiagnosisVerdict.UNKNOWN_EFFECT):
         out += [f"to find {what}: {what.advice}" for what in seen if what.advice]
+    if verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
         out += [_to_find(where), *_set_up_anew(found.problem.data, where), _ALL_AT_ONCE]
     if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         out.append("nothing that matters is missing; to find smaller effects, use crosscheck plan")

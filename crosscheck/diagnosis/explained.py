@@ -15,6 +15,7 @@ from crosscheck.calibration.search import SetSearch
 from crosscheck.calibration.sets.equals import EQUAL
 from crosscheck.calibration.sets.exact import Refit
 from crosscheck.calibration.sets.linear_search import Names
+from crosscheck.calibration.unknown.imitated import Imitated
 from crosscheck.diagnosis.averaged import spread_by_others
 from crosscheck.diagnosis.chances import PROBABLE, Chances, chances_of
 from crosscheck.diagnosis.listed import diagnosis_of, left_out, missing_of
@@ -35,7 +36,7 @@ from crosscheck.diagnosis.words import (
     words_of,
 )
 from crosscheck.fit.effects.candidates import Candidate
-from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
+from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why, probability_words
 from crosscheck.fit.words import rms_words
 from seecr.counted import counted
 
@@ -56,7 +57,8 @@ def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
     fitted = len(sought.calibration.terms.names)
     chances = chances_of(sought)
     more = sought.judgement.more
-    some = [] if more or unknown else alternatives(sought.found, sought.classes)
+    open_to_known = not (more or unknown or sought.judgement.imitated)
+    some = alternatives(sought.found, sought.classes) if open_to_known else []
     listed_in_all = all(is_in_each(name, some, sought.classes) for name in search.found)
     if search.found and (len(some) < 2 or not listed_in_all):
         some = []
@@ -161,12 +163,7 @@ def _sentence(
     if said.verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         return agreement_words(tried, hints_of(chances, ()))
     if said.imitated is not None:
-        known = " + ".join(sorted(said.imitated.replaced))
-        left = (
-            f"an unknown effect is more probable than {known}, which can imitate it: "
-            f"{said.imitated.words}"
-        )
-        return and_what_is_left(words_of(missing), left, tried)
+        return and_what_is_left(words_of(missing), _more_probable(said, said.imitated), tried)
     if said.verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
         return structure_words(missing, tried, chances)
     if said.verdict is DiagnosisVerdict.EFFECTS_FOUND:
@@ -197,6 +194,18 @@ def _sentence(
         f"No few effects explain the error, but {every} together do: they reduce it from "
         f"{rms_words(together.before)} to {rms_words(together.held_out)} on held-out runs. "
         + (f"Certain among them: {sure}." if sure else "None of them is certain by itself.")
+    )
+
+
+def _more_probable(said: Judgement, unknown: Imitated) -> str:
+    """That something unknown is more probable than members that can imitate it, and how sure."""
+    known = " + ".join(sorted(unknown.replaced))
+    likely = ""
+    if said.verdict is DiagnosisVerdict.MANY_EFFECTS:
+        likely = f" (probability {probability_words(unknown.probability)}), but not certain"
+    return (
+        f"an unknown effect is more probable than {known}, which can imitate it{likely}: "
+        f"{unknown.words}"
     )
 
 

@@ -54,7 +54,7 @@ def diagnosis_of(
     last = (search if shown is None else shown).last
     after = rms_by_kind(search.problem, last.fit.state.raw)
     is_unknown = verdict is DiagnosisVerdict.UNKNOWN_EFFECT
-    seen = chances.seen if is_unknown else ()
+    seen = chances.seen if is_unknown or chances.imitated is not None else ()
     alike = [one.common.note for one in missing if one.common is not None]
     doubts = [] if is_unknown else doubts_about(missing, chances)
     return Diagnosis(

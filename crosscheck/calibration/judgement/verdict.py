@@ -4,7 +4,8 @@ Something unknown is there if a smooth field over the workspace, or something th
 earns evidence beside all effects or in place of some, or if held-out runs are predicted worse than
 the fit itself expects. If the data leave open which effects are missing, or if it takes many, the
 verdict is ``many_effects``: a calibration and no diagnosis. The same holds if something unknown
-explains more beside the best set, but nothing beside the whole catalogue.
+explains more beside the best set, but nothing beside the whole catalogue; or if it is likelier than
+some members, but not sure.
 """
 
 from __future__ import annotations
@@ -182,14 +183,16 @@ def _named(found: ComparedSets, likely: Classes, few: bool) -> tuple[str, ...]:
 def _beside_unknown(
     found: ComparedSets, signs: SignsOfUnknown, implausible: Names, undecided: float
 ) -> Judgement | None:
-    """What is sure where something unknown is at work; None if nothing is."""
+    """What is sure where something unknown is at work, or likelier than not; None if nothing is."""
     in_place = signs.in_place
     if in_place.chance:
         # of several members that stay, some may absorb what others explain
         most = carrying_most(found, in_place.worth, _ALL)
         kept = tuple(name for name in most if name not in implausible)
         if kept or not signs.are_clear:
-            return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, kept, undecided, imitated=in_place)
+            sure = signs.are_clear or in_place.chance > SURE
+            verdict = DiagnosisVerdict.UNKNOWN_EFFECT if sure else DiagnosisVerdict.MANY_EFFECTS
+            return Judgement(verdict, kept, undecided, imitated=in_place)
     if not signs.are_clear:
         return None
     # known effects imitate it: none of them is sure but one that outweighs all else; where no field

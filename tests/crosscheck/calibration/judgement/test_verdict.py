@@ -20,6 +20,7 @@ from crosscheck.calibration.sets.exact import Refit
 from crosscheck.calibration.sets.linear_search import Names, Scores
 from crosscheck.calibration.sets.refits import ComparedSets
 from crosscheck.calibration.unknown.imitated import Imitated
+from crosscheck.calibration.unknown.varying import Varying
 from crosscheck.fit.reasons import DiagnosisVerdict
 from seecr.effects import Terms
 
@@ -147,6 +148,22 @@ def test_a_field_or_runs_left_out_make_it_unknown() -> None:
     assert judged(scores, surprise=3.0).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
 
 
+@pytest.mark.parametrize("odds", [5.5, 7.5, 8.5])
+def test_something_unknown_in_place_of_members_must_be_sure(odds: float) -> None:
+    """A robot all of whose tolerances were off was called unknown, with a probability of 0.89."""
+    found = found_of({"": -900.0, "a": -300.0, "b": -500.0, "ab": 0.0})
+    classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
+    field = Imitated(odds, frozenset("b"), (Varying.POSITION,), {"a": 400.0})
+    said = judge(found, classes, SignsOfUnknown(-5.0, 1.0, in_place=field))
+    is_sure = field.probability > 0.95
+    assert is_sure == (odds == 8.5) and said.sure == ("a",) and said.imitated is field
+    unknown = said.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
+    assert unknown == is_sure and (unknown or said.verdict is DiagnosisVerdict.MANY_EFFECTS)
+    # a field beside the whole catalogue leaves no doubt
+    said = judge(found, classes, SignsOfUnknown(6.0, 1.0, in_place=field))
+    assert said.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
+
+
 def test_a_field_beside_the_best_set_alone_makes_it_many() -> None:
     """The whole catalogue takes it in: that can be a calibration, few effects it is not."""
     found = found_of({"": -9000.0, "a": -30.0, "b": -8970.0, "ab": 0.0})
@@ -171,7 +188,7 @@ def test_a_field_beside_the_best_set_alone_makes_it_many() -> None:
 def test_a_field_in_the_place_of_members_is_something_unknown() -> None:
     found = found_of({"": -9000.0, "a": -30.0, "b": -8970.0, "ab": 0.0})
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
-    here = Imitated(6.0, frozenset("b"), (), {"a": 800.0})
+    here = Imitated(9.0, frozenset("b"), (), {"a": 800.0})
 
     def said(
         in_place: Imitated, of: ComparedSets = found, implausible: Names = frozenset()
