@@ -8,7 +8,7 @@ A test runs :func:`with_table` and goes red where the page is out of date.
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import cache
@@ -435,9 +435,9 @@ def with_table(
     return f"{before}{begin}\n" + "\n".join(lines) + f"\n{end}{tail}"
 
 
-def main(arguments: list[str]) -> None:
-    """Write the pictures, and the table into the page."""
-    if "--numbers" not in arguments:
+def main(numbers: bool) -> None:
+    """Write the pictures, and the tables into the page; of ``numbers`` only the tables."""
+    if not numbers:
         PICTURES.mkdir(parents=True, exist_ok=True)
         for name, draw in FIGURES.items():
             draw(PICTURES / f"{name}.png")
@@ -450,4 +450,6 @@ def main(arguments: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--numbers", action="store_true", help="the tables only")
+    main(parser.parse_args().numbers)

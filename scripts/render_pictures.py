@@ -10,6 +10,7 @@ are written to ``docs/pictures``, or to the folder given. Each keeps the numbers
 
 from __future__ import annotations
 
+import argparse
 import io
 import json
 import socket
@@ -87,7 +88,7 @@ _GRID = ((0.04, 0.76, 73), (0.04, 0.46, 43), (0.05, 0.40, 6))
 _COLOURS = 256
 
 
-def main(folder: Path = FOLDER) -> None:
+def main(folder: Path) -> None:
     """Run the cases, record them, and draw each picture."""
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as name, viewer() as client:
@@ -207,4 +208,6 @@ def viewer() -> Iterator[ViewerClient]:
 
 
 if __name__ == "__main__":
-    main(*(Path(argument) for argument in sys.argv[1:2]))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, nargs="?", default=FOLDER)
+    main(parser.parse_args().folder)

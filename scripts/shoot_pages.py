@@ -9,7 +9,7 @@ Chromium or Chrome on the path the pages are written and no pictures are taken.
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections.abc import Callable
 from pathlib import Path
 
@@ -98,5 +98,10 @@ def photograph(page: Path) -> list[str]:
 
 
 if __name__ == "__main__":
-    given, *pages = sys.argv[1:] or ["pages"]
-    main(Path(given), *pages)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, nargs="?", default=Path("pages"))
+    parser.add_argument("pages", nargs="*", metavar="page", help=" ".join(PAGES))
+    given = parser.parse_args()
+    if unknown := set(given.pages) - set(PAGES):
+        parser.error(f"no page {', '.join(sorted(unknown))}; pages are {', '.join(PAGES)}")
+    main(given.folder, *given.pages)
