@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from crosscheck.calibration.judgement.probability import Classes, of_classes
 from crosscheck.calibration.judgement.verdict import SURE
 from crosscheck.calibration.sets.linear_search import Names
 
 # An effect may join a class if it costs less ln evidence than this. Those that cost least join, as
-# few as make the class surer than _TO.
+# few as make the class surer than _TO, and what costs no more than these.
 _NEARLY, _TO = 6.0, 0.97
 
 
@@ -44,18 +46,23 @@ def _joined(
     best: Names,
     name: str,
 ) -> Classes:
-    """The class of one member of the best set joined by others until it is sure, or as it was."""
+    """The class of one member of the best set joined by others until it is sure, or as it was.
+
+    Then whatever explains as well as one of these joins too, though it takes no more to be sure.
+    """
     loss = _losses(fitted, best, name)
-    members = list(classes.members)
+    members, wider, worst = list(classes.members), classes, np.inf
     for other in sorted(loss, key=lambda e: (loss[e], e)):
         mine, its = (next(some for some in members if e in some) for e in (name, other))
         if its == mine or not best.isdisjoint(its):
             continue
+        if loss[other] > worst:
+            break
         members = [some for some in members if some not in (mine, its)] + [(*mine, *its)]
         wider = of_classes(scores, best, classes.effect, members)
         if wider.of(name) > _TO:
-            return wider
-    return classes
+            worst = max(loss.get(member, 0.0) for member in (*mine, *its))
+    return wider if np.isfinite(worst) else classes
 
 
 def _losses(fitted: Mapping[Names, float], best: Names, name: str) -> dict[str, float]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from crosscheck.calibration.judgement.probability import Classes, probabilities
+from crosscheck.calibration.judgement.probability import Classes, of_classes, probabilities
 from crosscheck.calibration.judgement.sure_together import sure_together
 from crosscheck.calibration.sets.linear_search import Names
 
@@ -33,6 +33,15 @@ def test_what_explains_nearly_as_well_joins_until_the_class_is_sure() -> None:
 def test_no_more_join_than_are_needed() -> None:
     found = wider(ALONE | {frozenset("d"): -7.0}, "a")
     assert found.members[0] == ("a", "b", "c") and found.probability[0] > 0.97
+
+
+def test_what_explains_as_well_as_one_that_joined_is_not_left_out() -> None:
+    """A mass, which was there, explained better than four that joined with one of their kind."""
+    scores = ALONE | {frozenset("c"): -7.0, frozenset("d"): -4.5, frozenset(): -20.0}
+    groups = [("a",), ("b", "e"), ("c",), ("d",)]
+    classes = of_classes(scores, frozenset("a"), "abcde", groups)
+    found = sure_together(classes, scores, scores, frozenset("a"))
+    assert set(found.members[0]) == set("abde") and ("c",) in found.members
 
 
 def test_a_class_that_is_sure_stays_as_it_is() -> None:
