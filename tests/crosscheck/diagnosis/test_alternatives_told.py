@@ -9,10 +9,11 @@ from typing import Any
 import made_diagnoses
 import pytest
 
+from crosscheck.calibration.judgement.verdict import Judgement
 from crosscheck.calibration.unknown.imitated import NOT_ASKED, Imitated
 from crosscheck.calibration.unknown.varying import Varying
 from crosscheck.diagnosis.chances import Chances, chances_of
-from crosscheck.diagnosis.explained import _or_in_its_place
+from crosscheck.diagnosis.explained import _or_in_its_place, _sentence
 from crosscheck.diagnosis.listed import diagnosis_of
 from crosscheck.diagnosis.nearby import _with_equals
 from crosscheck.fit.reasons import DiagnosisVerdict
@@ -66,3 +67,18 @@ def test_what_does_the_same_in_another_set_is_told_beside_a_listed_effect() -> N
     assert _or_in_its_place(centre, some[1:]) == "centre_of_mass"
     weight: Any = SimpleNamespace(effect="cable_weight", rivals=rivals)
     assert _or_in_its_place(weight, some) == "cable_weight"
+
+
+@pytest.mark.parametrize(
+    "verdict", [DiagnosisVerdict.MANY_EFFECTS, DiagnosisVerdict.UNKNOWN_EFFECT]
+)
+def test_the_sentence_says_how_probable_something_unknown_is_unless_it_is_sure(
+    verdict: DiagnosisVerdict,
+) -> None:
+    unknown = Imitated(6.0, frozenset({"length_scale"}), (Varying.POSITION,))
+    said = Judgement(verdict, (), 0.0, imitated=unknown)
+    nothing: Any = None
+    sentence = _sentence(said, [], 25, nothing)
+    assert sentence.startswith("An unknown effect is more probable than length_scale, which can")
+    told = "imitate it (probability 73 %), but not certain: " in sentence
+    assert told == (verdict is DiagnosisVerdict.MANY_EFFECTS)
