@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting, moved_on, settle
 from crosscheck.calibration.joint_fit.linearised import Linear, linearised
@@ -25,8 +24,6 @@ from seecr.pose import Array
 _STEPS, _EARNEST = 6, 4
 # A prediction is nonlinear if it differs from its linearisation by this part of the noise.
 _BENT = 0.1
-# So seldom a run is to be twice as far off as expected by chance.
-_CHANCE = 1e-4
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -36,7 +33,7 @@ class LeftOut(HeldOut):
     Attributes:
         surprise: (blocks,) chi2 per reading of linearised predictions, in units of noise plus the
             uncertainty of the fit without the block: about 1 if the model is right, however far
-            it extrapolates. Of few readings it is less, so that it is hardly ever 2 by chance.
+            it extrapolates.
     """
 
     surprise: Array
@@ -64,17 +61,9 @@ def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
             own = blocks[b][problem.row_of]
             chi2[b], readings[b] = float(left[own] @ left[own]), int(own.sum())
             power = surprise_of(linear, absent, _padded(own, len(absent)), expected[own])
-            surprise[b] = power / max(_by_chance(int(own.sum())), 1.0)
+            surprise[b] = power / max(int(own.sum()), 1)
     rms = rms_by_kind(problem, raw)
     return LeftOut(raw, chi2, readings, values, rms, valid=True, surprise=surprise)
-
-
-def _by_chance(readings: int) -> float:
-    """What chi2 is compared with: the number of readings, or, of few, half of what chance allows.
-
-    A run of one whole pose is twice as far off as expected in six of a hundred cases.
-    """
-    return max(float(readings), 0.5 * float(special.chdtri(readings, _CHANCE)))
 
 
 def _without(setting: Setting, joint: JointFit, absent: NDArray[np.bool_]) -> State:
