@@ -12,7 +12,6 @@ import math
 
 import numpy as np
 
-from seecr.compiled.algebra import next_within
 from seecr.compiled.columns import (
     COMPLIANCE,
     CREEP,
@@ -41,8 +40,6 @@ from seecr.compiled.jit import jit, jit_inner
 
 # A softening cable keeps this part of its stiffness.
 LEAST = 0.01
-# Most steps for the strain of a law: every other one may only halve a bracket, down to rounding.
-_MOST = 200
 
 
 @jit
@@ -235,8 +232,8 @@ def _solve_strain(row, stretch, guess):
         if series_length(row, high)[0] >= stretch:
             break
         low, high = high, 2.0 * high
-    strain, before = min(max(guess, low), high), np.inf
-    for _ in range(_MOST):
+    strain = min(max(guess, low), high)
+    for _ in range(100):
         length, rate, _t, _s, _z = series_length(row, strain)
         error = length - stretch
         if error > 0.0:
@@ -245,10 +242,12 @@ def _solve_strain(row, stretch, guess):
             low = strain
         if abs(error) <= 2e-16 * (abs(stretch) + row[REST] * strain):
             break
-        following = next_within(low, high, strain, strain - error / rate, before)
-        if following in (low, high):
+        following = strain - error / rate
+        if not (low < following < high):
+            following = 0.5 * (low + high)
+        if following == strain:
             break
-        before, strain = abs(following - strain), following
+        strain = following
     return strain
 
 
@@ -272,8 +271,7 @@ def strain_of_tension(row, tension):
             break
         high += reach
         reach *= 2.0
-    before = np.inf
-    for _ in range(_MOST):
+    for _ in range(100):
         t, slope, _z = tension_of_strain(row, strain)
         if t > tension:
             high = strain
@@ -281,9 +279,11 @@ def strain_of_tension(row, tension):
             low = strain
         if abs(t - tension) <= 2e-16 * abs(tension):
             break
-        following = next_within(low, high, strain, strain - (t - tension) / slope, before)
-        if following in (low, high):
+        following = strain - (t - tension) / slope
+        if not (low < following < high):
+            following = 0.5 * (low + high)
+        if following == strain:
             break
-        before, strain = abs(following - strain), following
+        strain = following
     _t, slope, z = tension_of_strain(row, strain)
     return strain, slope, z

@@ -14,7 +14,6 @@ from seecr.compiled.bracketed import bracketed_pull
 from seecr.compiled.catenary import catenary_span
 from seecr.compiled.columns import (
     CREEP,
-    EA,
     ENERGY,
     HYSTERESIS_BEFORE,
     REST,
@@ -67,26 +66,6 @@ def test_stiffness_and_slope_against_differences(kind: str, below: float) -> Non
             assert stiffness == pytest.approx(here.stiffness[:, k], rel=1e-5, abs=20 * top)
             slope = (ahead.tension - behind.tension) / (2 * size)
             assert slope == pytest.approx(here.slope[k], rel=1e-5, abs=20 * top)
-
-
-# About its last stretch this cable is five times as stiff; beyond, Newton's steps led to and fro.
-STICKING = {
-    "REST": 0.57744, "EA": 300.0, "HYSTERESIS": 0.0747, "HYSTERESIS_STRETCH": 1e-5,
-    "STRETCH_BEFORE": 1.28183412e-3, "HYSTERESIS_BEFORE": -0.05742917,
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("stretch", np.linspace(1.24e-3, 1.32e-3, 41))
-def test_a_hanging_cable_that_sticks_is_solved_to_rounding(stretch: float) -> None:
-    for weight, near in ((1e-7, 1e-5), (0.078, np.inf)):
-        row = cable(**STICKING, WEIGHT=weight)
-        strain = stretch / row[REST]  # of a straight cable, where all stretch is its own
-        straight = row[EA] * strain + dahl(row, strain)[0]
-        found = pull(row, in_direction(20.0, row[REST] + stretch))
-        assert found.ok and found.tension == pytest.approx(straight, rel=near)
-        there = found.state[STRAIN]
-        law = row[EA] * there + dahl(row, there)[0]
-        assert found.tension == pytest.approx(law, rel=1e-13)
 
 
 WITH_ENERGY = {
