@@ -87,6 +87,20 @@ def solve_3x3(a, b, out):
 
 
 @jit_inner
+def next_within(low, high, at, newton, before):
+    """The next point of a search for the root between ``low`` and ``high``, one of which is ``at``.
+
+    That is Newton's, or the middle. About a kink Newton's steps may circle for long inside of the
+    bracket, so that one that is longer than half the step before is not taken. A step that rounding
+    takes back to ``at`` ends a search, as does a middle that is ``low`` or ``high``.
+    """
+    if newton == at or (low < newton < high and abs(newton - at) <= 0.5 * before):
+        return newton
+    middle = 0.5 * (low + high)
+    return middle if math.isfinite(middle) else newton
+
+
+@jit_inner
 def largest_diagonal(a):
     """Largest absolute diagonal entry."""
     top = 0.0

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from seecr.compiled.algebra import solve_3x3
+from seecr.compiled.algebra import next_within, solve_3x3
 from seecr.compiled.bracketed import guess_by_brackets
 from seecr.compiled.catenary import catenary_energy, solve_catenary
 from seecr.compiled.columns import (
@@ -62,7 +62,7 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
     """
     seen, more = work[32], row[LIFT]
     lift, hanging = 0.0, row[WEIGHT] * row[REST]
-    low, high = -np.inf, np.inf
+    low, high, before = -np.inf, np.inf, np.inf
     for _ in range(_LIFTINGS):
         lowered(move, lift, up, seen)
         if not _fixed_pull(row, start, seen, up, guess, work, force, stiffness, gradient, state):
@@ -73,17 +73,16 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
         error = lift - more * pull
         if abs(error) <= _LIFTED * row[REST]:
             break
-        # the error grows with the lift, but has kinks, about which plain Newton steps may circle
+        # the error grows with the lift, but has kinks
         if error > 0.0:
             high = lift
         else:
             low = lift
-        following = lift - error / lift_slope(more, up, stiffness)
-        if not low < following < high:
-            following = 0.5 * (low + high)
-        if following == lift or not math.isfinite(following):
+        newton = lift - error / lift_slope(more, up, stiffness)
+        following = next_within(low, high, lift, newton, before)
+        if following in (low, high) or not math.isfinite(following):
             break
-        lift = following
+        before, lift = abs(following - lift), following
     if not abs(error) <= _LIFTED_ENOUGH * row[REST]:
         return False
     soften(more, up, stiffness, gradient, work[33])

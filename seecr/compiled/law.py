@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from seecr.compiled.algebra import next_within
 from seecr.compiled.columns import (
     COMPLIANCE,
     CREEP,
@@ -40,6 +41,8 @@ from seecr.compiled.jit import jit, jit_inner
 
 # A softening cable keeps this part of its stiffness.
 LEAST = 0.01
+# Most steps for the strain of a law: every other one may only halve a bracket, down to rounding.
+_MOST = 200
 
 
 @jit
@@ -232,8 +235,8 @@ def _solve_strain(row, stretch, guess):
         if series_length(row, high)[0] >= stretch:
             break
         low, high = high, 2.0 * high
-    strain = min(max(guess, low), high)
-    for _ in range(100):
+    strain, before = min(max(guess, low), high), np.inf
+    for _ in range(_MOST):
         length, rate, _t, _s, _z = series_length(row, strain)
         error = length - stretch
         if error > 0.0:
@@ -242,12 +245,10 @@ def _solve_strain(row, stretch, guess):
             low = strain
         if abs(error) <= 2e-16 * (abs(stretch) + row[REST] * strain):
             break
-        following = strain - error / rate
-        if not (low < following < high):
-            following = 0.5 * (low + high)
-        if following == strain:
+        following = next_within(low, high, strain, strain - error / rate, before)
+        if following in (low, high):
             break
-        strain = following
+        before, strain = abs(following - strain), following
     return strain
 
 
@@ -271,7 +272,8 @@ def strain_of_tension(row, tension):
             break
         high += reach
         reach *= 2.0
-    for _ in range(100):
+    before = np.inf
+    for _ in range(_MOST):
         t, slope, _z = tension_of_strain(row, strain)
         if t > tension:
             high = strain
@@ -279,11 +281,9 @@ def strain_of_tension(row, tension):
             low = strain
         if abs(t - tension) <= 2e-16 * abs(tension):
             break
-        following = strain - (t - tension) / slope
-        if not (low < following < high):
-            following = 0.5 * (low + high)
-        if following == strain:
+        following = next_within(low, high, strain, strain - (t - tension) / slope, before)
+        if following in (low, high):
             break
-        strain = following
+        before, strain = abs(following - strain), following
     _t, slope, z = tension_of_strain(row, strain)
     return strain, slope, z

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numba
 import numpy as np
 import pytest
 from one_cable import cable, in_direction, pull
@@ -14,6 +15,7 @@ from seecr.compiled.bracketed import bracketed_pull
 from seecr.compiled.catenary import catenary_span
 from seecr.compiled.columns import (
     CREEP,
+    EA,
     ENERGY,
     HYSTERESIS_BEFORE,
     REST,
@@ -22,7 +24,7 @@ from seecr.compiled.columns import (
     STRETCH_BEFORE,
     WINCH_TENSION,
 )
-from seecr.compiled.law import dahl, winch_tension
+from seecr.compiled.law import dahl, strain_of_tension, winch_tension
 from seecr.compiled.pulley import pulley_geometry
 
 DIRECTIONS = (-40.0, 0.0, 20.0, 60.0, 89.0)
@@ -66,6 +68,23 @@ def test_stiffness_and_slope_against_differences(kind: str, below: float) -> Non
             assert stiffness == pytest.approx(here.stiffness[:, k], rel=1e-5, abs=20 * top)
             slope = (ahead.tension - behind.tension) / (2 * size)
             assert slope == pytest.approx(here.slope[k], rel=1e-5, abs=20 * top)
+
+
+@numba.njit  # type: ignore[misc]  # uncached: it would not notice that the law changes
+def strain_of(row: np.ndarray, tension: float) -> float:
+    """The strain at a tension, from a function that only compiled code calls."""
+    return float(strain_of_tension(row, tension)[0])
+
+
+def test_the_strain_of_a_cable_that_sticks_is_found_to_rounding() -> None:
+    """About its last stretch it is five times as stiff; beyond, Newton's steps led to and fro."""
+    row = cable(
+        REST=0.57744, EA=300.0, HYSTERESIS=0.0747, HYSTERESIS_STRETCH=1e-5,
+        STRETCH_BEFORE=1.28183e-3, HYSTERESIS_BEFORE=-0.057429,
+    )  # fmt: skip
+    for tension in (*np.linspace(0.55, 0.75, 2001), 0.604106):
+        strain = strain_of(row, tension)
+        assert row[EA] * strain + dahl(row, strain)[0] == pytest.approx(tension, rel=1e-13)
 
 
 WITH_ENERGY = {
