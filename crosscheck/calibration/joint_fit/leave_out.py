@@ -22,6 +22,8 @@ from seecr.pose import Array
 
 # Steps of a refit without a block: with the derivatives of the joint fit, and with its own.
 _STEPS, _EARNEST = 6, 4
+# A block of fewer rows may be an outlier as a whole.
+_ROWS = 3
 # A prediction is nonlinear if it differs from its linearisation by this part of the noise.
 _BENT = 0.1
 
@@ -33,7 +35,7 @@ class LeftOut(HeldOut):
     Attributes:
         surprise: (blocks,) chi2 per reading of linearised predictions, in units of noise plus the
             uncertainty of the fit without the block: about 1 if the model is right, however far
-            it extrapolates.
+            it extrapolates. Blocks of a row or two are judged together, see :func:`by_block`.
     """
 
     surprise: Array
@@ -46,7 +48,7 @@ def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
     linear = linearised(setting, joint)
     fitted = values_without(linear, np.zeros(len(linear.y), dtype=bool))
     raw = np.full(problem.measured.shape, np.nan)
-    chi2, readings, surprise = (np.zeros(len(blocks)) for _ in range(3))
+    chi2, readings, power = (np.zeros(len(blocks)) for _ in range(3))
     values = np.zeros((len(blocks), len(joint.z)))
     for fold in folds_of(len(blocks)):
         rows = np.any([blocks[b] for b in fold], axis=0)
@@ -60,10 +62,28 @@ def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
         for b in fold:
             own = blocks[b][problem.row_of]
             chi2[b], readings[b] = float(left[own] @ left[own]), int(own.sum())
-            power = surprise_of(linear, absent, _padded(own, len(absent)), expected[own])
-            surprise[b] = power / max(int(own.sum()), 1)
+            power[b] = surprise_of(linear, absent, _padded(own, len(absent)), expected[own])
     rms = rms_by_kind(problem, raw)
+    surprise = by_block(power, readings, np.array([int(rows.sum()) for rows in blocks]))
     return LeftOut(raw, chi2, readings, values, rms, valid=True, surprise=surprise)
+
+
+def by_block(power: Array, readings: Array, rows: NDArray[np.int_]) -> Array:
+    """(blocks,) chi2 per reading of each block, and of short ones that of all of them together.
+
+    Where every pose is a run of its own, one row in ten that is far off is no surprise; nor is the
+    one row of a run that was broken off.
+
+    Args:
+        power: (blocks,) chi2 of held-out readings. readings: (blocks,) how many these are.
+        rows: (blocks,) in how many rows.
+    """
+    each = power / np.maximum(readings, 1.0)
+    short = rows < _ROWS
+    if not short.any():
+        return each
+    together = power[short].sum() / max(readings[short].sum(), 1.0)
+    return np.where(short, together if rows[short].sum() >= _ROWS else 0.0, each)
 
 
 def _without(setting: Setting, joint: JointFit, absent: NDArray[np.bool_]) -> State:

@@ -12,7 +12,7 @@ from made_data import COGIRO, SIGMA, measured, term
 
 from crosscheck.calibration.joint_fit.all_effects import Calibration, fit_all_effects
 from crosscheck.calibration.joint_fit.joint import cost
-from crosscheck.calibration.joint_fit.leave_out import surprise_of, values_without
+from crosscheck.calibration.joint_fit.leave_out import by_block, surprise_of, values_without
 from crosscheck.calibration.joint_fit.linearised import Linear
 from crosscheck.calibration.result import calibrate
 from crosscheck.fit.effects.held_out import blocks_of
@@ -176,6 +176,27 @@ def test_leaving_out_in_a_linear_model_is_refitting_without() -> None:
     assert surprise_of(Linear(x, y, width), rows, np.arange(30) < 3, left[:3]) == pytest.approx(
         left[:3] @ np.linalg.solve(expected[:3, :3], left[:3])
     )
+
+
+def test_poses_that_are_runs_of_their_own_may_be_outliers() -> None:
+    """One in ten had made every such file something unknown."""
+    data = measured(ROBOT, [term(ROBOT, "stiffness", factor=1.2)], points=14)
+    far = np.arange(data.n_rows) % 10 == 3
+    push = np.random.default_rng(1).normal(scale=20.0, size=(data.n_rows, 3))
+    moved = data.position + np.where(far[:, None], push * SIGMA.position_m, 0.0)
+    each = np.array([f"pose {k}" for k in range(data.n_rows)])
+    found = fit_all_effects(problem_of(replace(data, position=moved, run=each), FEW))
+    assert found.surprise < 2.0
+
+
+def test_blocks_of_a_row_or_two_are_judged_together() -> None:
+    """A run of one row had made a lone effect of 75 times the noise something unknown."""
+    power, readings = np.array([20.0, 30.0, 18.0, 12.0]), np.array([24.0, 6.0, 12.0, 6.0])
+    found = by_block(power, readings, np.array([4, 1, 2, 1]))
+    assert found == pytest.approx([20 / 24, 2.5, 2.5, 2.5])
+    # the first row of a run that was broken off may be an outlier
+    assert by_block(power[:2], readings[:2], np.array([4, 1])) == pytest.approx([20 / 24, 0.0])
+    assert by_block(power, readings, np.array([4, 3, 5, 6])) == pytest.approx(power / readings)
 
 
 def test_what_acts_by_its_square_joins_where_its_derivative_says_nothing() -> None:
