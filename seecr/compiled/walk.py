@@ -27,6 +27,10 @@ from seecr.compiled.past import (
 )
 from seecr.compiled.steps import advance
 
+# Most evaluations of a row's wrench, until each tension changes as its slope says, up to this part
+# and this rounding.
+_CORRECTIONS, _BENT, _ROUNDING = 3, 1e-5, 1e-10
+
 
 @jit_allocating
 def walk_in_order(
@@ -113,9 +117,13 @@ def _keep_side(
         part: (d,) [m] displacement of that side from the equilibrium. more: (d,) [m] the part of it
             since the tensions were computed.
         side: as _pull_side left it; tensions are updated.
+
+    Returns:
+        Whether a tension changed otherwise than its slope says: then a cable turned round between,
+        and that side's equilibrium is not quite there.
     """
     rows, kept, pulls, _gradient = side
-    placed = False
+    placed, bent = False, False
     for i in range(table.shape[0]):
         if not has_stretch_memory(table[i]):
             for a in range(more.shape[0]):
@@ -126,8 +134,14 @@ def _keep_side(
             advance(deviation, values, part, length, screws, pose, space[12], space[13], space[1])
             place_platform(screws, space[13], length, pose, space[12], space)
             placed = True
+        expected, size = pulls[i], 0.0
+        for a in range(more.shape[0]):
+            expected += slopes[i, a] * more[a]
+            size += abs(slopes[i, a] * more[a])
         pulls[i] = add_pull(1.0, rows[i], pose, load[UP:], 1.0 / length, guess[i], space)
+        bent = bent or abs(pulls[i] - expected) > _BENT * size + _ROUNDING * abs(pulls[i])
         keep_past(rows[i], space[9], fresh, kept[i])
+    return bent
 
 
 @jit_inner
@@ -147,7 +161,8 @@ def change_on_the_way(
     history; the difference of their wrenches moves the platform by the implicit function theorem;
     and each side stores its cables' history where it then is. The wrench is evaluated at the
     equilibrium; if the platform stands still, at the displacement of the row before, where no cable
-    reverses on either side and the stiffness holds.
+    reverses on either side and the stiffness holds. Where a cable turned round between there and
+    where that side then is, it is evaluated again there.
 
     Args:
         plus, minus: (N, m, N_COLUMNS), the columns OF_THE_PAST are ignored.
@@ -160,6 +175,7 @@ def change_on_the_way(
     n, m, d = plus.shape[0], plus.shape[1], step.shape[1]
     ahead = (np.empty_like(plus[0]), np.zeros((m, N_KEPT)), np.zeros(m), np.zeros(d))
     behind = (np.empty_like(plus[0]), np.zeros((m, N_KEPT)), np.zeros(m), np.zeros(d))
+    past_ahead, past_behind = np.zeros((m, N_KEPT)), np.zeros((m, N_KEPT))
     space, half, more = make_change_space(screws.shape[1]), np.zeros(d), np.zeros(d)
     lost = False
     for k in range(n):
@@ -171,28 +187,34 @@ def change_on_the_way(
             continue
         for a in range(d):
             half[a] = 0.5 * step[k - 1, a] if still else 0.0
-        _pull_side(
-            plus[k], plus_load[k], half, poses[k], screws[k], deviation[k], values[k], length,
-            guess[k], elapsed[k], fresh[k], ahead, space,
-        )  # fmt: skip
-        _pull_side(
-            minus[k], minus_load[k], -half, poses[k], screws[k], deviation[k], values[k], length,
-            guess[k], elapsed[k], fresh[k], behind, space,
-        )  # fmt: skip
-        for a in range(d):
-            more[a] = 0.0
-            for b in range(d):
-                more[a] -= 0.5 * inverse[k, a, b] * (ahead[3][b] - behind[3][b])
-            half[a] += more[a]
-            step[k, a] = 2.0 * half[a]
-        _keep_side(
-            plus[k], plus_load[k], half, more, slopes[k], poses[k], screws[k], deviation[k],
-            values[k], length, guess[k], fresh[k], ahead, space,
-        )  # fmt: skip
-        _keep_side(
-            minus[k], minus_load[k], -half, -more, slopes[k], poses[k], screws[k], deviation[k],
-            values[k], length, guess[k], fresh[k], behind, space,
-        )  # fmt: skip
+        past_ahead[:], past_behind[:] = ahead[1], behind[1]
+        for again in range(_CORRECTIONS):
+            if again:
+                ahead[1][:], behind[1][:] = past_ahead, past_behind
+            _pull_side(
+                plus[k], plus_load[k], half, poses[k], screws[k], deviation[k], values[k], length,
+                guess[k], elapsed[k], fresh[k], ahead, space,
+            )  # fmt: skip
+            _pull_side(
+                minus[k], minus_load[k], -half, poses[k], screws[k], deviation[k], values[k],
+                length, guess[k], elapsed[k], fresh[k], behind, space,
+            )  # fmt: skip
+            for a in range(d):
+                more[a] = 0.0
+                for b in range(d):
+                    more[a] -= 0.5 * inverse[k, a, b] * (ahead[3][b] - behind[3][b])
+                half[a] += more[a]
+                step[k, a] = 2.0 * half[a]
+            bent = _keep_side(
+                plus[k], plus_load[k], half, more, slopes[k], poses[k], screws[k], deviation[k],
+                values[k], length, guess[k], fresh[k], ahead, space,
+            )  # fmt: skip
+            other = _keep_side(
+                minus[k], minus_load[k], -half, -more, slopes[k], poses[k], screws[k], deviation[k],
+                values[k], length, guess[k], fresh[k], behind, space,
+            )  # fmt: skip
+            if not (bent or other):
+                break
         for i in range(m):
             tension[k, i] = ahead[2][i] - behind[2][i]
             lost = lost or not np.isfinite(tension[k, i])

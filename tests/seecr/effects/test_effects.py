@@ -11,6 +11,7 @@ import pytest
 from effect_cases import (
     KINDS,
     experiment_of,
+    full_difference,
     moved,
     random_effect,
     random_term,
@@ -27,6 +28,7 @@ from seecr.effects import (
     PLACES,
     Effect,
     Layout,
+    Term,
     Terms,
     catalogue,
     effect_named,
@@ -215,6 +217,17 @@ def test_effects_together_are_solved_and_differentiated(seed: int) -> None:
             break
     worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
     assert worst < 1e-3, (COMBINATIONS[seed], whose)
+
+
+def test_a_cable_that_turns_round_within_a_step_of_the_difference_has_its_derivative() -> None:
+    """At a fixed pose the step stretches a stiff cable further than its motion does."""
+    experiment = experiment_of("free", seed=1)
+    radius = Term.of(experiment.robot, "pulley_radius", radius_m=0.0184)
+    sticking = Term.of(experiment.robot, "hysteresis", amplitude_N=1.34, stretch_m=2.36e-4)
+    terms = Terms([radius, sticking])
+    found = sensitivities(experiment, terms, experiment.predict(terms.effects))[..., 6:, 0]
+    full = full_difference(experiment, terms, radius, 0, 1e-4 * radius.layout.scale[0])[:, 6:]
+    assert found == pytest.approx(full, abs=1e-3 * np.abs(full).max())
 
 
 SHAPES = ("free", "planar", "jointed")
