@@ -35,7 +35,7 @@ class LeftOut(HeldOut):
     Attributes:
         surprise: (blocks,) chi2 per reading of linearised predictions, in units of noise plus the
             uncertainty of the fit without the block: about 1 if the model is right, however far
-            it extrapolates. Blocks of a row or two are judged together, see :func:`by_block`.
+            it extrapolates. Blocks of a row or two are judged together, see :func:`surprises`.
     """
 
     surprise: Array
@@ -64,11 +64,11 @@ def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
             chi2[b], readings[b] = float(left[own] @ left[own]), int(own.sum())
             power[b] = surprise_of(linear, absent, _padded(own, len(absent)), expected[own])
     rms = rms_by_kind(problem, raw)
-    surprise = by_block(power, readings, np.array([int(rows.sum()) for rows in blocks]))
+    surprise = surprises(power, readings, np.array([int(rows.sum()) for rows in blocks]))
     return LeftOut(raw, chi2, readings, values, rms, valid=True, surprise=surprise)
 
 
-def by_block(power: Array, readings: Array, rows: NDArray[np.int_]) -> Array:
+def surprises(power: Array, readings: Array, rows: NDArray[np.int_]) -> Array:
     """(blocks,) chi2 per reading of each block, and of short ones that of all of them together.
 
     Where every pose is a run of its own, one row in ten that is far off is no surprise; nor is the

@@ -12,7 +12,7 @@ from made_data import COGIRO, SIGMA, measured, term
 
 from crosscheck.calibration.joint_fit.all_effects import Calibration, fit_all_effects
 from crosscheck.calibration.joint_fit.joint import cost
-from crosscheck.calibration.joint_fit.leave_out import by_block, surprise_of, values_without
+from crosscheck.calibration.joint_fit.leave_out import surprise_of, surprises, values_without
 from crosscheck.calibration.joint_fit.linearised import Linear
 from crosscheck.calibration.result import calibrate
 from crosscheck.fit.effects.held_out import blocks_of
@@ -192,11 +192,11 @@ def test_poses_that_are_runs_of_their_own_may_be_outliers() -> None:
 def test_blocks_of_a_row_or_two_are_judged_together() -> None:
     """A run of one row had made a lone effect of 75 times the noise something unknown."""
     power, readings = np.array([20.0, 30.0, 18.0, 12.0]), np.array([24.0, 6.0, 12.0, 6.0])
-    found = by_block(power, readings, np.array([4, 1, 2, 1]))
+    found = surprises(power, readings, np.array([4, 1, 2, 1]))
     assert found == pytest.approx([20 / 24, 2.5, 2.5, 2.5])
     # the first row of a run that was broken off may be an outlier
-    assert by_block(power[:2], readings[:2], np.array([4, 1])) == pytest.approx([20 / 24, 0.0])
-    assert by_block(power, readings, np.array([4, 3, 5, 6])) == pytest.approx(power / readings)
+    assert surprises(power[:2], readings[:2], np.array([4, 1])) == pytest.approx([20 / 24, 0.0])
+    assert surprises(power, readings, np.array([4, 3, 5, 6])) == pytest.approx(power / readings)
 
 
 def test_what_acts_by_its_square_joins_where_its_derivative_says_nothing() -> None:
