@@ -45,8 +45,6 @@ POSITION_M, ORIENTATION_RAD, TENSION_N = 1e-8, 1e-7, 1e-6
 _WEIGHT_N = 0.4 * 9.81
 # Chains with so many segments, extrapolated, are that close to the catenary.
 _SEGMENTS = (16, 32)
-# Both sides evaluate the motion between two rows at the same points.
-_WAYPOINTS = (6, 2)
 # Rows of each sweep, and its reach; the robot's own twin goes twice as far.
 _POINTS, _REACH = 4, 0.3
 # Creep is slow: seecr takes the tension as constant between waypoints, the truth as linear in time.
@@ -243,8 +241,11 @@ def run_effect(case: EffectCase) -> EffectResult:
     began = time.perf_counter()
     plain = Experiment(case.robot, case.commands).predict()
     commands = replace(case.commands, loads=case.loads)
-    ours = Experiment(case.robot, commands).predict(case.effects)
-    truth = measure(case.robot, commands, case.effects, segments=_SEGMENTS, waypoints=_WAYPOINTS)
+    experiment = Experiment(case.robot, commands)
+    ours = experiment.predict(case.effects)
+    # both sides evaluate the motion between two rows at as many points
+    steps = experiment.path.steps
+    truth = measure(case.robot, commands, case.effects, segments=_SEGMENTS, steps=steps)
     position_m, orientation_rad = gap(_seen(truth), _seen(ours.readings))
     moved = np.linalg.norm(ours.readings.position - plain.readings.position, axis=1)
     return EffectResult(

@@ -13,9 +13,9 @@ from crosscheck.twin.world import World
 from seecr.commands.data import Commands
 from seecr.pose import Array, pose_add, pose_difference, transform_points
 
-WAYPOINTS = (12, 4)
-"""Number of points on the way to the first row of a run, and from row to row."""
-
+# Number of points on the way to each row. The laws of cables with history take each step between
+# two points as one in which the stretch does not turn round.
+_STEPS = 8
 # Parts of the way between two points in which winches are checked for reversals.
 _WATCHED = 64
 
@@ -42,13 +42,19 @@ class Waypoints:
 
 
 def waypoints_of(
-    true: TrueRobot, commands: Commands, waypoints: tuple[int, int] = WAYPOINTS
+    true: TrueRobot, commands: Commands, steps: NDArray[np.integer] | None = None
 ) -> Waypoints:
     """Every run from the reference pose straight to its first row, then from row to row.
 
     A run that starts at its first row has no way to it; a load changes before the motion.
+
+    Args:
+        true: the robot.
+        commands: n rows.
+        steps: (n,) numbers of points on the way to each row; eight by default.
     """
     robot, n = true.robot, len(commands)
+    every = np.full(n, _STEPS) if steps is None else steps
     clock = np.zeros(n) if commands.time is None else commands.time
     points: list[tuple[Array, Array, int, bool, bool, float]] = []
     none = np.zeros(0)
@@ -68,12 +74,11 @@ def waypoints_of(
             passed = 0.0
         elif _reloaded(commands, k):
             points.append((before, paid, k, False, False, 0.0))
-        steps = waypoints[0] if starts else waypoints[1]
-        parts = np.arange(1, steps + 1) / steps
+        parts = np.arange(1, every[k] + 1) / every[k]
         poses = [*_straight_way(guide, before, commands.pose[k], parts[:-1]), commands.pose[k]]
         for pose, part in zip(poses, parts, strict=True):
             length = paid + part * (told - paid)
-            points.append((pose, length, k, part == 1.0, False, passed / steps))
+            points.append((pose, length, k, part == 1.0, False, passed / every[k]))
     path, lengths, *others = (np.array(part) for part in zip(*points, strict=True))
     return Waypoints(path, None if commands.lengths is None else lengths, commands.told, *others)
 

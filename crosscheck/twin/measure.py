@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from crosscheck.settle.relax import SettleStatus, come_to_rest
 from crosscheck.twin.descent import Descent, descend
-from crosscheck.twin.lengths import WAYPOINTS, Waypoints, paid_out, waypoints_of
+from crosscheck.twin.lengths import Waypoints, paid_out, waypoints_of
 from crosscheck.twin.robot import true_robot
 from crosscheck.twin.springs import Cable, Springs
 from crosscheck.twin.world import World
@@ -86,7 +86,7 @@ def measure(
     *,
     length_errors: Array | None = None,
     segments: tuple[int, ...] = SEGMENTS,
-    waypoints: tuple[int, int] = WAYPOINTS,
+    steps: NDArray[np.integer] | None = None,
     progress: Progress | None = None,
 ) -> Truth:
     """Let MuJoCo bring a robot with effects to rest at each command, and read its sensors.
@@ -98,12 +98,12 @@ def measure(
         length_errors: (n, m) [m] additional length in each row: noise of the winches, not an
             effect.
         segments: N of each cable, if cables have weight; with two, the poses are extrapolated.
-        waypoints: numbers on the way to the first row of a run and from row to row, for effects
-            with history.
+        steps: (n,) numbers of waypoints on the way to each row, for effects with history; as
+            :func:`crosscheck.twin.lengths.waypoints_of` has them by default.
         progress: called with the number of rows done since the last call.
     """
     true = true_robot(robot, effects)
-    path = waypoints_of(true, commands, waypoints)
+    path = waypoints_of(true, commands, steps)
     rest, loads = paid_out(true, path, commands.temperature), commands.loads
     if length_errors is not None:
         rest = rest + length_errors[path.row]

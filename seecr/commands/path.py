@@ -19,8 +19,10 @@ from seecr.description.joints import motion_columns, pose_of_values, values_of_p
 from seecr.description.robot import Robot
 from seecr.pose import Array, cross, pose_add, pose_difference, quat_rotate
 
-# Number of waypoints on the way to the first row of a run, and from row to row.
-_APPROACH, _BETWEEN = 6, 2
+# Largest motion of the command from waypoint to waypoint [robot's length], and the fewest and most
+# waypoints on the way to a row. Where a cable's tension turns between two waypoints, hysteresis and
+# friction miss it.
+_STEP, _LEAST, _MOST = 0.05, 2, 8
 # Reversals of a cable's length are searched in pieces in which the platform turns by less than this
 # [rad]. Two reversals in one piece would go unseen; they differ by less than a millionth of an
 # anchor point's distance.
@@ -41,6 +43,7 @@ class Path:
         source: (N,) index of the row that a waypoint belongs to.
         fresh: (N,) bool, waypoints at which a run starts.
         elapsed: (N,) [s] since the waypoint before.
+        steps: (n,) numbers of waypoints on the way to each row, with the row.
     """
 
     robot: Robot
@@ -50,6 +53,7 @@ class Path:
     source: NDArray[np.integer]
     fresh: NDArray[np.bool_]
     elapsed: Array
+    steps: NDArray[np.integer]
 
     @property
     def new_clock(self) -> NDArray[np.bool_]:
@@ -78,16 +82,18 @@ def waypoints_of(robot: Robot, commands: Commands, waypoints: float | None = Non
     Args:
         robot: as described.
         commands: n rows.
-        waypoints: largest motion of the command between them [robot's length]; by default there is
-            a fixed number for each row.
+        waypoints: largest motion of the command between them [robot's length]; by default a
+            twentieth, with two to eight waypoints on the way to each row.
     """
     n = len(commands)
     ways, fresh = _ways(robot, commands), commands.starts
     # the way begins with a waypoint of its own if a run starts or the load changes
     begins = fresh.copy() if commands.loads is None else fresh | commands.loads.changes
-    steps = np.where(fresh, _APPROACH, _BETWEEN)
-    if waypoints is not None:
-        steps = np.ceil(_moved(ways, commands) / waypoints).astype(int).clip(1)
+    moved = _moved(ways, commands)
+    if waypoints is None:
+        steps = np.ceil(moved / _STEP).astype(int).clip(_LEAST, _MOST)
+    else:
+        steps = np.ceil(moved / waypoints).astype(int).clip(1)
     steps = np.where(commands.starts_here, 0, steps)
     source = np.repeat(np.arange(n), steps + begins)
     rows = np.cumsum(steps + begins) - 1
@@ -116,7 +122,7 @@ def waypoints_of(robot: Robot, commands: Commands, waypoints: float | None = Non
         stands=None if commands.stands is None else commands.stands[source],
         clock=None if commands.clock is None else commands.clock[source],
     )
-    return Path(robot, commands, whole, rows, source, first, elapsed)
+    return Path(robot, commands, whole, rows, source, first, elapsed, steps)
 
 
 def _moved(ways: _Ways, commands: Commands) -> Array:

@@ -191,7 +191,8 @@ class Hysteresis(Effect):
 
     T = E S eps + z, z Dahl's friction of the amplitude given, turning over within the stretch
     e = l0 eps given: dz/de = (amplitude - z sign(de))/stretch (Dahl 1968; for cables
-    Miermeister et al. 2015). z = 0 at rest at the start of each run.
+    Miermeister et al. 2015). z = 0 at rest at the start of each run. On the way to each row two to
+    eight poses are solved, by the distance; cables are taken to turn round at these.
     """
 
     name: ClassVar[str] = "hysteresis"
@@ -264,7 +265,8 @@ class ExitFriction(Effect):
 
     Capstan (Euler-Eytelwein): the tensions behind and in front differ by at most the factor
     exp(friction), friction = coefficient x wrap angle, against the motion of the cable. It
-    shows in the pose through the ``length`` of elastic cable behind the exit point.
+    shows in the pose through the ``length`` of elastic cable behind the exit point. The motion
+    from row to row is taken in two to eight steps, as for ``hysteresis``.
     """
 
     name: ClassVar[str] = "exit_friction"

@@ -81,12 +81,12 @@ def test_loads_and_starts_leave_the_same_history(stands: bool) -> None:
     experiment = experiment_of("demobot_cogiro", reach=0.5)
     robot, n = experiment.robot, len(experiment.commands)
     commands = replace(experiment.commands, loads=loads_of(robot, n), stands=np.full(n, stands))
-    way = (6, 2)  # seecr's own: between other points the laws take other steps
+    ours = Experiment(robot, commands)
     there = [effect("hysteresis", amplitude=0.2, stretch=2e-4), effect("backlash", gap=5e-4)]
-    truth = measure(robot, commands, there, waypoints=way)
-    ours = Experiment(robot, commands).predict(there)
-    assert truth.at_rest.all() and ours.solved.all()
-    assert np.abs(pose_difference(truth.pose, ours.pose)).max() < 1e-8
+    # between other points the laws take other steps
+    truth, found = measure(robot, commands, there, steps=ours.path.steps), ours.predict(there)
+    assert truth.at_rest.all() and found.solved.all()
+    assert np.abs(pose_difference(truth.pose, found.pose)).max() < 1e-8
     without = Experiment(robot, replace(commands, stands=np.full(n, not stands))).predict(there)
     assert np.abs(pose_difference(truth.pose, without.pose)).max() > 1e-5
 

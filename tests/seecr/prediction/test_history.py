@@ -101,6 +101,31 @@ def test_lengths_move_evenly_too() -> None:
     assert lengths[middle] == pytest.approx(0.5 * (told[0] + told[1]), abs=1e-12)
 
 
+@pytest.mark.parametrize("name, values", [
+    ("hysteresis", {"amplitude": 0.2, "stretch": 2e-4}),
+    ("exit_friction", {"friction": 0.3, "length": 0.4}),
+])  # fmt: skip
+def test_poses_asked_for_on_the_way_hardly_change_the_rows(
+    name: str, values: dict[str, float]
+) -> None:
+    """With two steps to each row, what turned round in between was missed."""
+    apart = []
+    for seed in range(8):
+        experiment = experiment_of("demobot_parallel", seed=seed, reach=0.6)
+        robot, acts = experiment.robot, [effect(name, **values)]
+        way = waypoints_of(robot, experiment.commands, waypoints=0.005)
+        run, there = way.commands.run, ~way.fresh
+        assert run is not None
+        closely = Commands(way.commands.pose[there], run=run[there])
+        rows = (np.cumsum(there) - 1)[way.rows]
+        fine = Experiment(robot, closely).predict(acts)
+        found, plain = experiment.predict(acts), experiment.predict()
+        assert found.solved.all() and fine.solved.all()
+        largest = np.abs(pose_difference(found.pose, plain.pose)).max()
+        apart.append(np.abs(pose_difference(found.pose, fine.pose[rows])).max() / largest)
+    assert np.median(apart) < 0.04
+
+
 # --- backlash ------------------------------------------------------------------------------------
 
 
@@ -274,7 +299,7 @@ def lift_by_small_steps(lengths: np.ndarray, amplitude: float, turning: float) -
     Where a cable would push, it pulls no more, and keeps stretch and friction until it would pull
     again.
     """
-    ea, weight, substeps = 1000.0, WEIGHT, 200
+    ea, weight, substeps = 1000.0, WEIGHT, 1600
     stretch, friction, heights = np.zeros(2), np.zeros(2), []
 
     def tried(height: float, rest: np.ndarray, start: bool) -> tuple[np.ndarray, ...]:
@@ -317,7 +342,7 @@ def test_a_slack_cable_keeps_its_stretch_and_its_friction_and_pulls_again_from_t
     heights = lift_by_small_steps(lengths, 2.0, 5e-3)
     plain = Experiment(robot, Commands(pose, lengths)).predict()
     assert np.ptp(found.pose[:, 2] - plain.pose[:, 2]) > 5e-4  # or there is nothing to see
-    assert found.pose[:, 2] == pytest.approx(heights, abs=3e-6)
+    assert found.pose[:, 2] == pytest.approx(heights, abs=2e-6)
 
 
 @pytest.mark.parametrize("name, values", [
