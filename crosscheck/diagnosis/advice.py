@@ -29,6 +29,8 @@ from seecr.units import with_error
 
 # [m] No length is measured more finely by hand.
 _LEAST_BY_HAND = 1e-5
+# What was stated is rounded to this part of itself at most.
+_STATED = 0.1
 # Most ways that are named to tell two effects apart.
 _MOST_WAYS = 2
 
@@ -107,7 +109,10 @@ def check_of(term: Term, robot: Robot, stderr: Array | None = None) -> str:
         key = "total" if name == layout.names[k] and len(layout) > 1 else name
         shown = number(total.value, doubts[name], total.unit)
         values[key] = _Unknown() if np.isinf(lost[name]) else shown
-        values[f"{key}_nominal"] = number(total.nominal, doubts[name], total.unit)
+        # however little the fit says of it, what was stated is not rounded to nothing
+        doubt = doubts[name]
+        near = min(doubt, _STATED * abs(total.nominal)) if np.isfinite(doubt) else doubt
+        values[f"{key}_nominal"] = number(total.nominal, near, total.unit)
     try:
         return layout.effect.advice.format(**values)
     except (KeyError, IndexError, ValueError):
