@@ -13,9 +13,9 @@ from crosscheck.twin.world import World
 from seecr.commands.data import Commands
 from seecr.pose import Array, pose_add, pose_difference, transform_points
 
-# Number of points on the way to each row. The laws of cables with history take each step between
-# two points as one in which the stretch does not turn round.
-_STEPS = 8
+# Number of points on the way to the first row of a run, and from row to row. The laws of cables
+# with history take each step between two points as one in which the stretch does not turn round.
+_APPROACH, _BETWEEN = 12, 8
 # Parts of the way between two points in which winches are checked for reversals.
 _WATCHED = 64
 
@@ -51,10 +51,11 @@ def waypoints_of(
     Args:
         true: the robot.
         commands: n rows.
-        steps: (n,) numbers of points on the way to each row; eight by default.
+        steps: (n,) numbers of points on the way to each row; by default twelve to the first row of
+            a run, and eight from row to row.
     """
     robot, n = true.robot, len(commands)
-    every = np.full(n, _STEPS) if steps is None else steps
+    every = np.where(commands.starts, _APPROACH, _BETWEEN) if steps is None else steps
     clock = np.zeros(n) if commands.time is None else commands.time
     points: list[tuple[Array, Array, int, bool, bool, float]] = []
     none = np.zeros(0)
