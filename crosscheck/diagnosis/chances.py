@@ -38,8 +38,8 @@ class Chances:
         further: for effects that share a class with others that are needed more, the probability
             that as many members of the class are missing.
         imitated: something smooth and unknown that some of the effects found imitate.
-        doubt: something smooth and unknown that is less likely than the effects it could replace,
-            but that the data do not exclude.
+        doubt: something smooth and unknown that is much less likely than the effects it could
+            replace, but that the data do not exclude.
         varies: what something unknown changes that is beside all effects, the likeliest first.
     """
 

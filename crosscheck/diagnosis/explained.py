@@ -198,15 +198,18 @@ def _sentence(
 
 
 def _more_probable(said: Judgement, unknown: Imitated) -> str:
-    """That something unknown is more probable than members that can imitate it, and how sure."""
-    known = " + ".join(sorted(unknown.replaced))
-    likely = ""
-    if said.verdict is DiagnosisVerdict.MANY_EFFECTS:
-        likely = f" (probability {probability_words(unknown.probability)}), but not certain"
-    return (
-        f"an unknown effect is more probable than {known}, which can imitate it{likely}: "
-        f"{unknown.words}"
-    )
+    """That something unknown may be there instead of members that can imitate it, and how sure."""
+    known, p = " + ".join(sorted(unknown.replaced)), probability_words(unknown.probability)
+    if said.verdict is not DiagnosisVerdict.MANY_EFFECTS:
+        likely = f"is more probable than {known}, which can imitate it"
+    elif unknown.probability > 0.5:
+        likely = (
+            f"is more probable than {known}, which can imitate it (probability {p}), "
+            "but not certain"
+        )
+    else:
+        likely = f"may be there in place of {known}, which can imitate it (probability {p})"
+    return f"an unknown effect {likely}: {unknown.words}"
 
 
 def _or_in_its_place(one: MissingEffect, alternatives: Sequence[Names]) -> str:

@@ -53,7 +53,7 @@ class Why(Enum):
     IMPROBABLE = "explains too little (probability {chance})"
     OPEN = "open: one of the sets that explain as much has it (probability {chance})"
     IMITATES = "not certain: its {parameters} can imitate much of the unexplained error"
-    MAY_IMITATE = "not certain: more probably it imitates an unknown effect"
+    MAY_IMITATE = "not certain: it may imitate an unknown effect"
     EXPLAINS_PART = "not certain: it explains a part, but structure remains"
 
 

@@ -4,8 +4,8 @@ Something unknown is there if a smooth field over the workspace, or something th
 earns evidence beside all effects or in place of some, or if held-out runs are predicted worse than
 the fit itself expects. If the data leave open which effects are missing, or if it takes many, the
 verdict is ``many_effects``: a calibration and no diagnosis. The same holds if something unknown
-explains more beside the best set, but nothing beside the whole catalogue; or if it is likelier than
-some members, but not sure.
+explains more beside the best set, but nothing beside the whole catalogue; or if it may be there in
+place of some members, but is not sure.
 """
 
 from __future__ import annotations

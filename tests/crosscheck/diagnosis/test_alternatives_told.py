@@ -18,7 +18,7 @@ from crosscheck.diagnosis.listed import diagnosis_of
 from crosscheck.diagnosis.nearby import _with_equals
 from crosscheck.fit.reasons import DiagnosisVerdict
 
-DOUBT = Imitated(4.0, frozenset({"pulley_radius"}), (Varying.POSITION,))
+DOUBT = Imitated(3.5, frozenset({"pulley_radius"}), (Varying.POSITION,))
 
 
 def by_sets(in_place: Imitated) -> Chances:
@@ -82,3 +82,13 @@ def test_the_sentence_says_how_probable_something_unknown_is_unless_it_is_sure(
     assert sentence.startswith("An unknown effect is more probable than length_scale, which can")
     told = "imitate it (probability 73 %), but not certain: " in sentence
     assert told == (verdict is DiagnosisVerdict.MANY_EFFECTS)
+
+
+def test_something_unknown_is_not_called_more_probable_where_it_is_less() -> None:
+    unknown = Imitated(4.4, frozenset({"creep", "length_scale"}), (Varying.POSITION,))
+    said = Judgement(DiagnosisVerdict.MANY_EFFECTS, (), 0.0, imitated=unknown)
+    nothing: Any = None
+    assert _sentence(said, [], 25, nothing).startswith(
+        "An unknown effect may be there in place of creep + length_scale, which can imitate it "
+        "(probability 35 %): something that varies smoothly"
+    )

@@ -68,15 +68,15 @@ def test_what_imitates_something_unknown_is_told_with_where_that_shows() -> None
 
 
 def test_what_a_field_could_replace_is_told_if_that_is_not_excluded() -> None:
-    """Expansion was listed above 95 % where a field of the position is as likely."""
-    doubt = Imitated(4.98, frozenset({"thermal_expansion"}), (Varying.POSITION,))
+    """Expansion was listed above 95 % where a field of the position is likely, too."""
+    doubt = Imitated(3.5, frozenset({"thermal_expansion"}), (Varying.POSITION,))
     chances = Chances({}, (), None, None, doubt=doubt)
     listed = cast(MissingEffect, SimpleNamespace(effect="creep", indistinguishable=[]))
     alike = cast(
         MissingEffect, SimpleNamespace(effect="creep", indistinguishable=["thermal_expansion"])
     )
     assert doubts_about([alike], chances) == [
-        "there may be something else in place of thermal_expansion (probability 50 %): something "
+        "there may be something else in place of thermal_expansion (probability 18 %): something "
         "that varies smoothly over the workspace, in the position alone; move the tracker and "
         "measure some poses again; an error that moves with it comes from the tracker"
     ]
@@ -113,7 +113,7 @@ def test_an_effect_that_predicts_only_with_the_next_one_tells_what_it_leaves_on_
 
 def test_what_data_do_not_tell_apart_is_told_with_what_to_do_about_each() -> None:
     seen = (Varying.POSITION, Varying.WINCHES)
-    doubt = Imitated(4.98, frozenset({"creep"}), seen)
+    doubt = Imitated(3.5, frozenset({"creep"}), seen)
     chances = Chances({}, (), None, None, doubt=doubt)
     listed = cast(MissingEffect, SimpleNamespace(effect="creep", indistinguishable=[]))
     (note,) = doubts_about([listed], chances)

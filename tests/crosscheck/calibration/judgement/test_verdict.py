@@ -148,9 +148,13 @@ def test_a_field_or_runs_left_out_make_it_unknown() -> None:
     assert judged(scores, surprise=3.0).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
 
 
-@pytest.mark.parametrize("odds", [5.5, 7.5, 8.5])
+@pytest.mark.parametrize("odds", [4.4, 5.5, 7.5, 8.5])
 def test_something_unknown_in_place_of_members_must_be_sure(odds: float) -> None:
-    """A robot all of whose tolerances were off was called unknown, with a probability of 0.89."""
+    """A robot all of whose tolerances were off was called unknown, with a probability of 0.89.
+
+    Nor are effects found where one in three such fields is there: of a lens of 35 %, three known
+    effects had been listed as sure.
+    """
     found = found_of({"": -900.0, "a": -300.0, "b": -500.0, "ab": 0.0})
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
     field = Imitated(odds, frozenset("b"), (Varying.POSITION,), {"a": 400.0})
@@ -197,7 +201,7 @@ def test_a_field_in_the_place_of_members_is_something_unknown() -> None:
 
     assert said(here).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     assert (said(here).sure, said(here).imitated) == (("a",), here)
-    assert said(replace(here, odds=4.0)).sure == ("a", "b")
+    assert said(replace(here, odds=3.5)).sure == ("a", "b")
     # of several that stay none is, nor what is worth little, has many parameters or hardly happens
     assert said(replace(here, worth={"a": 800.0, "c": 80.0})).sure == ()
     assert said(replace(here, worth={"a": 20.0})).sure == ()

@@ -86,11 +86,12 @@ def test_the_odds_are_those_of_the_covariances() -> None:
         (-np.inf, False, 0.0),
         (2.0, False, 0.0),
         (2.1, True, 0.0),
-        (4.99, True, 0.0),
+        (3.85, True, 0.0),
+        (3.95, False, 0.259),
         (6.0, False, 0.731),
     ],
 )
-def test_a_field_that_is_less_likely_is_a_doubt_from_one_in_twenty_on(
+def test_a_field_is_a_doubt_from_one_in_twenty_on_and_leaves_it_open_from_one_in_four_on(
     odds: float, doubt: bool, chance: float
 ) -> None:
     found = Imitated(odds, frozenset("a"), (Varying.POSITION,))
