@@ -55,6 +55,11 @@ class Path:
     elapsed: Array
     steps: NDArray[np.integer]
 
+    @cached_property
+    def onward(self) -> NDArray[np.bool_]:
+        """(N,) bool, waypoints as far from the one before as that is from its own, on one line."""
+        return np.asarray(np.arange(len(self.source)) - (self.rows - self.steps)[self.source] >= 2)
+
     @property
     def new_clock(self) -> NDArray[np.bool_]:
         """(N,) bool, waypoints at which another clock begins, including the first."""

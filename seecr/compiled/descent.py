@@ -174,9 +174,9 @@ def solve_one(
 @jit_allocating
 def solve_in_stages(
     cables, load, pose, screws, start, start_values, length, scale, radius, reach, limit,
-    guess, gradient, hessian, states, slopes, deviation, values, softened, staged, space,
+    guess, gradient, hessian, states, slopes, deviation, values, softened, staged, fine, space,
 ):  # fmt: skip
-    """Like solve_one, if ``staged`` from soft to stiff.
+    """Like solve_one with ``fine`` enough, if ``staged`` from soft to stiff.
 
     The energy of a stiff robot is a narrow curved valley. So all cables are first softened by
     powers of STAGE, until the stiffest has at most STIFF loads, and then stiffened by STAGE in each
@@ -185,7 +185,7 @@ def solve_in_stages(
     top = 0.0
     for i in range(cables.shape[0]):
         top = max(top, cables[i, EA])
-    factor, total, enough = 1.0, 0, 1e-3
+    factor, total, enough, last = 1.0, 0, 1e-3, False
     while staged and top * factor > STIFF * scale:
         factor /= STAGE
     while True:
@@ -196,13 +196,13 @@ def solve_in_stages(
                 softened[i, EA] *= factor
             now = softened
         else:
-            enough = FINE
+            enough, last = fine, True
         outcome, count, residual = solve_one(
             now, load, pose, screws, start, start_values, length, scale, radius, reach,
             limit, guess, gradient, hessian, states, slopes, deviation, values, enough, space,
         )  # fmt: skip
         total += count
-        if enough == FINE:
+        if last:
             return outcome, total, residual
         start, start_values = deviation.copy(), values.copy()
         factor *= STAGE
@@ -220,5 +220,5 @@ def solve_batch(
         outcome[i], count[i], residual[i] = solve_in_stages(
             cables[i], load[i], poses[i], screws[i], starts[i], start_values[i], length, scale[i],
             radius, reach[i], limit, guess[i], gradient[i], hessian[i], states[i], slopes[i],
-            deviation[i], values[i], softened, staged, space,
+            deviation[i], values[i], softened, staged, FINE, space,
         )  # fmt: skip

@@ -34,8 +34,8 @@ _CORRECTIONS, _BENT, _ROUNDING = 3, 1e-5, 1e-10
 
 @jit_allocating
 def walk_in_order(
-    cables, load, poses, screws, length, scale, radius, reach, limit, fresh, elapsed, outcome,
-    count, residual, gradient, hessian, states, slopes, deviation, values, guess,
+    cables, load, poses, screws, length, scale, radius, reach, limit, fresh, onward, enough,
+    elapsed, outcome, count, residual, gradient, hessian, states, slopes, deviation, values, guess,
 ):  # fmt: skip
     """Solve waypoints in order, each from the one before; all outputs are filled.
 
@@ -45,6 +45,8 @@ def walk_in_order(
     Args:
         cables: (N, m, N_COLUMNS); the columns OF_THE_PAST are filled.
         fresh: (N,) waypoints that start a run. elapsed: (N,) [s] since the one before.
+        onward: (N,) waypoints that go on from the one before as that went on from its own.
+        enough: (N,) residual/scale at which to stop.
         Other arguments are those of solve_batch.
     """
     n, m = cables.shape[0], cables.shape[1]
@@ -62,9 +64,14 @@ def walk_in_order(
             start[3] = 1.0
             first[:] = 0.0
         else:
-            # the start deviates from its command as much as the last equilibrium did
+            # the start deviates from its command as much as the last equilibrium did, or by as much
+            # more as it had become: that takes a step of four less
             copy_vector(deviation[k - 1], start)
             copy_vector(values[k - 1], first)
+            if onward[k]:
+                _go_on(deviation[k - 2], start)
+                _go_on(values[k - 2], first)
+                _normalise(start)
         for i in range(m):
             row = cables[k, i]
             amplitude[i], friction[i] = row[HYSTERESIS], row[FRICTION]
@@ -72,7 +79,7 @@ def walk_in_order(
         outcome[k], count[k], residual[k] = solve_in_stages(
             cables[k], load[k], poses[k], screws[k], start, first, length, scale[k], radius,
             reach[k], limit, guess[k], gradient[k], hessian[k], states[k], slopes[k],
-            deviation[k], values[k], softened, fresh[k], space,
+            deviation[k], values[k], softened, fresh[k], enough[k], space,
         )  # fmt: skip
         lost = outcome[k] != CONVERGED and outcome[k] != SINGULAR
         for i in range(m):
@@ -81,6 +88,23 @@ def walk_in_order(
             if fresh[k]:
                 row[HYSTERESIS], row[FRICTION] = amplitude[i], friction[i]
                 begin(row, kept[i])
+
+
+@jit_inner
+def _go_on(before, now):
+    """The values that follow after two."""
+    for a in range(now.shape[0]):
+        now[a] = 2.0 * now[a] - before[a]
+
+
+@jit_inner
+def _normalise(deviation):
+    """Bring the quaternion of a deviation (7,) back to unit length."""
+    size = 0.0
+    for a in range(3, 7):
+        size += deviation[a] ** 2
+    for a in range(3, 7):
+        deviation[a] /= np.sqrt(size)
 
 
 @jit_inner

@@ -21,7 +21,7 @@ from seecr.compiled.columns import (
     SLACK,
     TENSION,
 )
-from seecr.compiled.descent import STIFF, solve_batch
+from seecr.compiled.descent import FINE, STIFF, solve_batch
 from seecr.compiled.joints import N_CURRENT, place_batch
 from seecr.compiled.outcomes import (
     CABLE_LAW,
@@ -194,12 +194,15 @@ def walk(tables: Tables, path: Path, limit: int) -> Evaluation:
     """
     out = Evaluation.at_commands(tables)
     out.energy[:] = np.nan
+    enough = np.full(len(tables), TOLERANCE)  # on the way; to rows as many digits as possible
+    enough[path.rows] = FINE
 
     def run(part: slice) -> None:
         walk_in_order(
             tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
             tables.length, tables.scale[part], 0.5 * tables.length, tables.reach[part], limit,
-            path.fresh[part], path.elapsed[part], out.outcome[part], out.count[part],
+            path.fresh[part], path.onward[part], enough[part], path.elapsed[part],
+            out.outcome[part], out.count[part],
             out.residual[part], out.gradient[part], out.hessian[part], out.states[part],
             out.slopes[part], out.deviation[part], out.values[part], out.guess[part],
         )  # fmt: skip

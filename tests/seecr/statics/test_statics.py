@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from effect_cases import experiment_of
 
 from seecr.commands.data import Commands
+from seecr.commands.path import Path
 from seecr.compiled.change import change_at_rest, change_of_each_cable
 from seecr.compiled.columns import COMPLIANCE, EA, N_COLUMNS, OF_THE_PAST, REST, SLACK, TENSION
 from seecr.compiled.descent import solve_batch
-from seecr.compiled.outcomes import CONVERGED
+from seecr.compiled.outcomes import CONVERGED, TOLERANCE
 from seecr.compiled.pulley import lengths_at
 from seecr.prediction.experiment import Experiment
 from seecr.statics import batch
@@ -84,6 +87,30 @@ def test_a_walk_of_cables_without_a_past_comes_to_rest_where_each_pose_does(kind
     assert np.all(walked.outcome == CONVERGED)
     assert walked.deviation == pytest.approx(alone.deviation, abs=1e-10)
     assert np.all(tables.cables[path.fresh][..., list(OF_THE_PAST[:2])] == 0.0)
+
+
+def test_a_walk_goes_on_as_it_went_and_finds_rows_to_the_last_digits() -> None:
+    """It took four evaluations for each waypoint, three of them to begin where the last ended."""
+    experiment = experiment_of("demobot_cogiro")
+    path = experiment.path
+    step = np.concatenate([np.arange(1 - b, k + 1) for k, b in _steps(path)])
+    assert np.array_equal(path.onward, step >= 2) and path.onward.mean() > 0.5
+    cables = assemble(experiment.setup([], path.commands))
+    walked = batch.walk(cables, path, 400)
+    standing = replace(path)
+    standing.__dict__["onward"] = np.zeros_like(path.onward)
+    each = batch.walk(cables, standing, 400)
+    assert walked.deviation == pytest.approx(each.deviation, abs=1e-10)
+    assert np.all(walked.count[~path.onward] == each.count[~path.onward])
+    assert walked.count[path.onward].sum() < each.count[path.onward].sum()
+    assert walked.count[path.onward].mean() < 3.0
+    assert np.all(walked.residual <= TOLERANCE) and np.all(walked.residual[path.rows] < 1e-12)
+
+
+def _steps(path: Path) -> list[tuple[int, int]]:
+    """Of each row, the waypoints on its way, and whether the way begins with one of its own."""
+    own = np.bincount(path.source) - path.steps
+    return list(zip(path.steps.tolist(), own.tolist(), strict=True))
 
 
 def test_a_walk_does_not_search_beyond_a_waypoint_that_it_lost() -> None:
