@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from crosscheck.calibration.joint_fit.all_effects import Calibration, fit_all_effects
 from crosscheck.calibration.joint_fit.joining import layouts
 from crosscheck.calibration.joint_fit.joint import JointFit, cost
+from crosscheck.calibration.joint_fit.leave_out import leave_out
 from crosscheck.calibration.joint_fit.stages import Progress, poor
 from crosscheck.calibration.judgement.verdict import SURPRISE
 from crosscheck.calibration.linear_evidence.priors import widths_of
 from crosscheck.calibration.noise.colour import Colour
 from crosscheck.calibration.sets.catalogue import Catalogue
 from crosscheck.calibration.sets.equals import EQUAL
+from crosscheck.calibration.sets.exact import FEW
 from crosscheck.calibration.sets.linear_search import Names
 from crosscheck.calibration.sets.own_noise import by_own_noise
 from crosscheck.calibration.sets.refits import ROUNDS, ComparedSets, compare_sets
@@ -37,6 +41,8 @@ class FitAndSets:
 
     Attributes:
         whole, catalogue: the fit of all effects, and their starts.
+        surprise: chi2 per reading of the worst held-out run over what a fit expects: that of all
+            effects, or of the best set.
         unknown: something unknown beside all effects.
         found: the compared sets.
         not_noise: whether what the best of them takes for noise is not noise.
@@ -45,20 +51,16 @@ class FitAndSets:
 
     whole: Calibration
     catalogue: Catalogue
+    surprise: float
     unknown: UnknownOdds
     found: ComparedSets
     not_noise: bool = False
     without: Mapping[Names, float] = field(default_factory=dict)
 
     @property
-    def surprise(self) -> float:
-        """chi2 per reading of the worst held-out run over what the fit of all expects."""
-        return self.whole.surprise
-
-    @property
     def is_unexplained(self) -> bool:
-        """Whether something unknown is there beside all effects."""
-        return self.unknown.is_there or self.surprise > SURPRISE
+        """Whether the fit of all effects leaves something, or foretells runs badly."""
+        return self.unknown.is_there or self.whole.surprise > SURPRISE
 
     @property
     def is_a_local_minimum(self) -> bool:
@@ -135,15 +137,16 @@ def _compared(
         return not _louder(fit.colour, kinds) and not is_structure(fit)
 
     unknown = unknown_beside(setting, whole.joint, all_stated(problem, stated))
-    smooth = unknown.is_there or whole.surprise > SURPRISE
-    structure_beside_all = is_structure(whole.joint)
-    found = sets(structure_beside_all or smooth)
-    not_noise = is_structure(found.best.joint)
-    if structure_beside_all and not not_noise and not smooth:
+    by_all = is_structure(whole.joint) or whole.surprise > SURPRISE
+    found = sets(by_all or unknown.is_there)
+    not_noise, surprise = is_structure(found.best.joint), _surprise(whole, found)
+    smooth = unknown.is_there or surprise > SURPRISE
+    if by_all and not not_noise and not smooth:
         # what few effects explain, all of them could: their fit ended in a local minimum
         found = sets(False, found.best.joint.terms)
-        not_noise = is_structure(found.best.joint)
-    as_found = FitAndSets(whole, catalogue, unknown, found, not_noise)
+        not_noise, surprise = is_structure(found.best.joint), _surprise(whole, found)
+        smooth = surprise > SURPRISE
+    as_found = FitAndSets(whole, catalogue, surprise, unknown, found, not_noise)
     if not_noise or smooth:
         return as_found
     own = by_own_noise(setting, found, may_be)
@@ -157,6 +160,19 @@ def _compared(
         if own.fewer is not None:
             return as_found  # the noise is still another: it says nothing for sure
     return replace(as_found, without=own.without)
+
+
+def _surprise(whole: Calibration, found: ComparedSets) -> float:
+    """How much worse than expected the worst held-out run is predicted, by all effects or by few.
+
+    With about as many parameters as rows a fit of all may go far without some of these, where its
+    expectation, which is linear, does not hold. What few effects predict is then no surprise.
+    """
+    best = found.best
+    if whole.surprise <= SURPRISE or len(best.names - found.always) > FEW:
+        return whole.surprise
+    own = leave_out(replace(whole.setting, frozen=True), best.joint)
+    return min(whole.surprise, float(np.max(own.surprise, initial=0.0)))
 
 
 def _louder(colour: Colour, stated: Sequence[str]) -> bool:

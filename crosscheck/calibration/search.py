@@ -105,7 +105,7 @@ def search_sets(
     else:
         classes = _about_listed(found, seen, by_sets, sizes, problem.robot, terms)
         said = seen.with_sure_ones(found, classes)
-    said, outdone = _still_there(said, _outdone(found, in_place))
+    said, outdone = _still_there(said, _outdone(found, in_place), in_place.is_likelier)
     return SetSearch(
         every.whole, found, every.catalogue,
         _less_unknown(classes.at_most(best.names, every.without), said, in_place, outdone),
@@ -178,13 +178,14 @@ def _varying(unknown: UnknownOdds, in_place: Imitated) -> tuple[Varying, ...]:
     return in_place.seen if in_place.chance else ()
 
 
-def _still_there(said: Judgement, outdone: Names) -> tuple[Judgement, Names]:
+def _still_there(said: Judgement, outdone: Names, likelier: bool) -> tuple[Judgement, Names]:
     """The judgement without what is outdone, and what is, which may be listed no more.
 
-    What outweighs something unknown is there, however much of its worth that could take.
+    What outweighs something unknown is there, however much of its worth that could take. Nor is
+    anything outdone by what is less likely than the members it replaces, unless it is told.
     """
     if said.imitated is None:
-        return said, outdone - set(said.sure)
+        return said, outdone - set(said.sure) if likelier else frozenset()
     return said.without(outdone), outdone
 
 

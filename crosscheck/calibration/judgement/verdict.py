@@ -185,7 +185,8 @@ def _beside_unknown(
 ) -> Judgement | None:
     """What is sure where something unknown is at work, or likelier than not; None if nothing is."""
     in_place = signs.in_place
-    if in_place.chance:
+    # where something unknown is there anyway, it need not be in the place of these members
+    if in_place.is_likelier or (in_place.chance and not signs.are_clear):
         # of several members that stay, some may absorb what others explain
         most = carrying_most(found, in_place.worth, _ALL)
         kept = tuple(name for name in most if name not in implausible)

@@ -72,6 +72,11 @@ class Imitated:
         return self.probability if self.probability > _OPEN else 0.0
 
     @property
+    def is_likelier(self) -> bool:
+        """Whether the field is likelier than the members it replaces."""
+        return self.odds > UNKNOWN
+
+    @property
     def is_doubt(self) -> bool:
         """Whether the field is much less likely than these members, but not excluded."""
         return not self.chance and self.probability > _DOUBT

@@ -13,6 +13,7 @@ from crosscheck.calibration import compared as module
 from crosscheck.calibration.compared import fit_and_compare
 from crosscheck.calibration.joint_fit.all_effects import Calibration, fit_all_effects
 from crosscheck.calibration.joint_fit.joint import scaled_derivatives
+from crosscheck.calibration.joint_fit.leave_out import LeftOut, leave_out
 from crosscheck.calibration.noise.colour import Colour
 from crosscheck.calibration.unknown.beside import unknown_beside
 from crosscheck.fit.least_squares.state import evaluate
@@ -69,6 +70,29 @@ def test_what_stays_unknown_is_compared_once(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(module, "fit_all_effects", with_surprise)
     found = fit_and_compare(ready.problem, SIGMA, Terms(), lambda _text, _part: None, ())
     assert count == 1 and found.is_unexplained and not found.is_a_local_minimum
+
+
+@pytest.mark.parametrize("foretold", [True, False])
+def test_runs_that_few_effects_foretell_are_no_surprise(
+    monkeypatch: pytest.MonkeyPatch, foretold: bool
+) -> None:
+    """With 30 rows, friction beside drums and anchor points was unknown: all effects went far."""
+
+    def with_surprise(*given: Any) -> Calibration:
+        whole = fit_all_effects(*given)
+        return replace(whole, held_out=replace(whole.held_out, surprise=np.array([2.1])))
+
+    def surprised(*given: Any) -> LeftOut:
+        return replace(leave_out(*given), surprise=np.array([2.05]))
+
+    data = measured(ROBOT, [term(ROBOT, "pulley_radius", radius_m=0.006)])
+    ready = prepare(ROBOT, data, Terms(), considered(FEW))
+    monkeypatch.setattr(module, "fit_all_effects", with_surprise)
+    if not foretold:
+        monkeypatch.setattr(module, "leave_out", surprised)
+    found = fit_and_compare(ready.problem, SIGMA, Terms(), lambda _text, _part: None, ())
+    assert found.found.best.names == {"pulley_radius"}
+    assert found.surprise == 2.05 if not foretold else found.surprise < 1.5
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.4])

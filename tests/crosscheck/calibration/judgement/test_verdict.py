@@ -166,6 +166,8 @@ def test_something_unknown_in_place_of_members_must_be_sure(odds: float) -> None
     # a field beside the whole catalogue leaves no doubt
     said = judge(found, classes, SignsOfUnknown(6.0, 1.0, in_place=field))
     assert said.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
+    # nor is one in the place of members that are likelier then what is unknown
+    assert said.imitated is (field if field.is_likelier else None)
 
 
 def test_a_field_beside_the_best_set_alone_makes_it_many() -> None:

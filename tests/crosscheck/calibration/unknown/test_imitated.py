@@ -344,8 +344,11 @@ def test_what_has_no_probability_left_is_not_listed() -> None:
     """Beside winches that turn with others a platform's mass was, with a probability of zero."""
     lag = Imitated(173.0, frozenset({"pulley_radius"}), (Varying.LAG,))
     said = Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, ("backlash", "tilt"), 0.0, imitated=lag)
-    left, gone = _still_there(said, frozenset({"backlash"}))
+    left, gone = _still_there(said, frozenset({"backlash"}), likelier=True)
     assert left.sure == ("tilt",) and gone == {"backlash"}
     # where nothing is in place of known effects, what outweighs the unknown stays
     alone = Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, ("tilt",), 0.0)
-    assert _still_there(alone, frozenset({"tilt", "backlash"})) == (alone, {"backlash"})
+    both = frozenset({"tilt", "backlash"})
+    assert _still_there(alone, both, likelier=True) == (alone, {"backlash"})
+    # what is less likely than the members it replaces, and not told, takes nothing from others
+    assert _still_there(alone, both, likelier=False) == (alone, frozenset())
