@@ -139,7 +139,8 @@ def _compared(
     unknown = unknown_beside(setting, whole.joint, all_stated(problem, stated))
     by_all = is_structure(whole.joint) or whole.surprise > SURPRISE
     found = sets(by_all or unknown.is_there)
-    not_noise, surprise = is_structure(found.best.joint), _surprise(whole, found)
+    not_noise = is_structure(found.best.joint)
+    surprise = whole.surprise if unknown.is_there else _surprise(whole, found)
     smooth = unknown.is_there or surprise > SURPRISE
     if by_all and not not_noise and not smooth:
         # what few effects explain, all of them could: their fit ended in a local minimum
@@ -165,7 +166,7 @@ def _compared(
 def _surprise(whole: Calibration, found: ComparedSets) -> float:
     """How much worse than expected the worst held-out run is predicted, by all effects or by few.
 
-    With about as many parameters as rows a fit of all may go far without some of these, where its
+    With many parameters and few rows a fit of all may go far without some of these, where its
     expectation, which is linear, does not hold. What few effects predict is then no surprise.
     """
     best = found.best

@@ -163,7 +163,7 @@ def _sentence(
     if said.verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         return agreement_words(tried, hints_of(chances, ()))
     if said.imitated is not None:
-        return and_what_is_left(words_of(missing), _more_probable(said, said.imitated), tried)
+        return and_what_is_left(words_of(missing), _instead(said, said.imitated), tried)
     if said.verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
         return structure_words(missing, tried, chances)
     if said.verdict is DiagnosisVerdict.EFFECTS_FOUND:
@@ -197,19 +197,14 @@ def _sentence(
     )
 
 
-def _more_probable(said: Judgement, unknown: Imitated) -> str:
+def _instead(said: Judgement, unknown: Imitated) -> str:
     """That something unknown may be there instead of members that can imitate it, and how sure."""
-    known, p = " + ".join(sorted(unknown.replaced)), probability_words(unknown.probability)
-    if said.verdict is not DiagnosisVerdict.MANY_EFFECTS:
-        likely = f"is more probable than {known}, which can imitate it"
-    elif unknown.probability > 0.5:
-        likely = (
-            f"is more probable than {known}, which can imitate it (probability {p}), "
-            "but not certain"
-        )
-    else:
-        likely = f"may be there in place of {known}, which can imitate it (probability {p})"
-    return f"an unknown effect {likely}: {unknown.words}"
+    known, chance, doubt = " + ".join(sorted(unknown.replaced)), "", ""
+    how = "is more probable than" if unknown.is_likelier else "may be there in place of"
+    if said.verdict is DiagnosisVerdict.MANY_EFFECTS:
+        chance = f" (probability {probability_words(unknown.probability)})"
+        doubt = ", but not certain" if unknown.is_likelier else ""
+    return f"an unknown effect {how} {known}, which can imitate it{chance}{doubt}: {unknown.words}"
 
 
 def _or_in_its_place(one: MissingEffect, alternatives: Sequence[Names]) -> str:

@@ -64,8 +64,8 @@ def walk_in_order(
             start[3] = 1.0
             first[:] = 0.0
         else:
-            # the start deviates from its command as much as the last equilibrium did, or by as much
-            # more as it had become: that takes a step of four less
+            # the start deviates from its command as much as the last equilibrium did; on a straight
+            # way by as much more as that did than the one before it
             copy_vector(deviation[k - 1], start)
             copy_vector(values[k - 1], first)
             if onward[k]:

@@ -202,9 +202,9 @@ def walk(tables: Tables, path: Path, limit: int) -> Evaluation:
             tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
             tables.length, tables.scale[part], 0.5 * tables.length, tables.reach[part], limit,
             path.fresh[part], path.onward[part], enough[part], path.elapsed[part],
-            out.outcome[part], out.count[part],
-            out.residual[part], out.gradient[part], out.hessian[part], out.states[part],
-            out.slopes[part], out.deviation[part], out.values[part], out.guess[part],
+            out.outcome[part], out.count[part], out.residual[part], out.gradient[part],
+            out.hessian[part], out.states[part], out.slopes[part], out.deviation[part],
+            out.values[part], out.guess[part],
         )  # fmt: skip
 
     run_parts(run, _apart(path, tables))

@@ -183,7 +183,7 @@ def _named(found: ComparedSets, likely: Classes, few: bool) -> tuple[str, ...]:
 def _beside_unknown(
     found: ComparedSets, signs: SignsOfUnknown, implausible: Names, undecided: float
 ) -> Judgement | None:
-    """What is sure where something unknown is at work, or likelier than not; None if nothing is."""
+    """What is sure where something unknown is at work, or may be; None if nothing is."""
     in_place = signs.in_place
     # where something unknown is there anyway, it need not be in the place of these members
     if in_place.is_likelier or (in_place.chance and not signs.are_clear):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -93,6 +94,13 @@ def test_runs_that_few_effects_foretell_are_no_surprise(
     found = fit_and_compare(ready.problem, SIGMA, Terms(), lambda _text, _part: None, ())
     assert found.found.best.names == {"pulley_radius"}
     assert found.surprise == 2.05 if not foretold else found.surprise < 1.5
+
+
+def test_what_many_effects_foretell_takes_no_surprise_away() -> None:
+    """So many imitate what is unknown in the other runs as well."""
+    best = SimpleNamespace(names=frozenset("abcdef"))
+    whole: Any = SimpleNamespace(surprise=9.0)
+    assert module._surprise(whole, cast(Any, SimpleNamespace(best=best, always=frozenset()))) == 9.0
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.4])

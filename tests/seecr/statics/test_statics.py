@@ -90,7 +90,7 @@ def test_a_walk_of_cables_without_a_past_comes_to_rest_where_each_pose_does(kind
 
 
 def test_a_walk_goes_on_as_it_went_and_finds_rows_to_the_last_digits() -> None:
-    """It took four evaluations for each waypoint, three of them to begin where the last ended."""
+    """Each waypoint took four evaluations, to the last digits, from where the last had ended."""
     experiment = experiment_of("demobot_cogiro")
     path = experiment.path
     step = np.concatenate([np.arange(1 - b, k + 1) for k, b in _steps(path)])
