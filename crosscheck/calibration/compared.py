@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from crosscheck.calibration.joint_fit.all_effects import Calibration, fit_all_effects
+from crosscheck.calibration.joint_fit.beginning import Beginning
 from crosscheck.calibration.joint_fit.joining import layouts
 from crosscheck.calibration.joint_fit.joint import JointFit, cost
 from crosscheck.calibration.joint_fit.leave_out import leave_out
@@ -77,8 +78,9 @@ class FitAndSets:
 
 
 def fit_and_compare(
-    problem: Problem, stated: Sigma, terms: Terms, progress: Progress, given: Sequence[Terms]
-) -> FitAndSets:
+    problem: Problem, stated: Sigma, terms: Terms, progress: Progress, given: Sequence[Terms],
+    beginning: Beginning | None = None,
+) -> FitAndSets:  # fmt: skip
     """Fit all effects, then compare sets of them.
 
     If something unknown is there beside all effects, but some of them alone explain more, the fit
@@ -88,11 +90,13 @@ def fit_and_compare(
     Args: as in :func:`crosscheck.calibration.search.search_sets`.
     """
 
+    begun = beginning or Beginning(problem, terms)
+
     def of(first: Terms | None) -> FitAndSets:
         def report(text: str, part: float) -> None:
             progress(text, 0.5 * part)
 
-        whole = fit_all_effects(problem, terms, report, first)
+        whole = fit_all_effects(problem, terms, report, first, begun)
         return _compared(whole, stated, terms, progress, given)
 
     every = of(given[-1] if given else None)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from crosscheck.calibration.compared import all_stated, fit_and_compare
 from crosscheck.calibration.joint_fit.all_effects import PLAIN, Calibration, covariance
+from crosscheck.calibration.joint_fit.beginning import Beginning
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting
 from crosscheck.calibration.joint_fit.linearised import free_of
 from crosscheck.calibration.joint_fit.stages import Progress
@@ -77,6 +78,7 @@ def search_sets(
     terms: Terms = PLAIN,
     progress: Progress = lambda _text, _part: None,
     given: Sequence[Terms] = (),
+    beginning: Beginning | None = None,
 ) -> SetSearch:
     """Fit all effects at once, then compare sets of effects.
 
@@ -87,8 +89,9 @@ def search_sets(
         progress: called with what is being done and the fraction that is done.
         given: sets that were found elsewhere, with their values, the best last; they are compared
             too.
+        beginning: that of the fit of all effects, if it was begun before.
     """
-    every = fit_and_compare(problem, stated, terms, progress, given)
+    every = fit_and_compare(problem, stated, terms, progress, given, beginning)
     found, best, setting = every.found, every.found.best, every.whole.setting
     sizes = _sizes(every.catalogue, terms)
     in_place = field_in_place(setting, best.joint, best.widths, found.scores)

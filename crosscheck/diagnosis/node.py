@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from crosscheck.fit.effects.gauss_newton import Fit
 from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.fit.preparation.prepare import Progress
 from crosscheck.fit.reasons import Reason, Why
+from seecr.processes import Shared, shared_out
 
 # Least gain in ln evidence for one more effect (odds of 20:1).
 LEAST_GAIN = 3.0
@@ -89,16 +90,23 @@ def _screened(
     """Effects that are not worth a fit, with the reason; and the others, by their promise."""
     prune = _PRUNE_NOISE if node.whiteness.is_noise else _PRUNE_OTHER
     todo = [c for c in trials.candidates(trials.problem) if c.name not in node.names]
-    out = []
-    for k, c in enumerate(todo):
-        progress(f"trying {c.name}", k / len(todo))
+
+    def screened(c: Candidate) -> Candidate:
         if c.why_not is None:
             c = screen(trials, node.fit, c.layout)
-        if c.why_not is None and c.p > prune:
-            c = c.refused(Reason(Why.CHANCE, p=c.p))
-        out.append(c)
+        return c.refused(Reason(Why.CHANCE, p=c.p)) if c.why_not is None and c.p > prune else c
+
+    out = shared_out(
+        screened, todo, lambda: Shared(trials, node, todo), _told(progress, "trying", len(todo))
+    )
     promising = sorted((c for c in out if c.why_not is None), key=lambda c: -_promise(c))
     return [c for c in out if c.why_not is not None], promising
+
+
+def _told(progress: Progress, doing: str, count: int) -> Callable[[Candidate], None]:
+    """Progress by the number of candidates that were begun."""
+    begun = iter(range(count))
+    return lambda c: progress(f"{doing} {c.name}", next(begun) / count)
 
 
 def _promise(c: Candidate) -> float:
@@ -126,16 +134,22 @@ def _fitted(
     progress: Progress,
 ) -> list[Candidate]:
     """All promising candidates in their order: the chosen ones fitted, the others refused."""
-    best, out = np.inf, []
-    for k, c in enumerate(promising):
-        if c not in chosen:
-            out.append(c.refused(Reason(Why.PROMISES_LESS)))
-            continue
-        progress(f"fitting {c.name}", k / len(promising))
-        tried = fit_candidate(trials, node.fit, c, hopeless(node.fit.chi2, best))
-        best = min(best, np.inf if tried.fit is None else tried.fit.chi2)
-        out.append(tried)
-    return out
+    first, others = list(chosen[:1]), list(chosen[1:])
+    told = _told(progress, "fitting", len(chosen))
+
+    def fits(some: Sequence[Candidate], best: float) -> list[Candidate]:
+        limit = hopeless(node.fit.chi2, best)
+        return shared_out(
+            lambda c: fit_candidate(trials, node.fit, c, limit), some,
+            lambda: Shared(trials, node, some), told,
+        )  # fmt: skip
+
+    tried = fits(first, np.inf)
+    best = min((c.fit.chi2 for c in tried if c.fit is not None), default=np.inf)
+    tried += fits(others, best)
+    by_name = {c.name: c for c in tried}
+    refused = Reason(Why.PROMISES_LESS)
+    return [by_name[c.name] if c.name in by_name else c.refused(refused) for c in promising]
 
 
 def hopeless(without: float, best: float) -> float:

@@ -15,6 +15,7 @@ from crosscheck.fit.effects.gauss_newton import Fit
 from crosscheck.fit.least_squares.imitation import basis, beside, imitated
 from seecr.effects import catalogue
 from seecr.effects.base import Layout
+from seecr.processes import Shared, shared_out
 
 # An effect is only refitted in place of another if it can imitate this part of its signal.
 _LIKELY = 0.9
@@ -68,7 +69,11 @@ def in_place_of(found: Search, name: str, apart: float = TOLD_APART) -> list[Riv
     if not without.valid:
         return []
     own = len(final.fit.terms[name].layout)
-    tried = [_in_its_place(found, c, without, apart) for c in _likely(found, name, without)]
+    likely = _likely(found, name, without)
+    tried = shared_out(
+        lambda c: _in_its_place(found, c, without, apart), likely,
+        lambda: Shared(found, without, likely),
+    )  # fmt: skip
     every = {rival.name: rival for rival in tried if rival is not None}
     out = {rival.name for rival in every.values() if _explains_as_well(found, rival, own, apart)}
     for rival in sorted(out):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from crosscheck.diagnosis.words import (
 from crosscheck.fit.least_squares.problem import rms_by_kind
 from crosscheck.fit.preparation.prepare import noise_floor
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
+from seecr.processes import Shared, shared_out
 
 
 def settled(
@@ -76,10 +78,7 @@ def _with_better(
 ) -> tuple[Search, dict[str, list[Rival]]]:
     """The search with what explains more in place of some of its effects, and their rivals."""
     for _ in found.found:
-        every = {}
-        for name in found.found:
-            told(f"looking for effects that could replace {name}")
-            every[name] = in_place_of(found, name)
+        every = _for_each(found, in_place_of, told)
         other = replaced(found, (rival for some in every.values() for rival in some))
         if other is found:
             return found, {n: [r for r in some if not r.is_better] for n, some in every.items()}
@@ -88,11 +87,18 @@ def _with_better(
 
 
 def _all_rivals(found: Search, told: Callable[[str], None]) -> dict[str, list[Rival]]:
-    out = {}
-    for name in found.found:
-        told(f"looking for effects that could replace {name}")
-        out[name] = rivals_of(found, name)
-    return out
+    return _for_each(found, rivals_of, told)
+
+
+def _for_each(
+    found: Search, look: Callable[[Search, str], list[Rival]], told: Callable[[str], None]
+) -> dict[str, list[Rival]]:
+    """What is found in place of each effect."""
+    some = shared_out(
+        partial(look, found), found.found, partial(Shared, found),
+        lambda name: told(f"looking for effects that could replace {name}"),
+    )  # fmt: skip
+    return dict(zip(found.found, some, strict=True))
 
 
 def _by_evidence(

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from crosscheck.calibration.joint_fit.beginning import Beginning
 from crosscheck.calibration.judgement.verdict import SURE, too_large
 from crosscheck.calibration.search import search_sets
 from crosscheck.diagnosis.chances import PROBABLE
@@ -176,6 +177,14 @@ def _searched(
     ready: Prepared, base: Fit, factor: Array, notes: Notes, progress: Progress
 ) -> Diagnosis:
     """The diagnosis of data that are fit for one."""
+    with Beginning(ready.problem, ready.terms) as beginning:
+        return _by_steps_or_sets(ready, base, factor, notes, progress, beginning)
+
+
+def _by_steps_or_sets(
+    ready: Prepared, base: Fit, factor: Array, notes: Notes, progress: Progress,
+    beginning: Beginning,
+) -> Diagnosis:  # fmt: skip
     problem = ready.problem
     found, more = by_steps(problem, base, factor, _part(progress, 0.0, 0.5))
     pairs = pairs_instead(found)
@@ -189,7 +198,8 @@ def _searched(
     # outliers), or estimated from what may be an effect. So all effects are fitted at once, and
     # sets of them compared.
     given = [*pairs, *(step.fit.terms for step in found.steps[1:])]
-    sought = search_sets(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0), given)
+    share = _part(progress, 0.5, 1.0)
+    sought = search_sets(problem, problem.data.sigma, ready.terms, share, given, beginning)
     said = sought.judgement
     if said.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT or said.imitated is not None:
         return explained(beside_imitated(found, sought), notes)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import signal
 import threading
+import time
 from collections import deque
 
 import numpy as np
@@ -129,3 +131,67 @@ def test_a_part_that_fails_leaves_the_thread_as_it_was() -> None:
     parts: list[slice] = []
     threads.in_parts(parts.append, 1000, 2)
     assert len(parts) == 2
+
+
+def counted_parts(n: int = 1000) -> int:
+    parts: list[slice] = []
+    threads.in_parts(parts.append, n)
+    return len(parts)
+
+
+def test_batches_stay_whole_while_the_other_processors_are_busy(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(threads, "processors", lambda: 4)
+    busy = True
+    with threads.undivided(lambda: busy):
+        assert counted_parts() == 1
+        with threads.undivided(lambda: False):
+            assert counted_parts() == 4
+        assert counted_parts() == 1
+        busy = False
+        assert counted_parts() == 4
+    with threads.undivided():
+        assert counted_parts() == 1
+    assert counted_parts() == 4
+
+
+@pytest.mark.parametrize(
+    "n, processors, divided", [(255, 4, False), (256, 4, True), (999, 1, False)]
+)
+def test_whether_a_batch_is_divided_can_be_asked_before(
+    n: int, processors: int, divided: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(threads, "processors", lambda: processors)
+    assert threads.is_divided(n) is divided
+    assert (counted_parts(n) > 1) is divided
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there are no forked processes here")
+@pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning")
+def test_a_forked_process_has_threads_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It waited for ever for those of the process that forked it."""
+    monkeypatch.setattr(threads, "processors", lambda: 2)
+    both = threading.Barrier(2, timeout=10.0)
+
+    def meet(_part: slice) -> None:
+        both.wait()
+
+    threads.run_parts(meet, [slice(0, 1), slice(1, 2)])  # the pool has its threads
+    process = os.fork()
+    if process == 0:
+        status = 1
+        try:
+            threads.run_parts(meet, [slice(0, 1), slice(1, 2)])
+            status = 0
+        finally:
+            os._exit(status)
+    ends = time.monotonic() + 20.0
+    ended, status = os.waitpid(process, os.WNOHANG)
+    while not ended and time.monotonic() < ends:
+        time.sleep(0.01)
+        ended, status = os.waitpid(process, os.WNOHANG)
+    if not ended:
+        os.kill(process, signal.SIGKILL)
+        os.waitpid(process, 0)
+    assert ended and status == 0

@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from crosscheck.calibration.joint_fit.beginning import Beginning
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting
 from crosscheck.calibration.joint_fit.leave_out import LeftOut, leave_out
 from crosscheck.calibration.joint_fit.linearised import linearised
 from crosscheck.calibration.joint_fit.stages import Everything, Progress, fit_everything
-from crosscheck.calibration.noise.colour import Colour, chain_of
+from crosscheck.calibration.noise.colour import Colour
 from crosscheck.calibration.noise.robust import outliers
 from crosscheck.fit.least_squares.definite import inverse_of
 from crosscheck.fit.least_squares.problem import Problem, Rms, rms_by_kind
@@ -102,6 +103,7 @@ def fit_all_effects(
     terms: Terms = PLAIN,
     progress: Progress = lambda _text, _part: None,
     given: Terms | None = None,
+    beginning: Beginning | None = None,
 ) -> Calibration:
     """Fit every effect that the data can see.
 
@@ -110,11 +112,13 @@ def fit_all_effects(
         terms: effects of the model as it stands; their values are the starting point.
         progress: called with what is being done and the fraction that is done.
         given: a few effects that were found elsewhere, with their values there.
+        beginning: that of this fit, which may have begun before.
     """
-    factor = problem.noise(problem.experiment.predict(terms.effects))
-    setting = Setting(problem, factor, chain_of(problem))
-    stood = evaluate(problem, terms, factor)
-    fitted = fit_everything(setting, terms, progress, given)
+    beginning = beginning or Beginning(problem, terms)
+    setting = beginning.setting
+    stood = evaluate(problem, terms, setting.factor)
+    progress("fitting all effects", 0.05)
+    fitted = fit_everything(setting, terms, beginning.begun, progress, given)
     setting, joint = fitted.setting, fitted.joint
     far_off = outliers(setting.chain, joint.weight, problem.data.n_rows)
     problem = setting.problem.with_far_off(far_off)

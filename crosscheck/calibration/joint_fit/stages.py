@@ -29,6 +29,7 @@ from crosscheck.fit.effects.registration import registered
 from crosscheck.fit.least_squares.state import State, evaluate
 from seecr.effects import Term, Terms
 from seecr.effects.base import Layout
+from seecr.processes import Shared, shared_out
 
 Progress = Callable[[str, float], None]
 # Most rounds of estimating the noise and fitting with it; the change at which the noise has
@@ -45,6 +46,20 @@ _HEATS = (0.3, 1.0, 3.0, 10.0)
 # The joint fit is also started from a few given effects if its objective there is at most so many
 # times that of the fit so far.
 _COMPARABLE = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """What a joint fit begins with, whatever was found elsewhere.
+
+    Attributes:
+        start: the model as it stands, with all effects that are fitted from the start at null.
+        first: the fit from there. alone: fits from single effects; None if they were not asked for.
+    """
+
+    start: State
+    first: JointFit
+    alone: Sequence[JointFit] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,32 +81,44 @@ class Everything:
     prices: Mapping[str, float]
 
 
+def begin(setting: Setting, terms: Terms, ahead: bool = False) -> Begun:
+    """Begin a joint fit.
+
+    Args:
+        setting: the data. terms: effects of the model as it stands.
+        ahead: also fit from single effects if the fit is poor, as if nothing better were known.
+    """
+    at_once, _later = layouts(setting.problem)
+    start = start_of(setting, terms, Terms(Term(a, a.null) for a in at_once))
+    first = with_noise(setting, tempered(setting, start, widths_of(start.terms, setting.free)))
+    alone = alone_fits(setting, start, terms) if ahead and poor(first) else None
+    return Begun(start, first, alone)
+
+
 def fit_everything(
-    setting: Setting, terms: Terms, progress: Progress, given: Terms | None = None
+    setting: Setting, terms: Terms, begun: Begun, progress: Progress, given: Terms | None = None
 ) -> Everything:
     """The joint fit, including effects that join later.
 
     Args:
         setting: the data. terms: effects of the model as it stands.
+        begun: the beginning of the fit.
         progress: called with what is being done and the fraction that is done.
         given: a few effects that were found elsewhere, with their values there.
     """
-    at_once, later = layouts(setting.problem)
-    progress("fitting all effects", 0.05)
-    start = start_of(setting, terms, Terms(Term(a, a.null) for a in at_once))
-    first = with_noise(setting, tempered(setting, start, widths_of(start.terms, setting.free)))
-    frozen = replace(setting, frozen=True)
+    _at_once, later = layouts(setting.problem)
+    start, first, frozen = begun.start, begun.first, replace(setting, frozen=True)
     if given is not None:
         first = from_given(frozen, first, start, given)
     back = with_rows_back(frozen, first)
-    wanted = [a for a in later if a.name not in terms]
     alone = back
     if poor(back):
         progress("trying effects one by one", 0.4)
-        firm = [a for a in at_once if a.name not in terms and a.name != TRACKER]
-        alone = _from_alone(frozen, back, start, terms, (wanted, firm))
+        fits = alone_fits(setting, start, terms) if begun.alone is None else begun.alone
+        alone = max([back, *fits], key=lambda j: worth(frozen, j))
     progress("trying effects with history", 0.6)
-    looked = promising_beside(frozen, alone, [a for a in wanted if a.name not in alone.terms])
+    wanted = [a for a in later if a.name not in terms and a.name not in alone.terms]
+    looked = promising_beside(frozen, alone, wanted)
     joined = _with_promising(frozen, alone, start.terms, looked, progress)
     own = frozen if any(a.name in joined.terms for a in later) else setting
     best = to_its_end(own, widened(own, joined))
@@ -197,26 +224,26 @@ def widened(setting: Setting, joint: JointFit) -> JointFit:
     return with_noise(setting, settle(setting, joint.state, width, joint.colour, jacobian=known))
 
 
-def _from_alone(
-    setting: Setting, joint: JointFit, start: State, terms: Terms,
-    may_be: tuple[Sequence[Layout], Sequence[Layout]],
-) -> JointFit:  # fmt: skip
-    """The joint fit, or a better one that starts from a fit of a single effect."""
+def alone_fits(setting: Setting, start: State, terms: Terms) -> list[JointFit]:
+    """Joint fits that start from fits of single effects, up to the first that is not poor."""
+    frozen = replace(setting, frozen=True)
+    at_once, later = layouts(setting.problem)
+    wanted = [a for a in later if a.name not in terms]
+    firm = [a for a in at_once if a.name not in terms and a.name != TRACKER]
     few = start.terms.only([*terms.names, TRACKER])
     begun = evaluate(setting.problem, few, setting.factor, start)
-    plain = settle(setting, begun, widths_of(few, setting.free), WHITE)
-    found = [joint]
-    for alone in fitted_alone(setting, plain, *may_be):
+    plain = settle(frozen, begun, widths_of(few, setting.free), WHITE)
+    found = list[JointFit]()
+    for alone in fitted_alone(frozen, plain, wanted, firm):
         others = (t for t in start.terms if t.name not in alone.terms)
-        state = evaluate(
-            setting.problem, Terms([*alone.terms, *others]), setting.factor, alone.state
-        )
+        every = Terms([*alone.terms, *others])
+        state = evaluate(setting.problem, every, setting.factor, alone.state)
         if state.valid:
-            fitted = tempered(setting, state, widths_of(state.terms, setting.free))
-            found.append(with_noise(setting, fitted))
+            fitted = tempered(frozen, state, widths_of(state.terms, setting.free))
+            found.append(with_noise(frozen, fitted))
             if not poor(found[-1]):
                 break
-    return max(found, key=lambda j: worth(setting, j))
+    return found
 
 
 def from_given(setting: Setting, joint: JointFit, start: State, given: Terms) -> JointFit:
@@ -273,17 +300,18 @@ def _with_more(setting: Setting, joint: JointFit, first: Terms, added: list[Term
     if float(np.max(joint.colour.scale)) > _POOR:
         there = [inside(at_null(t)) for t in joint.terms if t.name not in first]
         starts.append(Terms([*first, *there, *added]))
-    found = [joint]
-    for k, terms in enumerate(starts):
-        state = evaluate(setting.problem, terms, setting.factor, joint.state)
+
+    def fitted(k: int) -> JointFit | None:
+        state = evaluate(setting.problem, starts[k], setting.factor, joint.state)
         if not state.valid:
-            continue
-        width = widths_of(terms, setting.free)
+            return None
+        width = widths_of(starts[k], setting.free)
         if k == 0:
-            fitted = settle(setting, state, width, joint.colour)
-        else:
-            fitted = tempered(setting, state, width)
-        found.append(with_noise(setting, fitted))
+            return with_noise(setting, settle(setting, state, width, joint.colour))
+        return with_noise(setting, tempered(setting, state, width))
+
+    fits = shared_out(fitted, range(len(starts)), lambda: Shared(setting, joint, starts))
+    found = (one for one in (joint, *fits) if one is not None)
     return max(found, key=lambda j: worth(setting, j))
 
 

@@ -56,15 +56,13 @@ def _without(exact: Exact, about: Scores, best: Refit, name: str) -> None:
         least = best.score - _HOPELESS
         first, *others = scores.best(_EACH, _HOPELESS)
         some = [n for n in (first, *others) if scores.score(n) > least]
-        for names in some or ([first] if k == 0 else []):
-            exact.fit(scores, names)
+        exact.fit_all(scores, some or ([first] if k == 0 else []))
         other = max(
             (r for names, r in exact.possible.items() if not names & barred),
             key=lambda r: r.score,
         )
         if other.score > best.score - _NEAR:
-            for names in scores.best(_NEIGHBOURS, _NEAR):
-                exact.fit(scores, names)
+            exact.fit_all(scores, scores.best(_NEIGHBOURS, _NEAR))
         stays = barred == before and other.score < top + 1.0
         if stays or other.score < best.score - _NEEDED:
             return

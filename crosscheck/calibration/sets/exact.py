@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from crosscheck.fit.effects.possible import can_be
 from crosscheck.fit.least_squares.state import State, evaluate
 from seecr.effects import Term, Terms
 from seecr.pose import Array
+from seecr.processes import Shared, shared_out
 
 _STEPS = 12
 # If a refit is worse than its linear evidence by this much, it may have ended in a local minimum,
@@ -124,47 +125,74 @@ class Exact:
 
     def best_of(self, scores: Scores, some: Iterable[Names]) -> Refit:
         """Fit these sets, and return the best of all that were ever fitted."""
-        for names in some:
-            self.fit(scores, names)
+        self.fit_all(scores, some)
         return self.best
-
-    @property
-    def best(self) -> Refit:
-        """The best of all sets that were ever fitted."""
-        return max(self.possible.values(), key=lambda r: r.score)
-
-    def take(self, scores: Scores, start: Terms) -> None:
-        """Fit a set from these values, and keep the result if it is better than the present one.
-
-        Values that no robot can have are worse than any others, however much they explain: a set
-        with such values is not compared.
-        """
-        self._keep(scores, self._at(start))
-
-    def _keep(self, scores: Scores, start: State) -> None:
-        names = frozenset(start.terms.names)
-        # the linear model may hold an effect near null that only acts away from there
-        wide = {name: max(width, 1.0) for name, width in scores.widths(names).items()}
-        found = [self.fitted.get(names), self._from(scores, names, start, wide)]
-        fitted = [refit for refit in found if refit is not None]
-        self.fitted[names] = max(
-            fitted, key=lambda refit: (self.can_be(refit), refit.score), default=None
-        )
 
     def fit(self, scores: Scores, names: Names) -> Refit | None:
         """The exact fit of a set, or None if it has no solution.
 
         A set is fitted again if other shapes of its members promise far more.
         """
-        shapes = tuple((name, scores.shapes.get(name)) for name in sorted(names))
+        return self.fit_all(scores, [names])[0]
+
+    def fit_all(self, scores: Scores, some: Iterable[Names]) -> list[Refit | None]:
+        """Fit these sets, each as :meth:`fit` does, several at a time."""
+        wanted = list(some)
+        begin = [names for names in dict.fromkeys(wanted) if self._is_to_fit(scores, names)]
+        self._take(begin, shared_out(partial(self._fit, scores), begin, self._shared, self._told))
+        for names in wanted:
+            self._begun.setdefault(names, set()).add(_shapes(scores, names))
+        return [self.fitted[names] for names in wanted]
+
+    @property
+    def best(self) -> Refit:
+        """The best of all sets that were ever fitted."""
+        return max(self.possible.values(), key=lambda r: r.score)
+
+    def take(self, scores: Scores, *starts: Terms) -> None:
+        """Fit sets from these values, several at a time; each result is kept if it is better.
+
+        Values that no robot can have are worse than any others, however much they explain: a set
+        with such values is not compared.
+        """
+
+        def fit(start: Terms) -> Refit | None:
+            return self._from_start(scores, self._at(start))
+
+        names = [frozenset(start.names) for start in starts]
+        fits = shared_out(fit, starts, self._shared, lambda one: self._told(frozenset(one.names)))
+        self._take(names, fits)
+
+    def _take(self, some: Iterable[Names], fits: Iterable[Refit | None]) -> None:
+        for names, found in zip(some, fits, strict=True):
+            self.fitted[names] = self._better(self.fitted.get(names), found)
+
+    def _from_start(self, scores: Scores, start: State) -> Refit | None:
+        names = frozenset(start.terms.names)
+        # the linear model may hold an effect near null that only acts away from there
+        wide = {name: max(width, 1.0) for name, width in scores.widths(names).items()}
+        return self._from(scores, names, start, wide)
+
+    def _better(self, *fits: Refit | None) -> Refit | None:
+        fitted = [refit for refit in fits if refit is not None]
+        return max(fitted, key=lambda refit: (self.can_be(refit), refit.score), default=None)
+
+    def _told(self, names: Names) -> None:
+        self.report(" + ".join(sorted(names)) or "the model as it is")
+
+    @cached_property
+    def _all(self) -> Shared:
+        """All that is there before the first set is fitted, and that all fits have in common."""
+        return Shared(self.setting, self.joint, self.catalogue, self.plain, self.given)
+
+    def _shared(self) -> Shared:
+        return self._all
+
+    def _is_to_fit(self, scores: Scores, names: Names) -> bool:
         if names not in self.fitted:
-            self.report(" + ".join(sorted(names)) or "the model as it is")
-            self._fit(scores, names)
-        elif shapes not in self._begun.get(names, set()) and self._promises_more(scores, names):
-            self.report(" + ".join(sorted(names)))
-            self._keep(scores, self._linear(scores, names))
-        self._begun.setdefault(names, set()).add(shapes)
-        return self.fitted[names]
+            return True
+        begun = _shapes(scores, names) in self._begun.get(names, set())
+        return not begun and self._promises_more(scores, names)
 
     def _promises_more(self, scores: Scores, names: Names) -> bool:
         """Whether other shapes of its members may explain far more than the present fit."""
@@ -172,15 +200,22 @@ class Exact:
         other = names & scores.shapes.keys()
         return bool(other) and (own is None or own.score < scores.score(names) - LOCAL_MINIMUM)
 
-    def _fit(self, scores: Scores, names: Names) -> None:
-        """Fit a set from its linear values, from given ones, and from null if that ends badly."""
+    def _fit(self, scores: Scores, names: Names) -> Refit | None:
+        """A set fitted from its linear values, at first also from given ones, and from null.
+
+        From null only if all that ends badly.
+        """
+        if names in self.fitted:
+            return self._from_start(scores, self._linear(scores, names))
         linear, widths = scores.score(names), scores.widths(names)
-        self.fitted[names] = best = self._from(scores, names, self._linear(scores, names), widths)
+        best = self._from(scores, names, self._linear(scores, names), widths)
         if names in self.given:
-            self.take(scores, self.given[names])
+            best = self._better(best, self._from_start(scores, self._at(self.given[names])))
         few = 0 < len(names - scores.always) <= FEW
         if few and (best is None or best.score < linear - LOCAL_MINIMUM):
-            self.take(scores, Terms(inside(self.catalogue.start(name), _OFF) for name in names))
+            null = Terms(inside(self.catalogue.start(name), _OFF) for name in names)
+            best = self._better(best, self._from_start(scores, self._at(null)))
+        return best
 
     def _at(self, terms: Terms) -> State:
         return evaluate(self.setting.problem, terms, self.setting.factor, self.plain)
@@ -225,6 +260,10 @@ class Exact:
         width = width_of(start.terms, widths)
         found = settle(self.setting, start, width, self.joint.colour, _STEPS)
         return scored(self.setting, found, names, widths, scores)
+
+
+def _shapes(scores: Scores, names: Names) -> Shapes:
+    return tuple((name, scores.shapes.get(name)) for name in sorted(names))
 
 
 def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names, part: float) -> Terms:

@@ -22,7 +22,7 @@ def grown(exact: Exact) -> Refit:
         return exact.best
     scores = exact.scores_about(none.joint)
     names = [name for name in exact.catalogue.names if name not in none.names]
-    alone = [exact.fit(scores, none.names | {name}) for name in names]
+    alone = exact.fit_all(scores, [none.names | {name} for name in names])
     begun = [one for one in alone if one is not None and exact.can_be(one)]
     for one in sorted(begun, key=lambda one: -one.score)[:_FROM]:
         _grow(exact, one)
@@ -36,7 +36,7 @@ def _grow(exact: Exact, here: Refit) -> None:
         scores = exact.scores_about(here.joint)
         larger = [here.names | {name} for name in exact.catalogue.names if name not in here.names]
         tried = sorted(larger, key=lambda names: (-scores.score(names), sorted(names)))[:_TRIED]
-        fits = [fit for fit in (exact.fit(scores, names) for names in tried) if fit is not None]
+        fits = [fit for fit in exact.fit_all(scores, tried) if fit is not None]
         top = max(filter(exact.can_be, fits), key=lambda fit: fit.score, default=here)
         gain = top.score - here.score
         if gain < _LEAST or top.score + gain * (left - 1) < exact.best.score:

@@ -187,10 +187,9 @@ def _searched(exact: Exact, scores: Scores, begin: Names, most: int) -> Refit:
 def _thinned(exact: Exact, scores: Scores, best: Refit) -> Refit:
     """The best set after dropping members, by exact fits, as long as that improves it."""
     while len(own := best.names - scores.always) <= _THINNED:
-        for name in sorted(own):
-            if does_nothing(exact.setting, best, name):
-                # without it its values still serve; a fit from another start may miss them
-                exact.take(scores, Terms(t for t in best.joint.terms if t.name != name))
+        idle = [name for name in sorted(own) if does_nothing(exact.setting, best, name)]
+        # without one of these its values still serve; a fit from another start may miss them
+        exact.take(scores, *(best.joint.terms.only(best.names - {name}) for name in idle))
         better = exact.best_of(scores, [best.names - {name} for name in sorted(own)])
         if better.names == best.names:
             break
@@ -254,7 +253,6 @@ def about_given(
 def _from_values_of(exact: Exact, scores: Scores, best: Refit, part: Refit) -> Refit:
     """The best set, fitted also from the values that its members have in a part of it."""
     own = {term.name: term for term in part.joint.terms}
-    exact.report(" + ".join(sorted(best.names)))
     exact.take(scores, Terms(own.get(term.name, term) for term in best.joint.terms))
     return exact.fitted[best.names] or best
 
@@ -268,11 +266,10 @@ def looked_about(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Ref
     member would seem sure.
     """
     while True:
-        for names in _beside(exact, scores, best.names)[:_BESIDE]:
-            exact.fit(scores, names)
-            _begin_at(exact, scores, best, names)
-        for names in _beside_equals(exact, scores, best):
-            exact.fit(scores, names)
+        beside = _beside(exact, scores, best.names)[:_BESIDE]
+        exact.fit_all(scores, beside)
+        _begin_at(exact, scores, best, beside)
+        exact.fit_all(scores, _beside_equals(exact, scores, best))
         better = exact.best_of(scores, containing(exact, exact.best))
         if better.names == best.names:
             return scores, best
@@ -308,15 +305,19 @@ def _beside_equals(exact: Exact, scores: Scores, best: Refit) -> list[Names]:
     return sorted(new, key=lambda names: (-scores.score(names), sorted(names)))[:_BESIDE]
 
 
-def _begin_at(exact: Exact, scores: Scores, best: Refit, names: Names) -> None:
-    """Fit a part of the best set from its values, if far more is promised there than was found.
+def _begin_at(exact: Exact, scores: Scores, best: Refit, some: Iterable[Names]) -> None:
+    """Fit parts of the best set from its values, if far more is promised there than was found.
 
     With the shapes that its members have there (a reference temperature, a time) it may explain as
     much; a fit from other shapes misses that.
     """
-    own = exact.fitted[names]
-    if names < best.names and (own is None or own.score < scores.score(names) - LOCAL_MINIMUM):
-        exact.take(scores, Terms(t for t in best.joint.terms if t.name in names))
+
+    def promises(names: Names) -> bool:
+        own = exact.fitted[names]
+        return own is None or own.score < scores.score(names) - LOCAL_MINIMUM
+
+    parts = [names for names in some if names < best.names and promises(names)]
+    exact.take(scores, *(best.joint.terms.only(names) for names in parts))
 
 
 def containing(exact: Exact, best: Refit) -> list[Names]:
@@ -368,7 +369,6 @@ def _exchanged(
     if rest is None:
         return
     least = max(best.score - rest.score - LOCAL_MINIMUM, 0.0)
-    for one in promising_beside(exact.setting, rest.joint, absent):
-        if one.gain > least:
-            exact.report(" + ".join(sorted(rest.names | {one.term.name})))
-            exact.take(scores, Terms([*rest.joint.terms, inside(one.term)]))
+    looked = promising_beside(exact.setting, rest.joint, absent)
+    more = [inside(one.term) for one in looked if one.gain > least]
+    exact.take(scores, *(Terms([*rest.joint.terms, term]) for term in more))

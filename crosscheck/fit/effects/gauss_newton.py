@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -173,8 +173,8 @@ def fit(
     at_bound = ((found.vector <= found.lower) | (found.vector >= found.upper)) & ~fixed
     return Fit(
         state,
-        lambda: descent.jacobian(state) if end.jacobian is None else end.jacobian,
-        lambda rates: _spread(rates, found, descent.free & ~at_bound),
+        partial(_derived, descent, end),
+        partial(_spread, found, descent.free & ~at_bound),
         at_bound,
         FitStatus.SOLVED,
         end.count,
@@ -182,7 +182,11 @@ def fit(
     )
 
 
-def _spread(jacobian: Array, found: Terms, moved: NDArray[np.bool_]) -> Array:
+def _derived(descent: _Descent, end: _End) -> Array:
+    return descent.jacobian(end.state) if end.jacobian is None else end.jacobian
+
+
+def _spread(found: Terms, moved: NDArray[np.bool_], jacobian: Array) -> Array:
     """Covariance (p, p) of the values, given readings and independent measurements; 0 if fixed."""
     whole = np.concatenate([jacobian, known_readings(found)[0]])
     covariance = _covariance(whole, found.scale, moved)
@@ -199,12 +203,16 @@ def not_fitted(state: State, status: FitStatus, variance: float) -> Fit:
     p = len(state.terms)
     return Fit(
         state,
-        lambda: np.zeros((len(state.white), p)),
-        lambda _nothing: np.full((p, p), variance),
+        partial(np.zeros, (len(state.white), p)),
+        partial(_alike, np.full((p, p), variance)),
         np.zeros(p, dtype=bool),
         status,
         0,
     )
+
+
+def _alike(covariance: Array, _jacobian: Array) -> Array:
+    return covariance
 
 
 def _corrected(jacobian: Array, before: State, after: State) -> Array:

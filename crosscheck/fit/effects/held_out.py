@@ -13,6 +13,7 @@ from crosscheck.fit.effects.gauss_newton import Fit, fit
 from crosscheck.fit.least_squares.problem import Problem, rms_by_kind
 from seecr.counted import counted
 from seecr.pose import Array
+from seecr.processes import Shared, shared_out
 
 # Data with fewer runs than this are cut into blocks of time instead.
 _LEAST_RUNS = 3
@@ -114,17 +115,25 @@ def hold_out(problem: Problem, best: Fit, factor: Array, fit: Callable[..., Fit]
     chi2, readings = np.zeros(len(blocks)), np.zeros(len(blocks))
     values = np.zeros((len(blocks), len(best.terms)))
     valid = best.valid
-    for fold in folds_of(len(blocks)):
+
+    def without(fold: range) -> tuple[Array, Array, list[Array], bool]:
+        """The held-out rows' residuals, the values, the blocks' whitened ones, whether solved."""
         out = np.any([blocks[b] for b in fold], axis=0)
         rest = fit(
             problem.only(~out), best.terms, factor, best.state,
             iterations=_ITERATIONS, quick=True,
         )  # fmt: skip
-        valid = valid and rest.valid and bool(np.all(rest.state.prediction.solved[out]))
-        raw[out], values[fold] = rest.state.raw[out], rest.terms.vector
-        for b in fold:
-            white = rest.state.table[blocks[b][:, None] & problem.counted]
-            chi2[b], readings[b] = float(white @ white), len(white)
+        white = [rest.state.table[blocks[b][:, None] & problem.counted] for b in fold]
+        solved = rest.valid and bool(np.all(rest.state.prediction.solved[out]))
+        return rest.state.raw[out], rest.terms.vector, white, solved
+
+    folds = folds_of(len(blocks))
+    for fold, found in zip(folds, shared_out(without, folds, Shared), strict=True):
+        out = np.any([blocks[b] for b in fold], axis=0)
+        raw[out], values[fold], white, solved = found
+        valid = valid and solved
+        for b, one in zip(fold, white, strict=True):
+            chi2[b], readings[b] = float(one @ one), len(one)
     return HeldOut(raw, chi2, readings, values, rms_by_kind(problem, raw), valid)
 
 

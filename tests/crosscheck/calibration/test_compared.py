@@ -43,7 +43,7 @@ def test_what_fewer_effects_explain_all_are_fitted_from(monkeypatch: pytest.Monk
     starts: list[Terms | None] = []
 
     def fit_badly_at_first(*given: Any) -> Calibration:
-        starts.append(given[-1])
+        starts.append(given[3])
         whole = fit_all_effects(*given)
         return stuck(whole) if len(starts) == 1 else whole
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
@@ -12,6 +14,7 @@ import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
 from crosscheck.calibration import compared, search
+from crosscheck.calibration.joint_fit.beginning import Beginning
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting
 from crosscheck.calibration.judgement.verdict import Judgement, SignsOfUnknown, judge
 from crosscheck.calibration.search import SetSearch, nothing_by_themselves, search_sets
@@ -22,6 +25,7 @@ from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.fit.preparation.prepare import prepare
 from crosscheck.fit.reasons import DiagnosisVerdict, Why
 from crosscheck.given import considered
+from seecr import processes
 from seecr.description.mjcf import load_robot
 from seecr.effects import Term, Terms, layout_of
 from seecr.effects.actuation import DrumGain
@@ -37,6 +41,9 @@ FEW = (
 )  # fmt: skip
 
 
+PULLEYS = term(ROBOT, "pulley_radius", radius_m=0.006)
+
+
 def sought(terms: list[Term]) -> SetSearch:
     data = measured(ROBOT, terms, points=10)
     ready = prepare(ROBOT, data, Terms(), considered(FEW))
@@ -46,7 +53,7 @@ def sought(terms: list[Term]) -> SetSearch:
 
 @cache
 def with_pulleys() -> SetSearch:
-    return sought([term(ROBOT, "pulley_radius", radius_m=0.006)])
+    return sought([PULLEYS])
 
 
 def test_where_nothing_is_missing_nothing_is_named() -> None:
@@ -55,6 +62,34 @@ def test_where_nothing_is_missing_nothing_is_named() -> None:
     assert found.judgement.sure == ()
     assert found.found.best.names == frozenset()
     assert found.field_odds < 0.0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux")
+def test_several_processes_find_the_same_with_what_all_share(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """To the last bit, and each fit is one of the commands that were there, not of a copy."""
+    alone = with_pulleys().found
+    forked = list[int]()
+
+    def counted(job: Callable[[], bytes]) -> tuple[int, int]:
+        forked.append(1)
+        return fork(job)
+
+    fork = processes._forked
+    monkeypatch.setattr(processes, "_forked", counted)
+    monkeypatch.setenv(processes.MOST, "3")
+    ready = prepare(ROBOT, measured(ROBOT, [PULLEYS], points=10), Terms(), considered(FEW))
+    with Beginning(ready.problem, Terms()) as beginning:
+        several = search_sets(ready.problem, SIGMA, beginning=beginning).found
+    assert len(forked) >= 3
+    assert {names: r.score for names, r in several.refits.items()} == {
+        names: r.score for names, r in alone.refits.items()
+    }
+    assert list(several.refits) == list(alone.refits)
+    for names, refit in several.refits.items():
+        assert np.array_equal(refit.joint.z, alone.refits[names].joint.z)
+        assert refit.joint.state.experiment is ready.problem.experiment
 
 
 def test_two_effects_are_named_and_a_field_makes_the_verdict_unknown() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -204,6 +205,7 @@ def test_the_steps_vouch_for_what_sets_leave_beside_something_unknown(
     steps = SimpleNamespace(last=noisy, steps=())
     data = SimpleNamespace(data=SimpleNamespace(sigma=None))
     ready: Any = SimpleNamespace(problem=data, terms=None)
+    monkeypatch.setattr(verdict, "Beginning", lambda *_: nullcontext())
     monkeypatch.setattr(verdict, "by_steps", lambda *_: (steps, ()))
     monkeypatch.setattr(verdict, "pairs_instead", lambda _steps: [])
     monkeypatch.setattr(verdict, "search_sets", lambda *_: sought)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -51,10 +51,10 @@ class Linear(Exact):
     def size(self, name: str) -> int:
         return 2 if name in self.longer else 1
 
-    def fit(self, scores: Scores, names: Names) -> Refit | None:
+    def fit_all(self, scores: Scores, some: Iterable[Names]) -> list[Refit | None]:
         del scores
-        refit = Refit(names, NO_FIT, {}, self.scores.score(names))
-        return self.fitted.setdefault(names, refit)
+        fits = [Refit(names, NO_FIT, {}, self.scores.score(names)) for names in some]
+        return [self.fitted.setdefault(refit.names, refit) for refit in fits]
 
     def scores_about(self, joint: Any) -> Scores:
         del joint
@@ -137,7 +137,7 @@ def test_an_equal_may_cost_what_its_further_parameter_does() -> None:
 
 def test_large_sets_are_not_challenged(monkeypatch: pytest.MonkeyPatch) -> None:
     exact, best = compared(gram(dict.fromkeys("abef", 2.0)), frozenset("abef"))
-    monkeypatch.setattr(exact, "fit", pytest.fail)
+    monkeypatch.setattr(exact, "fit_all", pytest.fail)
     challenge(exact, exact.scores, best)
 
 
@@ -194,9 +194,10 @@ def test_a_part_of_the_best_set_begins_at_its_values_if_far_more_is_promised(
     exact.fitted[whole] = Refit(whole, joint, {}, exact.scores.score(whole))
     exact.fitted[part] = Refit(part, NO_FIT, {}, promised - lost)
 
-    def take(_scores: Scores, start: Terms) -> None:
-        begun.append([term.name for term in start])
-        exact.fitted[part] = found
+    def take(_scores: Scores, *starts: Terms) -> None:
+        for start in starts:
+            begun.append([term.name for term in start])
+            exact.fitted[part] = found
 
     monkeypatch.setattr(exact, "take", take)
     monkeypatch.setattr(refits, "containing", lambda _exact, _best: [])
@@ -251,17 +252,17 @@ def test_what_is_left_without_such_a_member_starts_where_it_is(
 ) -> None:
     """The set without it had ended in a hollow, so that any third effect seemed to be needed."""
     exact = Linear(gram({"a": 2.0}))
-    names = [SimpleNamespace(name="a"), SimpleNamespace(name="e")]
-    best = Refit(frozenset("ae"), SimpleNamespace(terms=names), {}, 0.0)  # type: ignore[arg-type]
+    joint: Any = SimpleNamespace(terms=SimpleNamespace(only=frozenset))
+    best = Refit(frozenset("ae"), joint, {}, 0.0)
     exact.fitted |= {best.names: best, frozenset("a"): Refit(frozenset("a"), NO_FIT, {}, -30.0)}
     taken: list[Names] = []
 
-    def take(_scores: Scores, start: Any) -> None:
-        taken.append(frozenset(one.name for one in start))
-        exact.fitted[taken[-1]] = Refit(taken[-1], NO_FIT, {}, 2.0)
+    def take(_scores: Scores, *starts: Names) -> None:
+        for start in starts:
+            taken.append(start)
+            exact.fitted[start] = Refit(start, NO_FIT, {}, 2.0)
 
     monkeypatch.setattr(exact, "take", take)
-    monkeypatch.setattr(refits, "Terms", list)
     monkeypatch.setattr(
         refits, "does_nothing", lambda _setting, found, name: found is best and name == "e"
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from types import SimpleNamespace
 from typing import Any
 
@@ -31,6 +32,9 @@ class Toy:
         score = self.table.get(names, self.nothing)
         self.fitted[names] = SimpleNamespace(names=names, score=score, joint=names)
         return self.fitted[names]
+
+    def fit_all(self, scores: object, some: Iterable[Names]) -> list[Any]:
+        return [self.fit(scores, names) for names in some]
 
     def scores_about(self, joint: object) -> Any:
         self.about.append(joint)
