@@ -376,10 +376,13 @@ def test_a_run_that_is_ended_leaves_nothing_unfinished(tmp_path: Path) -> None:
     words = ["crosscheck", "run", "--case", "parallel-vectran-z0.10", "--jobs", "1"]
     called = f"import sys; sys.argv = {[*words, '--out', str(out)]!r}"
     code = f"{called}; from crosscheck.cli import main; main()"
-    with subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE) as run:
+    # it was aborted once, in a thousand: where, it is to say itself
+    told = [sys.executable, "-X", "faulthandler", "-c", code]
+    with subprocess.Popen(told, stderr=subprocess.PIPE, text=True) as run:
         while not list(tmp_path.glob("results/.unfinished-*")):
             assert run.poll() is None
             time.sleep(0.01)
         run.terminate()
-        assert run.wait() == 143
+        _out, said = run.communicate()
+    assert run.returncode == 143, said
     assert not list(tmp_path.rglob("*.unfinished*")) and not list(tmp_path.rglob(".*"))
