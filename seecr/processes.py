@@ -209,7 +209,8 @@ def _forked(job: Callable[[], bytes]) -> tuple[int, int]:
         return process, sent
     status = 1
     try:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+            signal.signal(signal.SIGINT, signal.SIG_DFL)  # nor is a traceback printed twice
         _is_forked = True
         gc.freeze()
         with open(sent, "wb", closefd=False) as stream:

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -251,6 +252,29 @@ def test_one_that_is_not_wanted_any_more_is_ended() -> None:
     with Job(lambda: time.sleep(60.0), shared()) as job:
         assert job.is_running
     assert not job.is_running and time.monotonic() - began < 30.0
+    assert is_alone()
+
+
+@pytest.mark.parametrize("own", [signal.SIG_IGN, signal.default_int_handler])
+def test_an_interrupt_ends_it_in_silence_unless_interrupts_are_ignored(own: Any) -> None:
+    before = signal.signal(signal.SIGINT, own)
+    try:
+        there = Job(lambda: signal.getsignal(signal.SIGINT), shared()).result()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert there is (own if own is signal.SIG_IGN else signal.SIG_DFL)
+
+
+def test_an_interrupt_here_leaves_no_process() -> None:
+    me = os.getpid()
+
+    def run(value: float) -> Fit:
+        if os.getpid() == me:
+            raise KeyboardInterrupt
+        return fit_of(value)
+
+    with pytest.raises(KeyboardInterrupt):
+        shared_out(run, range(400), shared)
     assert is_alone()
 
 
