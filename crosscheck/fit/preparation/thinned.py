@@ -28,6 +28,8 @@ MOST = 1500
 
 # A cable reverses where its length goes back by this part of its range.
 _TURN = 1e-3
+# Of more runs than this, those that are left are as good as all.
+_MANY_RUNS = 100
 # Rows with more than so many times the median error are left out of the stated rms.
 _FAR = 10.0
 
@@ -93,8 +95,10 @@ def thinned(robot: Robot, data: Measurements, most: int = MOST) -> Thinned:
         size = np.bincount(data.run_index)[data.run_index]
         kept = place < -(-size // every)
         what = "the first of each run, because the poses are in no order"
-    # each run keeps a row at least: of thousands of short runs some are left out whole
-    apart = -(-int(kept.sum()) // (2 * most))
+    # each run keeps a row at least: of many short runs some are left out whole
+    runs = len(np.unique(data.run_index))
+    limit = most if runs > _MANY_RUNS else 2 * most
+    apart = -(-int(kept.sum()) // limit)
     if apart > 1:
         kept &= data.run_index % apart == 0
         what += f", of one run in {apart}"
