@@ -30,6 +30,8 @@ MOST = 1500
 _TURN = 1e-3
 # Of more runs than this, those that are left are as good as all.
 _MANY_RUNS = 100
+# Runs are taken by multiples of this: of those that alternate (to and fro) some of each kind.
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 # Rows with more than so many times the median error are left out of the stated rms.
 _FAR = 10.0
 
@@ -100,7 +102,7 @@ def thinned(robot: Robot, data: Measurements, most: int = MOST) -> Thinned:
     limit = most if runs > _MANY_RUNS else 2 * most
     apart = -(-int(kept.sum()) // limit)
     if apart > 1:
-        kept &= data.run_index % apart == 0
+        kept &= _GOLDEN * data.run_index % 1.0 < 1.0 / apart
         what += f", of one run in {apart}"
     note = (
         f"the search uses {counted(int((kept & read).sum()), 'row')} of {int(read.sum())}: "

@@ -90,6 +90,19 @@ def test_of_many_short_runs_some_are_left_out_whole() -> None:
     assert found.others.sum() + found.data.n_rows == ROWS
 
 
+@pytest.mark.parametrize("most", [100, 150, 300])
+def test_of_runs_that_alternate_some_of_each_kind_are_taken(most: int) -> None:
+    """Each place was gone to from two sides; every second run came from one of them."""
+    data = stream()
+    to_and_fro = replace(data, run=np.char.add("run ", (np.arange(ROWS) // 2).astype(str)))
+    found = thinned(ROBOT, to_and_fro, most)
+    taken = np.char.replace(np.unique(found.data.run), "run ", "").astype(int)
+    assert most / 2 < len(found.data.run) < 1.1 * most
+    for period in (2, 3, 4, 6):
+        counts = np.bincount(taken % period, minlength=period)
+        assert counts.min() > 0.7 * counts.mean(), period
+
+
 def test_of_fewer_runs_all_are_kept_though_more_rows_are_left() -> None:
     """Half of 760 runs tell as much as all, in half of the time; of forty each may be a place."""
     data = stream()
