@@ -2,7 +2,8 @@
 
 A process is forked: it begins with all that this one has, and only its results are sent back.
 Where processes cannot be forked safely (anywhere but on Linux), or there is one processor, all is
-done in this process, with the same results.
+done in this process, with the same results. The suite's cases are sent to processes instead, by
+:mod:`crosscheck.suite.pool`, which works everywhere; what a fit begins with is too much to send.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from io import BytesIO
 from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any, ClassVar, Generic, TypeVar, cast
 
+from seecr.errors import InputError
 from seecr.threads import processors, undivided
 
 __all__ = [
@@ -188,9 +190,17 @@ def _free() -> int:
     """How many more processes may run."""
     if not hasattr(os, "memfd_create") or _is_forked:  # which is there on Linux alone
         return 0
-    asked = os.environ.get(MOST, "")
-    most = int(asked) if asked.isdecimal() else processors()
-    return most - 1 - sum(job.is_running for job in tuple(Job.running))
+    return _most() - 1 - sum(job.is_running for job in tuple(Job.running))
+
+
+def _most() -> int:
+    """How many processes there may be, this one included."""
+    asked = os.environ.get(MOST, "").strip()
+    if not asked:
+        return processors()
+    if not asked.isdecimal() or int(asked) < 1:
+        raise InputError(f"{MOST}: expected a whole number of processes from 1 on, got {asked!r}")
+    return int(asked)
 
 
 def _forked(job: Callable[[], bytes]) -> tuple[int, int]:

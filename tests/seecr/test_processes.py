@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from seecr import processes, threads
+from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.processes import MOST, Job, Shared, shared_out
 
@@ -101,11 +102,18 @@ def test_a_thing_made_there_is_sent_with_what_it_has_of_its_own() -> None:
     assert found.robot.name == "two" and found.robot.points is ROBOT.points
 
 
-@pytest.mark.parametrize("most", ["1", "0"])
-def test_one_process_does_all_where_no_more_are_wanted(
-    most: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("most", ["0", "-1", "two", "1.5"])
+def test_a_wrong_number_of_processes_is_refused(most: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(MOST, most)
+    with pytest.raises(InputError) as refused:
+        shared_out(fit_of, range(3), shared)
+    assert str(refused.value) == (
+        f"SEECR_PROCESSES: expected a whole number of processes from 1 on, got {most!r}"
+    )
+
+
+def test_one_process_does_all_where_no_more_are_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(MOST, "1")
     begun: list[int] = []
     found = shared_out(fit_of, range(3), shared, begun.append)
     assert {fit.process for fit in found} == {os.getpid()} and begun == [0, 1, 2]

@@ -20,7 +20,7 @@ class Beginning:
     """The beginning of the fit of all effects, computed once; a context manager that ends it."""
 
     def __init__(self, problem: Problem, terms: Terms) -> None:
-        """Compute nothing yet.
+        """Fit nothing yet.
 
         Args:
             problem: readings, from :func:`crosscheck.fit.preparation.prepare.prepare`.
