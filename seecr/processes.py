@@ -35,6 +35,8 @@ R = TypeVar("R")
 
 # The environment variable that says how many processes there may be at most.
 MOST = "SEECR_PROCESSES"
+# Most processes if nobody says: to fork one takes 10 ms, and there are seldom more items than 24.
+_WORTH = 8
 # A process that is so much slower than this one may hang: its job is done here.
 _SECONDS, _TIMES = 60.0, 10.0
 # A pipe holds so many numbers whatever the system.
@@ -197,7 +199,7 @@ def _most() -> int:
     """How many processes there may be, this one included."""
     asked = os.environ.get(MOST, "").strip()
     if not asked:
-        return processors()
+        return min(processors(), _WORTH)
     if not asked.isdecimal() or int(asked) < 1:
         raise InputError(f"{MOST}: expected a whole number of processes from 1 on, got {asked!r}")
     return int(asked)
@@ -236,7 +238,7 @@ def shared_out(
     shared: Callable[[], Shared],
     begun: Callable[[T], None] = lambda _item: None,
 ) -> list[R]:
-    """Call a function with each item, in as many processes as there are processors.
+    """Call a function with each item, in as many processes as there are processors, up to eight.
 
     Each process takes the next item that is left.
 

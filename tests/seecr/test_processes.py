@@ -132,8 +132,9 @@ def test_there_are_no_more_processes_than_processors_whatever_runs(
     nested = shared_out(lambda _k: (os.getpid(), processes._free()), range(40), shared)
     assert all(free == 0 for process, free in nested if process != os.getpid())
     monkeypatch.delenv(MOST)
-    monkeypatch.setattr(processes, "processors", lambda: 1)
-    assert processes._free() == 0
+    for own, free in ((1, 0), (4, 3), (64, 7)):
+        monkeypatch.setattr(processes, "processors", lambda own=own: own)
+        assert processes._free() == free
 
 
 def test_one_that_is_done_makes_room_for_others() -> None:
