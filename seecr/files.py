@@ -12,6 +12,7 @@ import json
 import math
 import os
 import re
+import secrets
 import shutil
 import tempfile
 import tomllib
@@ -271,18 +272,16 @@ def staged(
     out, sometimes, read = Path(out), {*sometimes}, [*read]
     for name in sorted(sometimes):
         _check_not_read(out / name, read, option)
-    made = _missing(out)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        folder = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=out))
-    except OSError as error:
-        _remove_empty(made)
-        raise InputError(
-            f"{option} {out}: cannot write there: {reason_of(error)}; expected a folder that can "
-            "be made or written to"
-        ) from None
-    done = False
-    try:
+    made, folder, done = _missing(out), out / f".unfinished-{secrets.token_hex(4)}", False
+    try:  # from before the folder is made: whoever ends the program then leaves nothing either
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(mode=0o700)
+        except OSError as error:
+            raise InputError(
+                f"{option} {out}: cannot write there: {reason_of(error)}; expected a folder that "
+                "can be made or written to"
+            ) from None
         yield folder
         written_now = sorted(folder.iterdir())
         for file in written_now:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -182,3 +183,21 @@ def test_what_was_read_is_not_removed(tmp_path: Path) -> None:
 def test_commands_are_read_with_the_toml_beside_them() -> None:
     assert with_toml(None) == []
     assert with_toml(Path("a/poses.csv")) == [Path("a/poses.csv"), Path("a/poses.toml")]
+
+
+@pytest.mark.parametrize("made", ["results", ".unfinished"])
+def test_whoever_ends_the_program_as_a_folder_is_made_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, made: str
+) -> None:
+    """A signal came between the making of the folder and what removes it, once in many runs."""
+    make = os.mkdir
+
+    def ended(path: str, mode: int = 0o777) -> None:
+        make(path, mode)
+        if Path(path).name.startswith(made):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "mkdir", ended)
+    with pytest.raises(KeyboardInterrupt), staged(tmp_path / "results"):
+        pytest.fail("nothing is written")
+    assert list(tmp_path.iterdir()) == []
