@@ -100,11 +100,12 @@ def _catenary_change(row, up, unknown, work, force):
 
 
 @jit_inner
-def _change(row, start, move, up, guess, space):
-    """dT/dl0 [N/m] of any cable; fills space[4], derivative [N/m] of its force, over ``move``."""
-    force, stiffness, gradient, state, work = space[6:11]
-    if not cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
-        return math.nan
+def change_by_rest(row, up, guess, space):
+    """dT/dl0 [N/m] of any cable, with what :func:`cable_pull` left in ``guess`` and scratch.
+
+    Fills space[4], the cable's move, with the derivative [N/m] of its force.
+    """
+    move, gradient, state, work = space[4], space[8], space[9], space[10]
     yields = row[LIFT] != 0.0
     column, share, turned = work[33], 0.0, 0.0
     if yields:
@@ -139,6 +140,7 @@ def pull_and_change(
     n, m = cables.shape[:2]
     space, per, total = make_change_space(screws.shape[1]), 1.0 / length, np.empty(6)
     place, start, move, one = space[0], space[3], space[4], space[11]
+    force, stiffness, slope, state, work = space[6:11]
     for r in range(n):
         pose, up = poses[r], load[r, UP:]
         place_platform(screws[r], values[r], length, pose, deviation[r], space)
@@ -148,10 +150,12 @@ def pull_and_change(
             a, b, c, dx, dy, dz = moved_arm(row[ANCHOR : ANCHOR + 3], pose, place)
             start[0], start[1], start[2] = pose[0] + a, pose[1] + b, pose[2] + c
             move[0], move[1], move[2] = place[0] + dx, place[1] + dy, place[2] + dz
-            tension[r, i] = _change(row, start, move, up, guess[r, i], space)
-            force, pulls[r, i] = space[6], space[9][TENSION]
-            if math.isnan(tension[r, i]):
-                move[0] = force[0] = math.nan
+            own = guess[r, i]
+            if cable_pull(row, start, move, up, own, work, force, stiffness, slope, state):
+                tension[r, i] = change_by_rest(row, up, own, space)
+                pulls[r, i] = state[TENSION]
+            else:
+                tension[r, i] = pulls[r, i] = move[0] = force[0] = math.nan
             take_force(a + dx, b + dy, c + dz, force[0], force[1], force[2], per, total)
             one[:] = 0.0
             take_force(a + dx, b + dy, c + dz, move[0], move[1], move[2], per, one)

@@ -16,12 +16,20 @@ from typing import Any
 
 import numpy as np
 
-from seecr.compiled.columns import REST, STRAIN
+from seecr.compiled.columns import STRAIN
 from seecr.description.joints import motion_columns
 from seecr.effects.base import Effect, Readings
 from seecr.effects.checked import is_built_in
 from seecr.effects.terms import Terms
-from seecr.pose import Array, pose_add, quat_conjugate, quat_multiply, rotvec_from_quat
+from seecr.pose import (
+    Array,
+    pose_add,
+    quat_conjugate,
+    quat_multiply,
+    quat_rotate,
+    rotvec_from_quat,
+)
+from seecr.prediction.ends import CableRates, are_by_point, wrench_by_ends, wrench_by_rest
 from seecr.prediction.experiment import Experiment, Prediction, read, senses
 from seecr.prediction.shifts import OF_SHAPE, Shift, Sides, blocks_of_cables, positions, shifted
 from seecr.statics import batch
@@ -90,13 +98,14 @@ def length_sensitivities(at: Prediction) -> Array:
 
 
 def _by_length(at: Prediction) -> Array:
-    """With steps to the one side on which a cable that is just taut, or slack, remains so."""
-    step = 1e-6 * at.tables.length
-    longer_by = at.found.states[..., STRAIN] * at.tables.cables[..., REST]
-    ahead = np.where((longer_by > 0.0) & (longer_by < step), 0.0, step)
-    behind = np.where((longer_by < 0.0) & (longer_by > -step), 0.0, step)
-    plus, minus = at.tables.lengthened(ahead), at.tables.lengthened(-behind)
-    return _response_by_cable(at, plus, minus, (ahead + behind)[:, None])
+    rates = cable_rates(at)
+    return _response_to_wrench(at, wrench_by_rest(rates), rates.tension_by_rest)
+
+
+def cable_rates(at: Prediction) -> CableRates:
+    """What each cable pulls with at a prediction, and how that changes."""
+    made = _kept(at, "cable_rates", lambda at: batch.rates_of_cables(at.tables, at.found))
+    return CableRates(made)
 
 
 def read_by_length(at: Prediction) -> Array:
@@ -213,9 +222,20 @@ class _ByWrench:
             return None
         if sides.of_lengths:
             change = self.by_length * sides.longer(shift.apart)[:, None, :]
+        elif sides.of_ends and are_by_point(self.at.tables):
+            change = self._by_ends(sides, shift.apart[:, None])
         else:
             change = _response_by_cable(self.at, *self._tables(sides), shift.apart)
         return np.asarray(self.read_rates @ change if self.sensing else change)
+
+    def _by_ends(self, sides: Sides, apart: Array) -> Array:
+        """Derivatives (n, 6 + m, m) by where each cable begins or ends, ``apart`` (m, 1)."""
+        exits = (sides.plus.exit_points - sides.minus.exit_points) / apart
+        anchors = (sides.plus.anchor_points - sides.minus.anchor_points) / apart
+        moved = quat_rotate(self.at.pose[:, None, 3:], anchors)
+        longer = sides.longer(apart[:, 0])
+        wrench, own = wrench_by_ends(cable_rates(self.at), exits, moved, longer)
+        return _response_to_wrench(self.at, wrench, own)
 
     def _sides(self, shift: Shift) -> Sides:
         plus = self.experiment.setup(shift.plus.effects)
@@ -265,6 +285,23 @@ def _response_by_cable(at: Prediction, plus: Tables, minus: Tables, apart: Any) 
     out = np.concatenate([_moved(at, step), at.found.slopes @ step], axis=1)
     cable = np.arange(own.shape[1])
     out[:, 6 + cable, cable] += own / (apart[:, 0] if np.ndim(apart) == 3 else apart)
+    return out
+
+
+def _response_to_wrench(at: Prediction, wrench: Array, own: Array) -> Array:
+    """Change of pose and tensions (n, 6 + m, m) with cables that pull otherwise.
+
+    Args:
+        wrench: (n, 6, m) change of the wrench [N, N m] by each cable.
+        own: (n, m) change of its own tension while the platform is held.
+    """
+    motion = motion_of(at)
+    free = at.tables.screws.shape[1] == 0
+    along = np.diagonal(motion[0])[:, None] * wrench if free else motion.swapaxes(1, 2) @ wrench
+    step = _kept(at, "inverse", _inverse_stiffness) @ along
+    out = np.concatenate([_moved(at, step), at.found.slopes @ step], axis=1)
+    cable = np.arange(own.shape[1])
+    out[:, 6 + cable, cable] += own
     return out
 
 

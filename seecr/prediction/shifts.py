@@ -21,6 +21,8 @@ _CENTRAL, _ONE_SIDED = 1e-4, 1e-5
 
 # Quantities that affect the statics only through the rest lengths.
 _PAID_OUT = {name for name, item in QUANTITIES.items() if item.paid_out}
+# Quantities that say where cables begin and end.
+_ENDS = {"exit_points", "anchor_points"}
 # Quantities that also affect a row through the rows before it.
 _OF_HISTORY = {name for name, item in QUANTITIES.items() if item.history is not History.NONE}
 # Quantities that have no effect if no effect has a history.
@@ -68,6 +70,11 @@ class Sides:
         """Whether only the cables' lengths differ."""
         return self.differing <= _PAID_OUT and not (self.plus.laws or self.minus.laws)
 
+    @property
+    def of_ends(self) -> bool:
+        """Whether only the points differ between which cables run."""
+        return self.differing <= _ENDS and not (self.plus.laws or self.minus.laws)
+
     def longer(self, apart: Any) -> Array:
         """Rest lengths (n, m) of plus minus those of minus, per unit of ``apart``."""
         return np.asarray((self.plus.rest_lengths() - self.minus.rest_lengths()) / apart)
@@ -84,24 +91,36 @@ class Sides:
 
 def shifted(terms: Terms, term: Term, k: Any, part: float | None = None) -> Shift:
     """Shift parameter ``k`` of a term (or, with an index array, several together)."""
-    layout, value = term.layout, term.vector[k]
-    lower, upper = layout.lower[k], layout.upper[k]
-    # a time constant or radius counts by its relative change. The step is small, since a drum of
-    # this radius may have turned many times, but above the residual of a solved path
-    relative = layout.shape[k] & (lower > 0.0)
-    size = np.where(relative, value * (0.1 if part is None else 1.0), layout.scale[k])
-    step = (_CENTRAL if part is None else part) * size
-    low, high = value - step < lower, value + step > upper
-    small = (_ONE_SIDED if part is None else part) * size
-    up = np.where(low, value + small, np.where(high, value, value + step))
-    down = np.where(low, value, np.where(high, value - small, value - step))
+    up, down = (
+        _up_and_down(term, k, part)
+        if np.ndim(k) == 0
+        else np.array([_up_and_down(term, one, part) for one in k.tolist()]).T
+    )
 
-    def with_value(numbers: Array) -> Terms:
+    def with_value(numbers: Any) -> Terms:
         vector = term.vector.copy()
         vector[k] = numbers
         return terms.with_term(term.with_vector(vector))
 
-    return Shift(with_value(up), with_value(down), up - down, layout)
+    return Shift(with_value(up), with_value(down), up - down, term.layout)
+
+
+def _up_and_down(term: Term, k: int, part: float | None) -> tuple[float, float]:
+    """Values of parameter ``k`` on both sides of its own, or its own where the other is a bound."""
+    layout, value = term.layout, float(term.vector[k])
+    lower, upper = float(layout.lower[k]), float(layout.upper[k])
+    size = float(layout.scale[k])
+    # a time constant or radius counts by its relative change. The step is small, since a drum of
+    # this radius may have turned many times, but above the residual of a solved path
+    if layout.shape[k] and lower > 0.0:
+        size = value * (0.1 if part is None else 1.0)
+    step = (_CENTRAL if part is None else part) * size
+    small = (_ONE_SIDED if part is None else part) * size
+    if value - step < lower:
+        return value + small, value
+    if value + step > upper:
+        return value, value - small
+    return value + step, value - step
 
 
 def positions(terms: Terms, wanted: list[int]) -> list[tuple[Term, int]]:

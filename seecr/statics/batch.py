@@ -284,6 +284,28 @@ def change_by_cable(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array,
     return _solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, m * plus.n_dof))
 
 
+def rates_of_cables(tables: Tables, at: Evaluation) -> Array:
+    """What each cable pulls with, and how that changes: (n, m, N_RATES).
+
+    See :mod:`seecr.compiled.rates` for the columns. They are zero for rows in which a cable's
+    equations could not be solved.
+    """
+    from seecr.compiled import rates  # takes a while to import
+
+    n, m = tables.cables.shape[:2]
+    out = np.empty((n, m, rates.N_RATES))
+
+    def run(part: slice) -> None:
+        rates.rates_of_each_cable(
+            tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
+            at.deviation[part], at.values[part], tables.length, at.guess[part], out[part],
+        )  # fmt: skip
+
+    in_parts(run, n)
+    out[np.isnan(out).any(axis=(1, 2))] = 0.0
+    return out
+
+
 def pull_and_change(tables: Tables, at: Evaluation) -> tuple[Evaluation, Array, Array]:
     """Wrench and tensions at the deviations of ``at``, and derivatives by each cable's rest length.
 

@@ -112,7 +112,9 @@ def reassembled(tables: Tables, setup: Setup, names: Collection[str]) -> Tables:
     The history columns are kept, and so are the scales of a search (``scale``, ``reach``): the
     result is for differences at an equilibrium.
     """
-    cables, load = tables.cables.copy(), tables.load.copy()
+    cables, load = tables.cables, tables.load.copy()
+    if not _OF_CABLES.isdisjoint(names):
+        cables = cables.copy()
     _write(setup, names, cables, load)
     return replace(tables, cables=cables, load=load)
 
@@ -121,6 +123,7 @@ def reassembled(tables: Tables, setup: Setup, names: Collection[str]) -> Tables:
 _OF_LENGTHS = {"exit_points", "anchor_points", "pulley_radius"} | {
     name for name, item in QUANTITIES.items() if item.paid_out
 }
+_OF_CABLES = _OF_LENGTHS | {name for name, item in QUANTITIES.items() if item.column is not None}
 _OF_LOAD = {"mass", "centre_of_mass", "gravity", "pulley_radius", "lift"}
 
 
