@@ -120,6 +120,8 @@ TRADE = {
     "crosscheck.suite.write": {"RESULTS"},
     "crosscheck.twin": {"FILES"},
     "seecr.exported.export": {"wrote"},
+    # a page that is drawn while a recording is written
+    "seecr.processes": {"Job", "Shared"},
     # what results were made of
     "seecr.made": {"Made"},
     "seecr.description.fingerprint": {"fingerprint"},

@@ -90,12 +90,12 @@ figures_option = click.option(
 @contextmanager
 def figures_in(folder: Path | None) -> Iterator[None]:
     """Figures that are drawn meanwhile are kept there, if anywhere; all of them or none."""
-    from crosscheck.report import keeping
-    from seecr.files import staged
-
     if folder is None:
         yield
         return
+    from crosscheck.report import keeping
+    from seecr.files import staged
+
     with staged(folder, "--figures") as unfinished, keeping(unfinished):
         yield
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from crosscheck.cli.choices import figures_in, figures_option, sigma_option
+from crosscheck.cli.choices import figures_option, sigma_option
+from crosscheck.cli.drawn import page_beside
 from crosscheck.cli.following import Given, after_comparison
 from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
 
@@ -67,7 +68,6 @@ def command(
     Exit status: 0 all well, 1 a limit exceeded, 2 bad input, 3 rows without an equilibrium.
     """
     from crosscheck import Limits, Sigma, compare, exceeded, load_limits, load_measurements
-    from crosscheck.report import write_page
     from seecr import load_model, load_robot, with_history
     from seecr.files import json_text, staged, write_text
 
@@ -93,16 +93,13 @@ def command(
         }
         text = json_text(document)
         write_text(folder / "comparison.json", text + "\n")
-        progress("drawing the page", 0.5)
-        with figures_in(figures):
-            write_page(found, folder / "comparison.html", made)
-        progress("recording", 0.8)
-        if not no_recording:
-            # takes a second or two to import
-            from crosscheck.recording import write_comparison_recording
+        progress("drawing the page" if no_recording else "drawing the page, recording", 0.5)
+        with page_beside(found, folder / "comparison.html", made, figures):
+            if not no_recording:
+                from crosscheck.recording import write_comparison_recording
 
-            write_comparison_recording(found, folder / "comparison.rrd")
-        progress("recording", 1.0)
+                write_comparison_recording(found, folder / "comparison.rrd")
+        progress("all is written", 1.0)
     if as_json:
         click.echo(text)
         return status

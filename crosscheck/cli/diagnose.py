@@ -10,13 +10,13 @@ import click
 from crosscheck.cli.choices import (
     check_effects,
     exclude_option,
-    figures_in,
     figures_option,
     listed,
     only_option,
     sigma_option,
     tolerance_option,
 )
+from crosscheck.cli.drawn import page_beside
 from crosscheck.cli.following import Given, after_diagnosis
 from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
 
@@ -77,7 +77,6 @@ def command(
     """
     from crosscheck import DiagnosisVerdict, Sigma, Tolerance, diagnose, load_measurements
     from crosscheck.model.place import check_place
-    from crosscheck.report import write_page
     from seecr import load_model, load_robot, new_model, with_history
     from seecr.description.fingerprint import fingerprint
     from seecr.files import json_text, staged, write_text
@@ -99,12 +98,11 @@ def command(
         made = made_by(machine.source, *data, model)
         text = json_text({"made": made, "robot": fingerprint(machine), **found.as_json()})
         write_text(folder / "diagnosis.json", text + "\n")
-        with figures_in(figures):
-            write_page(found, folder / "diagnosis.html", made)
-        if not no_recording and found.search is not None:
-            from crosscheck.recording import write_diagnosis_recording
+        with page_beside(found, folder / "diagnosis.html", made, figures):
+            if not no_recording and found.search is not None:
+                from crosscheck.recording import write_diagnosis_recording
 
-            write_diagnosis_recording(found, folder / "diagnosis.rrd")
+                write_diagnosis_recording(found, folder / "diagnosis.rrd")
         note = "" if model_out is None else _keep(found, model_out)
     if as_json:
         click.echo(text)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, special
+from scipy import linalg
 
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting
 from crosscheck.calibration.linear_evidence.priors import widths_for
@@ -85,7 +85,7 @@ def promising_beside(setting: Setting, joint: JointFit, later: Sequence[Layout])
             max(beside.gain(one), beside.gain_at_its_size(one))
             for one in (Term(layout, start) for start in starts)
         ]
-        gain = float(special.logsumexp(gains) - np.log(len(gains)))
+        gain = float(np.logaddexp.reduce(gains) - np.log(len(gains)))
         term = Term(layout, starts[int(np.argmax(gains))])
         out.append(Promising(term, gain, max(gains) - gain))
     return out

@@ -19,6 +19,7 @@ from crosscheck.fit.effects.held_out import HeldOut, blocks_of, folds_of
 from crosscheck.fit.least_squares.problem import rms_by_kind
 from crosscheck.fit.least_squares.state import State
 from seecr.pose import Array
+from seecr.processes import Shared, shared_out
 
 # Steps of a refit without a block: with the derivatives of the joint fit, and with its own.
 _STEPS, _EARNEST = 6, 4
@@ -50,13 +51,19 @@ def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
     raw = np.full(problem.measured.shape, np.nan)
     chi2, readings, power = (np.zeros(len(blocks)) for _ in range(3))
     values = np.zeros((len(blocks), len(joint.z)))
-    for fold in folds_of(len(blocks)):
-        rows = np.any([blocks[b] for b in fold], axis=0)
-        mine = rows[problem.row_of]
-        absent = _padded(mine, len(linear.y))
-        state = _without(setting, joint, mine)
-        values[fold], raw[rows] = state.terms.vector, state.raw[rows]
-        left = joint.whitened(setting.chain, state.white)
+    folds = folds_of(len(blocks))
+    held_out = [np.any([blocks[b] for b in fold], axis=0) for fold in folds]
+
+    def fitted_without(rows: NDArray[np.bool_]) -> tuple[Array, Array, Array]:
+        """Values, residuals and whitened residuals of the fit without some rows."""
+        state = _without(setting, joint, rows[problem.row_of])
+        return state.terms.vector, state.raw, state.white
+
+    fits = shared_out(fitted_without, held_out, Shared)
+    for fold, rows, (vector, raw_there, white) in zip(folds, held_out, fits, strict=True):
+        values[fold], raw[rows] = vector, raw_there[rows]
+        absent = _padded(rows[problem.row_of], len(linear.y))
+        left = joint.whitened(setting.chain, white)
         straight = joint.state.white + joint.jacobian @ (fitted - values_without(linear, absent))
         expected = joint.whitened(setting.chain, straight)
         for b in fold:

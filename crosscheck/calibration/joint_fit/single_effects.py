@@ -9,6 +9,7 @@ model, one effect may explain most, and from there the joint fit finds the rest.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from crosscheck.calibration.joint_fit.joining import inside, promising_beside
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting, settle
@@ -16,6 +17,7 @@ from crosscheck.calibration.linear_evidence.priors import widths_of
 from crosscheck.fit.least_squares.state import evaluate
 from seecr.effects import Term, Terms
 from seecr.effects.base import Layout
+from seecr.processes import Shared, shared_out
 
 # Steps of each fit, and the largest part of chi2 that it may leave.
 _STEPS, _LEFT = 8, 0.5
@@ -42,7 +44,8 @@ def fitted_alone(
 
 def _best(setting: Setting, plain: JointFit, terms: Sequence[Term]) -> list[JointFit]:
     """The fits that explain much, the best first."""
-    fits = [_with(setting, plain, term) for term in terms]
+    shared = partial(Shared, setting, plain, terms)
+    fits = shared_out(partial(_with, setting, plain), terms, shared)
     most = _LEFT * plain.state.chi2
     good = [found for found in fits if found is not None and found.state.chi2 < most]
     return sorted(good, key=lambda j: j.state.chi2)

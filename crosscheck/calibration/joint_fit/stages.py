@@ -190,17 +190,26 @@ def with_rows_back(setting: Setting, joint: JointFit) -> JointFit:
     as outliers nothing pulls it back. So all rows get equal weight for a while, with noise of about
     the size of outliers. True outliers are explained no better after it.
     """
-    alike = replace(setting, weight=np.ones(len(joint.state.white)))
-    for heat in _HEATS:
-        if not np.any(outliers(setting.chain, joint.weight, setting.problem.data.n_rows)):
+    heats: Sequence[float] = _HEATS
+    while heats and np.any(outliers(setting.chain, joint.weight, setting.problem.data.n_rows)):
+        shared = partial(Shared, setting, joint)
+        others = shared_out(partial(_with_rows_alike, setting, joint), heats, shared)
+        enough = worth(setting, joint) + _SURE
+        better = (k for k, other in enumerate(others) if worth(setting, other) > enough)
+        first = next(better, None)
+        if first is None:
             break
-        hot = WHITE.hotter(heat * LARGER)
-        wide = settle(alike, joint.state, joint.width, hot, _STEPS, joint.jacobian)
-        back = settle(setting, wide.state, joint.width, joint.colour, jacobian=wide.jacobian)
-        other = with_noise(setting, back)
-        if worth(setting, other) > worth(setting, joint) + _SURE:
-            joint = other
+        joint, heats = others[first], heats[first + 1 :]
     return joint
+
+
+def _with_rows_alike(setting: Setting, joint: JointFit, heat: float) -> JointFit:
+    """The fit after a while in which all rows had equal weight, with noise so many times larger."""
+    alike = replace(setting, weight=np.ones(len(joint.state.white)))
+    hot = WHITE.hotter(heat * LARGER)
+    wide = settle(alike, joint.state, joint.width, hot, _STEPS, joint.jacobian)
+    back = settle(setting, wide.state, joint.width, joint.colour, jacobian=wide.jacobian)
+    return with_noise(setting, back)
 
 
 def noise_of(setting: Setting, joint: JointFit) -> Colour:

@@ -6,7 +6,6 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
 from crosscheck.calibration.sets.equals import EQUAL, are_equals
 from crosscheck.calibration.sets.exact import LOCAL_MINIMUM, Refit
@@ -216,7 +215,7 @@ def of_classes(
     """Posterior probabilities of effects and of given classes; ``best`` is the best set."""
     names = list(scores)
     logs = np.array([scores[n] for n in names])
-    share = np.exp(logs - special.logsumexp(logs))
+    share = np.exp(logs - np.logaddexp.reduce(logs))
 
     def chance(some: Iterable[str], least: int = 1) -> float:
         wanted = set(some)

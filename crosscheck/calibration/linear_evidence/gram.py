@@ -15,7 +15,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from crosscheck.calibration.linear_evidence.worth import ByWidth, log_positive
 from crosscheck.fit.least_squares.definite import inverse_of
@@ -161,7 +160,7 @@ class Solved:
     def gain(self, name: str) -> float:
         """The ln evidence that an effect gains beside the (other) members, averaged over widths."""
         gains = self.gains(name)
-        return float(special.logsumexp(gains) - np.log(len(gains)))
+        return float(np.logaddexp.reduce(gains) - np.log(len(gains)))
 
     def gains_of_member(self, name: str) -> Array:
         """The same of a member, less what its width costs others that cannot be negative.
@@ -238,4 +237,4 @@ def averaging(solved: Solved, name: str) -> float:
     """How much averaging over the widths of one member changes ln Z, beside the others."""
     gains = solved.gains_of_member(name)
     at = int(np.argmin(np.abs(solved.gram.groups[name].widths - solved.chosen[name])))
-    return float(special.logsumexp(gains) - np.log(len(gains)) - gains[at])
+    return float(np.logaddexp.reduce(gains) - np.log(len(gains)) - gains[at])

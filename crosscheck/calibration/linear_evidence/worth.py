@@ -104,4 +104,4 @@ def log_gain(
 ) -> float:
     """ln evidence that a group gains, averaged over its width."""
     gains = log_gains(normal, gradient, widths, one_sided)
-    return float(special.logsumexp(gains) - np.log(len(gains)))
+    return float(np.logaddexp.reduce(gains) - np.log(len(gains)))

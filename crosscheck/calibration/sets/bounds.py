@@ -10,7 +10,6 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting
 from crosscheck.calibration.joint_fit.linearised import Linear
@@ -52,7 +51,7 @@ def log_absent(
 def _gain(power: Array, along: Array, width: float | None) -> float:
     """Gain of one parameter; averaged over all widths if its effect has no free parameter."""
     every = np.array(WIDTHS if width is None else [width])
-    return float(special.logsumexp(half_gaussian(power, along, every)) - np.log(len(every)))
+    return float(np.logaddexp.reduce(half_gaussian(power, along, every)) - np.log(len(every)))
 
 
 def _each(joint: JointFit, widths: Mapping[str, float]) -> Array:

@@ -32,6 +32,7 @@ from crosscheck.fit.effects.possible import can_be
 from crosscheck.fit.least_squares.state import State, evaluate
 from seecr.effects import Term, Terms
 from seecr.pose import Array
+from seecr.prediction.parted import forget
 from seecr.processes import Shared, shared_out
 
 _STEPS = 12
@@ -251,15 +252,18 @@ class Exact:
             return refit
         # what other widths promise is far from a fit with these: it is looked for there
         wished = refit.widths | refit.wished
-        again = self._settled(scores, names, refit.joint.state, wished)
+        again = self._settled(scores, names, refit.joint.state, wished, refit.joint.jacobian)
         return max(refit, again, key=lambda one: (self.can_be(one), one.score))
 
     def _settled(
-        self, scores: Scores, names: Names, start: State, widths: dict[str, float]
-    ) -> Refit:
+        self, scores: Scores, names: Names, start: State, widths: dict[str, float],
+        jacobian: Array | None = None,
+    ) -> Refit:  # fmt: skip
         width = width_of(start.terms, widths)
-        found = settle(self.setting, start, width, self.joint.colour, _STEPS)
-        return scored(self.setting, found, names, widths, scores)
+        found = settle(self.setting, start, width, self.joint.colour, _STEPS, jacobian)
+        out = scored(self.setting, found, names, widths, scores)
+        forget(found.state.prediction)  # hundreds of sets are kept, few are looked at again
+        return out
 
 
 def _shapes(scores: Scores, names: Names) -> Shapes:

@@ -16,7 +16,6 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
-from scipy import special
 
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting, settle
 from crosscheck.calibration.joint_fit.stages import with_noise
@@ -77,7 +76,7 @@ def by_own_noise(
     best = max(worth, key=lambda out: worth[out], default=None)
     fewer = None if best is None or worth[best] <= own else fits[best]
     every = {frozenset[str](): own, **worth}
-    total = special.logsumexp(list(every.values()))
+    total = np.logaddexp.reduce(list(every.values()))
     return OwnNoise(fewer, {out: float(np.exp(e - total)) for out, e in every.items()})
 
 

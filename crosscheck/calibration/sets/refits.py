@@ -180,6 +180,11 @@ def plainer(exact: Exact, best: Refit) -> Refit:
 def _searched(exact: Exact, scores: Scores, begin: Names, most: int) -> Refit:
     """The best set that a search by linear evidence leads to, from the empty set and from this."""
     explore(scores, [scores.always, begin])
+    return _best_explored(exact, scores, most)
+
+
+def _best_explored(exact: Exact, scores: Scores, most: int) -> Refit:
+    """The best set after the best by linear evidence were fitted, and without needless members."""
     best = exact.best_of(scores, [scores.always, *scores.best(most, _WITHIN)])
     return _thinned(exact, scores, best)
 
@@ -241,13 +246,25 @@ def about_given(
         if now.score < best.score + LOCAL_MINIMUM:
             return scores, now
     near = exact.scores_about(last.joint, own_shapes=True)
-    other = _searched(exact, near, last.names, _BESIDE)
+    if not _leads_on(exact, near, last.names, best):
+        return scores, best
+    other = _best_explored(exact, near, _BESIDE)
     if other is best:
         return scores, best
     if other.names != best.names:
         near = exact.scores_about(other.joint, own_shapes=True)
         other = _searched(exact, near, other.names, _BESIDE)
     return exact.scores_about(other.joint, own_shapes=True), other
+
+
+def _leads_on(exact: Exact, near: Scores, begin: Names, best: Refit) -> bool:
+    """Whether the best set by linear evidence, from a given one on, is about as good as the best.
+
+    The next ones differ from it by a member or so: if it explains far less, so do they.
+    """
+    explore(near, [near.always, begin])
+    first = exact.fit(near, near.best(1, _WITHIN)[0])
+    return first is not None and first.score > best.score - LOCAL_MINIMUM
 
 
 def _from_values_of(exact: Exact, scores: Scores, best: Refit, part: Refit) -> Refit:

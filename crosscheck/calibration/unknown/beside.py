@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from scipy import special
@@ -23,6 +22,7 @@ from crosscheck.calibration.noise.restricted import estimate, log_evidence
 from crosscheck.calibration.unknown.field import FIELD_WIDTHS, UNKNOWN
 from crosscheck.calibration.unknown.varying import Varying, in_all_readings, varying_in_time
 from seecr.pose import Array
+from seecr.processes import Shared, shared_out
 
 # Prior standard deviation of ln(true sigma/stated sigma) if the noise was stated.
 _STATED = 0.35
@@ -77,23 +77,25 @@ class _Comparison:
 
     def of_all(self) -> UnknownOdds:
         """The odds of everything that may vary."""
-        each = {Varying.READINGS: self._odds(in_all_readings(self.setting, self.joint))}
-        for what, columns in varying_in_time(self.setting, self.joint):
-            each[what] = max(self._odds(columns), each.get(what, -np.inf))
+        some = [
+            (Varying.READINGS, in_all_readings(self.setting, self.joint)),
+            *varying_in_time(self.setting, self.joint),
+        ]
+        nothing = np.zeros((len(self.about.y), 0))
+        columns = [nothing, *(part for _what, part in some)]
+        without, *beside = shared_out(self._log_evidence, columns, Shared)
+        each = dict[Varying, float]()
+        for (what, _part), found in zip(some, beside, strict=True):
+            each[what] = max(found - without, each.get(what, -np.inf))
         share = {what: (1.0 - _SMOOTH) / (len(each) - 1) for what in each if len(each) > 1}
         share[Varying.READINGS] = _SMOOTH if len(each) > 1 else 1.0
         total = special.logsumexp(list(each.values()), b=[share[what] for what in each])
         return UnknownOdds(float(total), each)
 
-    def _odds(self, columns: Array) -> float:
-        """ln evidence with columns (N, k) minus that without, averaged over prior widths."""
-        found = self._scores(columns, FIELD_WIDTHS)
-        return float(special.logsumexp(found) - np.log(len(found))) - self._without
-
-    @cached_property
-    def _without(self) -> float:
-        """ln evidence with nothing more."""
-        return self._scores(np.zeros((len(self.about.y), 0)), (1.0,))[0]
+    def _log_evidence(self, columns: Array) -> float:
+        """ln evidence with columns (N, k), averaged over prior widths; with none there are none."""
+        found = self._scores(columns, FIELD_WIDTHS if columns.shape[1] else (1.0,))
+        return float(np.logaddexp.reduce(found) - np.log(len(found)))
 
     def _scores(self, columns: Array, some: Sequence[float]) -> list[float]:
         """ln evidence with columns (N, k) of some prior widths.

@@ -8,7 +8,7 @@ fields. The result is the size at which nine in ten fields would be called unkno
 from __future__ import annotations
 
 import numpy as np
-from scipy import linalg, special
+from scipy import linalg
 
 from crosscheck.calibration.joint_fit.joint import JointFit, Setting
 from crosscheck.calibration.linear_evidence.worth import gains_along
@@ -62,7 +62,7 @@ def _left(setting: Setting, joint: JointFit, field: Array, columns: Array, width
 def _log_odds(power: Array, along: Array) -> Array:
     """(draws,) ln evidence with a field minus that without, averaged over the field's width."""
     gains = gains_along(power, along, FIELD_WIDTHS)
-    return np.asarray(special.logsumexp(gains, axis=0) - np.log(len(gains)))
+    return np.asarray(np.logaddexp.reduce(gains, axis=0) - np.log(len(gains)))
 
 
 def _by_kind(setting: Setting, white: Array) -> Rms:

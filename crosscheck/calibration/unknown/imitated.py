@@ -29,6 +29,7 @@ from crosscheck.calibration.sets.exact import own_readings
 from crosscheck.calibration.sets.linear_search import Names, Scores
 from crosscheck.calibration.unknown.field import FIELD_WIDTHS, UNKNOWN
 from crosscheck.calibration.unknown.varying import Varying, varying
+from seecr.processes import Shared, shared_out
 
 # Fields that are worth so much less ln evidence than the best one are left out. It is large, and so
 # many are told: what is really there follows none of them exactly, and then odds tell little.
@@ -102,9 +103,10 @@ def field_in_place(
     whole = rest = sets.needed(frozenset(joint.terms.names))
     without = sets.whole(whole)
     while sets.fields and rest - scores.always:
-        tried = {name: sets.beside(rest - {name}) for name in sorted(rest - scores.always)}
-        name = max(tried, key=lambda n: tried[n][0])
-        rest, (total, seen) = rest - {name}, tried[name]
+        fewer = [rest - {name} for name in sorted(rest - scores.always)]
+        tried = shared_out(sets.beside, fewer, Shared)
+        k = max(range(len(tried)), key=lambda k: tried[k][0])
+        rest, (total, seen) = fewer[k], tried[k]
         if total - without > best.odds:
             best = Imitated(total - without, whole - rest, seen)
     if not best.chance:
@@ -186,7 +188,7 @@ class _Sets:
             # solve with the field: a member that cannot be negative may be so without it
             there = self.gram.solved({**own.chosen, name: float(width)})
             every[name] = there.log_evidence + averaging(there, name)
-        total = float(special.logsumexp(list(every.values())) - np.log(len(every)))
+        total = float(np.logaddexp.reduce(list(every.values())) - np.log(len(every)))
         return total + self._before(names), self._likely(every)
 
     def worths_beside(self, names: Names, total: float) -> dict[str, float]:
@@ -196,14 +198,16 @@ class _Sets:
             names: the subset. total: what :meth:`beside` gives for it.
         """
         own = sorted(names - self.scores.always)
-        return {name: total - self.beside(names - {name})[0] for name in own}
+        fewer = [names - {name} for name in own]
+        totals = [one for one, _seen in shared_out(self.beside, fewer, Shared)]
+        return {name: total - one for name, one in zip(own, totals, strict=True)}
 
     def _likely(self, every: Mapping[str, float]) -> tuple[Varying, ...]:
         """What is likely to vary, the likeliest first, by the ln evidence of each field."""
         by = dict[Varying, list[float]]()
         for name, part in every.items():
             by.setdefault(self.fields[name], []).append(part)
-        total = {what: float(special.logsumexp(parts)) for what, parts in by.items()}
+        total = {what: float(np.logaddexp.reduce(parts)) for what, parts in by.items()}
         order = sorted(total, key=lambda what: -total[what])[:_MOST_SEEN]
         return tuple(what for what in order if total[what] > total[order[0]] - _NEGLIGIBLE)
 

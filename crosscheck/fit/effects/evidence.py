@@ -128,13 +128,13 @@ def _averaged(
     shared = np.where(widest, WIDTHS[-1], np.array(WIDTHS)[:, None])
     logs = gains(shared)
     if len(groups) == 1:
-        return float(special.logsumexp(logs) - np.log(len(WIDTHS)))
+        return float(np.logaddexp.reduce(logs) - np.log(len(WIDTHS)))
     best = shared[int(np.argmax(logs))]
     for _ in range(_ROUNDS):
         for own in groups:
             best = np.where(own, WIDTHS[int(np.argmax(gains_with(own)))], best)
     top = float(gains(best[None])[0])
-    means = [special.logsumexp(gains_with(own)) for own in groups]
+    means = [np.logaddexp.reduce(gains_with(own)) for own in groups]
     return top + float(np.sum(np.array(means) - np.log(len(WIDTHS)) - top))
 
 

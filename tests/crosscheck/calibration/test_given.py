@@ -21,6 +21,7 @@ from crosscheck.calibration.noise.colour import WHITE, chain_of
 from crosscheck.calibration.search import search_sets
 from crosscheck.calibration.sets import exact, refits
 from crosscheck.calibration.sets.catalogue import Catalogue
+from crosscheck.calibration.sets.exact import LOCAL_MINIMUM
 from crosscheck.calibration.sets.linear_search import Names, Scores
 from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.least_squares.state import State, evaluate
@@ -225,11 +226,12 @@ def test_about_a_part_of_the_best_set_nothing_is_sought_unless_its_values_explai
     begun: list[Terms] = []
     sought: list[object] = []
 
-    def searched(_exact: object, scores: object, _begin: Names, _most: int) -> Any:
+    def explored(_exact: object, scores: object, _most: int) -> Any:
         sought.append(scores)
         return now if last <= both else best
 
-    monkeypatch.setattr(refits, "_searched", searched)
+    monkeypatch.setattr(refits, "_best_explored", explored)
+    monkeypatch.setattr(refits, "_leads_on", lambda _exact, _near, _begin, _best: True)
     nearby: Any = SimpleNamespace(
         catalogue=SimpleNamespace(later=SimpleNamespace(names=("drum_eccentricity", "creep"))),
         fitted={both: now},
@@ -250,6 +252,38 @@ def test_about_a_part_of_the_best_set_nothing_is_sought_unless_its_values_explai
     assert found == ((now.joint if about else linear), now)
     own = {member.name: member.origin for member in begun.pop()}
     assert own == {"drum_eccentricity": "given", "anchor_point_error": "best"}
+
+
+@pytest.mark.parametrize(("score", "more"), [(-0.5 * LOCAL_MINIMUM, True), (-176.8, False)])
+def test_about_a_given_set_one_is_fitted_before_all_others(
+    monkeypatch: pytest.MonkeyPatch, score: float, more: bool
+) -> None:
+    """A sixth of a diagnosis went to sets that explained less by hundreds, all for one reason."""
+    best = fitted(frozenset({"anchor_point_error"}), "best", 0.0)
+    given = fitted(frozenset({"drum_eccentricity"}), "given", -4325.0)
+    company = fitted(frozenset({"drum_eccentricity", "drum_gain"}), "near", score)
+    fits = {one.names: one for one in (given, company)}
+    near: Any = SimpleNamespace(always=frozenset(), best=lambda _count, _within: [company.names])
+    linear: Any = SimpleNamespace(
+        always=frozenset(), score=lambda names: -1e5 if names == given.names else 0.0
+    )
+    nearby: Any = SimpleNamespace(
+        catalogue=SimpleNamespace(later=SimpleNamespace(names=("drum_eccentricity",))),
+        fit=lambda _scores, names: fits[names],
+        scores_about=lambda _joint, own_shapes: near,
+    )
+    begun: list[Names] = []
+    monkeypatch.setattr(refits, "explore", lambda scores, some: begun.extend(some))
+    asked: list[object] = []
+
+    def explored(_exact: object, scores: object, _most: int) -> Any:
+        asked.append(scores)
+        return best
+
+    monkeypatch.setattr(refits, "_best_explored", explored)
+    assert refits.about_given(nearby, linear, best, [given.names]) == (linear, best)
+    assert begun == [frozenset(), given.names]
+    assert asked == ([near] if more else [])
 
 
 def fitted(names: Names, origin: str, score: float) -> Any:

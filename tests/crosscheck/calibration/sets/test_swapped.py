@@ -131,15 +131,19 @@ def test_what_other_widths_promise_is_looked_for_there(
     name = "tracker_target"
     narrow = Refit(frozenset({name}), joint, {name: 0.01}, -20.0, {name: 3.0})
     wide = replace(narrow, widths={name: 3.0}, score=-10.0 if better else -30.0, wished={name: 9.0})
-    fits, asked = iter([narrow, wide]), list[float]()
+    fits, asked, known = iter([narrow, wide]), list[float](), list[object]()
 
-    def settled(_scores: object, _names: object, _start: object, widths: dict[str, float]) -> Refit:
+    def settled(
+        _scores: object, _names: object, _start: object, widths: dict[str, float],
+        jacobian: object = None,
+    ) -> Refit:  # fmt: skip
         asked.append(widths[name])
+        known.append(jacobian)
         return next(fits)
 
     monkeypatch.setattr(exact, "_settled", settled)
     assert exact.fit(scores, narrow.names) is (wide if better else narrow)
-    assert asked[1:] == [3.0]
+    assert asked[1:] == [3.0] and known[1:] == [joint.jacobian]
 
 
 def test_what_a_fit_did_not_find_is_no_evidence() -> None:
