@@ -60,6 +60,13 @@ class Path:
         """(N,) bool, waypoints as far from the one before as that is from its own, on one line."""
         return np.asarray(np.arange(len(self.source)) - (self.rows - self.steps)[self.source] >= 2)
 
+    def on_the_way_to(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(N,) bool, waypoints at or before one of some rows (n,) in its run."""
+        run, at = np.cumsum(self.fresh), self.rows[rows]
+        last = np.full(run[-1] + 1 if len(run) else 0, -1)
+        np.maximum.at(last, run[at], at)
+        return np.asarray(np.arange(len(run)) <= last[run])
+
     @property
     def new_clock(self) -> NDArray[np.bool_]:
         """(N,) bool, waypoints at which another clock begins, including the first."""

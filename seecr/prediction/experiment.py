@@ -204,17 +204,24 @@ class Experiment:
             self._edits[id(commands)] = Edits(setup)
         return self._edits[id(commands)]
 
-    def predict(self, effects: Sequence[Effect] = (), near: Prediction | None = None) -> Prediction:
+    def predict(
+        self,
+        effects: Sequence[Effect] = (),
+        near: Prediction | None = None,
+        needed: NDArray[np.bool_] | None = None,
+    ) -> Prediction:
         """Solve all rows and compute what the sensors would report.
 
         Args:
             effects: in the order in which they act.
             near: a prediction with slightly different effects to start from; by default the search
                 starts at the commanded poses.
+            needed: (n,) rows without which all is useless: if one of them has no solution, others
+                may be given up. By default every row is solved that has one.
         """
         setup = self.setup(effects)
         if setup.has_history:
-            return self._predict_path(effects)
+            return self._predict_path(effects, needed)
         if near is not None and near.has_history:
             near = None
         tables, found = self._solve(setup, near)
@@ -292,23 +299,30 @@ class Experiment:
             self._led.append(led(self.robot, self.commands))
         return self._led[0]
 
-    def walk(self, effects: Sequence[Effect]) -> tuple[Tables, batch.Evaluation]:
-        """Solve all waypoints of the path in order, each from the one before."""
+    def walk(
+        self, effects: Sequence[Effect], needed: NDArray[np.bool_] | None = None
+    ) -> tuple[Tables, batch.Evaluation]:
+        """Solve all waypoints of the path in order, each from the one before.
+
+        Args: as for :meth:`predict`.
+        """
         path = self.path
         setup = self.setup(effects, path.commands)
-        return _with_laws(setup, lambda tables, _start: batch.walk(tables, path, _LIMIT), None)
 
-    def _predict_path(self, effects: Sequence[Effect]) -> Prediction:
+        def run(tables: Tables, _start: batch.Evaluation | None) -> batch.Evaluation:
+            return batch.walk(tables, path, _LIMIT, needed)
+
+        return _with_laws(setup, run, None)
+
+    def _predict_path(
+        self, effects: Sequence[Effect], needed: NDArray[np.bool_] | None
+    ) -> Prediction:
         path = self.path
-        tables, whole = self.walk(effects)
+        tables, whole = self.walk(effects, needed)
         rows = take(tables, path.rows)
         found = batch.take_evaluation(whole, path.rows)
-        # if a waypoint was not solved, the later rows of its run are not valid
-        for k in path.source[~whole.at_rest]:
-            run = path.commands.run
-            assert run is not None
-            later = (np.arange(len(found.outcome)) >= k) & (run[path.rows] == run[path.rows[k]])
-            found.outcome[later & (found.outcome == CONVERGED)] = STALLED
+        lost = _after_lost_waypoints(path, whole)
+        found.outcome[lost & (found.outcome == CONVERGED)] = STALLED
         own = self.setup(effects)
         readings = self._read(effects, own, rows, found)
         return Prediction(own, rows, found, readings, True, sensors_among(effects), whole)
@@ -389,6 +403,15 @@ def _differ_in_length(one: Setup, other: Setup) -> bool:
     """Whether two setups of the same commands differ in ``extra_length`` at most."""
     alike = one.robot is other.robot and one.commands is other.commands
     return alike and not (one.laws or other.laws) and one.differs(other) <= {"extra_length"}
+
+
+def _after_lost_waypoints(path: Path, whole: batch.Evaluation) -> NDArray[np.bool_]:
+    """Rows (n,) at or after a waypoint of their run that was not solved: they are not valid."""
+    assert path.commands.run is not None
+    run = np.unique(path.commands.run[path.rows], return_inverse=True)[1]
+    lost, first = path.source[~whole.at_rest], np.full(run.max() + 1, len(run))
+    np.minimum.at(first, run[lost], lost)
+    return np.asarray(np.arange(len(run)) >= first[run])
 
 
 def _among(

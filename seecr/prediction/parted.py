@@ -106,14 +106,21 @@ class Parted(Experiment):
             rows.setdefault(names, []).append(k)
         return [(dict(zip(kinds, n, strict=True)), np.array(r)) for n, r in rows.items()]
 
-    def predict(self, effects: Sequence[Effect] = (), near: Prediction | None = None) -> Prediction:
+    def predict(
+        self,
+        effects: Sequence[Effect] = (),
+        near: Prediction | None = None,
+        needed: NDArray[np.bool_] | None = None,
+    ) -> Prediction:
         parts = self.parts(effects)
         if not parts:
-            return super().predict(effects, near)
+            return super().predict(effects, near, needed)
         # a prediction that is divided into other parts is no help
         nearby = near.parts if near is not None and _is_of(near, parts) else (None,) * len(parts)
         found = [
-            part.experiment.predict(part.effects(effects), at)
+            part.experiment.predict(
+                part.effects(effects), at, None if needed is None else needed[part.rows]
+            )
             for part, at in zip(parts, nearby, strict=True)
         ]
         return self._joined(effects, parts, found)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from itertools import pairwise
+from threading import Event
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +65,7 @@ class Evaluation:
     @property
     def at_rest(self) -> NDArray[np.bool_]:
         """(n,) rows in equilibrium, including those that are free to move along some direction."""
-        return np.asarray((self.outcome == CONVERGED) | (self.outcome == SINGULAR))
+        return at_rest(self.outcome)
 
     @classmethod
     def empty(cls, n: int, m: int, d: int) -> Evaluation:
@@ -89,6 +90,11 @@ class Evaluation:
         """Nothing evaluated yet, with the platform at the poses of tables."""
         n, m = tables.cables.shape[:2]
         return cls.empty(n, m, tables.n_dof)
+
+
+def at_rest(outcome: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(n,) whether rows are in equilibrium, free to move or not."""
+    return np.asarray((outcome == CONVERGED) | (outcome == SINGULAR))
 
 
 def descend(
@@ -186,18 +192,31 @@ def evaluate(tables: Tables, at: Evaluation, threads: int | None = 1) -> Evaluat
     return out
 
 
-def walk(tables: Tables, path: Path, limit: int) -> Evaluation:
+def walk(
+    tables: Tables, path: Path, limit: int, needed: NDArray[np.bool_] | None = None
+) -> Evaluation:
     """Solve the waypoints of a path in order, each from the one before.
 
     Fills the history columns in ``tables``. Runs are independent, except with creep, which
     continues through all runs that share a clock.
+
+    Args:
+        tables: of the N waypoints.
+        path: the path.
+        limit: most steps to a waypoint.
+        needed: (n,) rows without which all is useless: where one is lost, no other run is begun.
     """
+    vital = np.zeros(len(tables), dtype=bool) if needed is None else path.on_the_way_to(needed)
+    given_up = Event()
     out = Evaluation.at_commands(tables)
     out.energy[:] = np.nan
     enough = np.full(len(tables), TOLERANCE)  # on the way; to rows as many digits as possible
     enough[path.rows] = FINE
 
     def run(part: slice) -> None:
+        if given_up.is_set():
+            out.outcome[part] = STALLED
+            return
         walk_in_order(
             tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
             tables.length, tables.scale[part], 0.5 * tables.length, tables.reach[part], limit,
@@ -206,6 +225,8 @@ def walk(tables: Tables, path: Path, limit: int) -> Evaluation:
             out.hessian[part], out.states[part], out.slopes[part], out.deviation[part],
             out.values[part], out.guess[part],
         )  # fmt: skip
+        if np.any(vital[part] & ~at_rest(out.outcome[part])):
+            given_up.set()
 
     run_parts(run, _apart(path, tables))
     _refuse_no_length(tables, out)

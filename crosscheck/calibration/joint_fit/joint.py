@@ -207,7 +207,8 @@ def _step(
         expected = -(2.0 * gradient @ step[move] + step[move] @ normal @ step[move])
         if expected < 0.1 * _GAIN:
             return None
-        trial = evaluate(setting.problem, terms.with_vector(moved), setting.factor, state)
+        there = terms.with_vector(moved)
+        trial = evaluate(setting.problem, there, setting.factor, state, trial=True)
         after = objective(trial) if trial.valid else np.inf
         if after < before:
             return _Step(before - after, before, max(0.1 * damping, 1e-9), trial)

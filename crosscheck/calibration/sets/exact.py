@@ -219,7 +219,7 @@ class Exact:
         return best
 
     def _at(self, terms: Terms) -> State:
-        return evaluate(self.setting.problem, terms, self.setting.factor, self.plain)
+        return evaluate(self.setting.problem, terms, self.setting.factor, self.plain, trial=True)
 
     def _linear(self, scores: Scores, names: Names) -> State:
         """A set at the values of the linear model, or part of the way to them.

@@ -318,7 +318,8 @@ class _Descent:
         for _ in range(_DAMPINGS):
             by = _damped_step(normal, gradient, move, damping)
             values = np.clip(terms.vector + by * terms.scale, terms.lower, terms.upper)
-            trial = evaluate(self.problem, terms.with_vector(values), self.factor, state)
+            there = terms.with_vector(values)
+            trial = evaluate(self.problem, there, self.factor, state, trial=True)
             after = _objective(trial) if trial.valid else np.inf
             promised = -2.0 * float(gradient @ by + 0.5 * by @ normal @ by)
             if after < before:

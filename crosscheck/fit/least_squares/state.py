@@ -57,7 +57,13 @@ class State:
         return replace(self, terms=terms)
 
 
-def evaluate(problem: Problem, terms: Terms, factor: Array, near: State | None = None) -> State:
+def evaluate(
+    problem: Problem,
+    terms: Terms,
+    factor: Array,
+    near: State | None = None,
+    trial: bool = False,
+) -> State:
     """Predict with the terms, and compare with the readings.
 
     If commanded lengths are noisy, their most likely errors are found row by row (Gauss-Newton on
@@ -69,12 +75,14 @@ def evaluate(problem: Problem, terms: Terms, factor: Array, near: State | None =
         terms: effects with values.
         factor: :meth:`Problem.noise`; only used if commanded lengths are exact.
         near: a state to start from.
+        trial: the state is dropped unless it is valid: where a counted row with history is lost,
+            the others need not be solved.
     """
     effects = terms.effects
     experiment = problem.experiment if near is None else near.experiment
     start = None if near is None else near.prediction
     if not problem.sigma.length_m:
-        prediction = experiment.predict(effects, start)
+        prediction = experiment.predict(effects, start, problem.use if trial else None)
         raw = problem.residuals(prediction.readings)
         state = _compared(problem, terms, prediction, raw, factor, experiment)
         return _on_measured_branch(problem, state)

@@ -18,6 +18,7 @@ from seecr.compiled.pulley import lengths_at
 from seecr.prediction.experiment import Experiment
 from seecr.statics import batch
 from seecr.statics.tables import Tables, assemble, take
+from seecr.threads import undivided
 
 KINDS = ("demobot_cogiro", "demobot_parallel", "planar_vertical")
 
@@ -123,6 +124,37 @@ def test_a_walk_does_not_search_beyond_a_waypoint_that_it_lost() -> None:
     spoilt = np.isin(np.arange(len(tables)), range(lost, lost + 3))
     assert np.array_equal(walked.outcome != CONVERGED, spoilt)
     assert np.all(walked.count[~spoilt] > 0) and np.all(walked.count[lost + 1 : lost + 3] == 0)
+
+
+@pytest.mark.parametrize(("row", "goes_on"), [(0, False), (1, True)])
+def test_where_all_is_useless_without_a_row_no_other_run_is_begun(row: int, goes_on: bool) -> None:
+    """A fit dropped a step because of one run in 760, after it had searched for all of them."""
+    experiment = experiment_of("demobot_cogiro")
+    path = experiment.path
+    tables = assemble(experiment.setup([], path.commands))
+    second = int(np.flatnonzero(path.fresh)[1])
+    needed = np.ones(6, dtype=bool)
+    needed[1:3] = False  # of the first run only row 0
+    tables.cables[path.rows[row], 3, REST] = np.nan
+    with undivided():  # another thread might have begun the second run
+        walked = batch.walk(tables, path, 400, needed)
+    assert np.all(walked.count[: path.rows[row]] > 0)
+    assert np.all((walked.count[second:] > 0) == goes_on)
+    assert np.all((walked.outcome[second:] == CONVERGED) == goes_on)
+    every = batch.walk(tables, path, 400)
+    assert np.all(every.outcome[second:] == CONVERGED)
+
+
+def test_waypoints_on_the_way_to_rows_are_those_of_their_runs() -> None:
+    path = experiment_of("demobot_cogiro").path
+    rows = np.zeros(6, dtype=bool)
+    rows[1] = True
+    found = np.flatnonzero(path.on_the_way_to(rows))
+    assert np.array_equal(found, np.arange(path.rows[1] + 1))
+    rows[4] = True  # of the second run, which begins with row 3
+    second = np.arange(np.flatnonzero(path.fresh)[1], path.rows[4] + 1)
+    assert np.array_equal(np.flatnonzero(path.on_the_way_to(rows)), [*found, *second])
+    assert not path.on_the_way_to(np.zeros(6, dtype=bool)).any()
 
 
 def test_a_past_is_taken_over_and_nothing_else_is() -> None:
