@@ -409,7 +409,7 @@ def _after_lost_waypoints(path: Path, whole: batch.Evaluation) -> NDArray[np.boo
     """Rows (n,) at or after a waypoint of their run that was not solved: they are not valid."""
     assert path.commands.run is not None
     run = np.unique(path.commands.run[path.rows], return_inverse=True)[1]
-    lost, first = path.source[~whole.at_rest], np.full(run.max() + 1, len(run))
+    lost, first = path.source[~whole.at_rest], np.full(len(run), len(run))
     np.minimum.at(first, run[lost], lost)
     return np.asarray(np.arange(len(run)) >= first[run])
 

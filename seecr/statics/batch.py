@@ -65,7 +65,7 @@ class Evaluation:
     @property
     def at_rest(self) -> NDArray[np.bool_]:
         """(n,) rows in equilibrium, including those that are free to move along some direction."""
-        return at_rest(self.outcome)
+        return _are_at_rest(self.outcome)
 
     @classmethod
     def empty(cls, n: int, m: int, d: int) -> Evaluation:
@@ -92,7 +92,7 @@ class Evaluation:
         return cls.empty(n, m, tables.n_dof)
 
 
-def at_rest(outcome: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _are_at_rest(outcome: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(n,) whether rows are in equilibrium, free to move or not."""
     return np.asarray((outcome == CONVERGED) | (outcome == SINGULAR))
 
@@ -225,7 +225,7 @@ def walk(
             out.hessian[part], out.states[part], out.slopes[part], out.deviation[part],
             out.values[part], out.guess[part],
         )  # fmt: skip
-        if np.any(vital[part] & ~at_rest(out.outcome[part])):
+        if np.any(vital[part] & ~_are_at_rest(out.outcome[part])):
             given_up.set()
 
     run_parts(run, _apart(path, tables))
