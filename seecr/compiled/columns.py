@@ -31,6 +31,13 @@ OF_THE_PAST = (CREEP, CREEP_RATE, STRETCH_BEFORE, HYSTERESIS_BEFORE, STUCK)
 N_STATE = 6
 TENSION, STRAIN, HYSTERESIS_NOW, WINCH_TENSION, ENERGY, SLACK = range(N_STATE)
 
+# Entries of what a cable does at a pose and of how that changes, see rates_of_each_cable: its force
+# on the anchor point (3,) [N]; minus the derivative of that by the anchor point (3, 3) [N/m]; the
+# derivative of the tension by the anchor point (3,) [N/m]; arm of the anchor point (3,) [m];
+# derivatives of force (3,) and tension by the rest length [N/m].
+FORCE, STIFFNESS, SLOPE, ARM, BY_REST, TENSION_BY_REST = 0, 3, 12, 15, 18, 21
+N_RATES = 22
+
 # Entries of the load of a pose.
 FORCE_OF_WEIGHT, CENTRE_OF_MASS, EXTERNAL_FORCE, EXTERNAL_MOMENT, UP = 0, 3, 6, 9, 12
 N_LOAD = 15

@@ -12,15 +12,18 @@ import math
 from seecr.compiled.algebra import copy_vector
 from seecr.compiled.cable import cable_pull
 from seecr.compiled.change import make_change_space, moved_arm, place_platform
-from seecr.compiled.columns import ANCHOR, UP
+from seecr.compiled.columns import (
+    ANCHOR,
+    ARM,
+    BY_REST,
+    FORCE,
+    SLOPE,
+    STIFFNESS,
+    TENSION_BY_REST,
+    UP,
+)
 from seecr.compiled.jit import jit_allocating
 from seecr.compiled.lengthening import change_by_rest
-
-# Columns of what is found for a cable: its force on the anchor point (3,) [N]; minus the derivative
-# of that by the anchor point (3, 3) [N/m]; the derivative of the tension by the anchor point (3,)
-# [N/m]; arm of the anchor point (3,) [m]; derivatives of force (3,) and tension by the rest length.
-FORCE, STIFFNESS, SLOPE, ARM, BY_REST, TENSION_BY_REST = 0, 3, 12, 15, 18, 21
-N_RATES = 22
 
 
 @jit_allocating

@@ -15,7 +15,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seecr.compiled.columns import RADIUS, WEIGHT
+from seecr.compiled.columns import (
+    ARM,
+    BY_REST,
+    FORCE,
+    RADIUS,
+    SLOPE,
+    STIFFNESS,
+    TENSION_BY_REST,
+    WEIGHT,
+)
 from seecr.pose import Array, cross
 from seecr.statics.tables import Tables
 
@@ -33,32 +42,32 @@ class CableRates:
     @property
     def force(self) -> Array:
         """(n, m, 3) [N] on the platform."""
-        return self.table[..., 0:3]
+        return self.table[..., FORCE : FORCE + 3]
 
     @property
     def stiffness(self) -> Array:
         """(n, m, 3, 3) [N/m] minus its derivative by the anchor point."""
-        return self.table[..., 3:12].reshape(*self.table.shape[:2], 3, 3)
+        return self.table[..., STIFFNESS : STIFFNESS + 9].reshape(*self.table.shape[:2], 3, 3)
 
     @property
     def slope(self) -> Array:
         """(n, m, 3) [N/m] derivative of the tension by the anchor point."""
-        return self.table[..., 12:15]
+        return self.table[..., SLOPE : SLOPE + 3]
 
     @property
     def arm(self) -> Array:
         """(n, m, 3) [m] anchor point as seen from the platform's origin, base axes."""
-        return self.table[..., 15:18]
+        return self.table[..., ARM : ARM + 3]
 
     @property
     def force_by_rest(self) -> Array:
         """(n, m, 3) [N/m] derivative of the force by the rest length."""
-        return self.table[..., 18:21]
+        return self.table[..., BY_REST : BY_REST + 3]
 
     @property
     def tension_by_rest(self) -> Array:
         """(n, m) [N/m] derivative of the tension by the rest length."""
-        return self.table[..., 21]
+        return self.table[..., TENSION_BY_REST]
 
 
 def are_by_point(tables: Tables) -> bool:

@@ -16,6 +16,7 @@ from seecr.compiled.columns import (
     EA,
     EXTERNAL_MOMENT,
     GAP,
+    N_RATES,
     N_STATE,
     RADIUS,
     REST,
@@ -308,16 +309,15 @@ def change_by_cable(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array,
 def rates_of_cables(tables: Tables, at: Evaluation) -> Array:
     """What each cable pulls with, and how that changes: (n, m, N_RATES).
 
-    See :mod:`seecr.compiled.rates` for the columns. They are zero for rows in which a cable's
-    equations could not be solved.
+    All is zero for rows in which a cable's equations could not be solved.
     """
-    from seecr.compiled import rates  # takes a while to import
+    from seecr.compiled.rates import rates_of_each_cable  # takes a while to import
 
     n, m = tables.cables.shape[:2]
-    out = np.empty((n, m, rates.N_RATES))
+    out = np.empty((n, m, N_RATES))
 
     def run(part: slice) -> None:
-        rates.rates_of_each_cable(
+        rates_of_each_cable(
             tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
             at.deviation[part], at.values[part], tables.length, at.guess[part], out[part],
         )  # fmt: skip
