@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -278,13 +277,13 @@ def _response(at: Prediction, plus: Tables, minus: Tables, apart: float, inverse
     return np.concatenate([move, tension / apart + (at.found.slopes @ step)[..., 0]], axis=1)
 
 
-def _response_by_cable(at: Prediction, plus: Tables, minus: Tables, apart: Any) -> Array:
-    """The same (n, 6 + m, m) for tables in which every cable was changed, by the change of each."""
+def _response_by_cable(at: Prediction, plus: Tables, minus: Tables, apart: Array) -> Array:
+    """The same (n, 6 + m, m) for tables in which every cable was changed, by ``apart`` (m,)."""
     force, own = batch.change_by_cable(plus, minus, at.found)
     step = -_kept(at, "inverse", _inverse_stiffness) @ (force / apart)
     out = np.concatenate([_moved(at, step), at.found.slopes @ step], axis=1)
     cable = np.arange(own.shape[1])
-    out[:, 6 + cable, cable] += own / (apart[:, 0] if np.ndim(apart) == 3 else apart)
+    out[:, 6 + cable, cable] += own / apart
     return out
 
 

@@ -45,13 +45,6 @@ class Tables:
     def __len__(self) -> int:
         return len(self.poses)
 
-    def lengthened(self, by: float | Array) -> Tables:
-        """The same tables with every cable longer by a length [m], or by lengths (n, m)."""
-        cables = self.cables.copy()
-        cables[..., REST] += by
-        cables[..., GAP] -= by
-        return replace(self, cables=cables)
-
     def sliding(self) -> Tables:
         """The same tables without hysteresis and friction at the exit points, which hold cables."""
         cables = self.cables.copy()

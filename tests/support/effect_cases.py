@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from random_robots import random_poses, random_robot
 
 from seecr.commands.data import Commands
+from seecr.compiled.columns import GAP, REST
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
 from seecr.effects import Effect, Term, Terms, effect_named, layout_of
 from seecr.prediction.experiment import Experiment, Prediction
 from seecr.prediction.sensitivity import readings_difference
+from seecr.statics.tables import Tables
 
 # The last is commanded in lengths.
 KINDS = ("demobot_cogiro", "demobot_parallel", "planar_vertical", "lengths")
@@ -42,6 +45,14 @@ def experiment_of(kind: str, seed: int = 0, rows: int = 6, reach: float = 1.0) -
         time=np.cumsum(rng.uniform(1, 20, rows)),
         temperature=20 + rng.uniform(-5, 5, rows),
     ))  # fmt: skip
+
+
+def lengthened(tables: Tables, by: float) -> Tables:
+    """The same tables with every cable longer by a length [m]."""
+    cables = tables.cables.copy()
+    cables[..., REST] += by
+    cables[..., GAP] -= by
+    return replace(tables, cables=cables)
 
 
 def random_term(

@@ -258,7 +258,7 @@ def test_about_a_part_of_the_best_set_nothing_is_sought_unless_its_values_explai
 def test_about_a_given_set_one_is_fitted_before_all_others(
     monkeypatch: pytest.MonkeyPatch, score: float, more: bool
 ) -> None:
-    """A sixth of a diagnosis went to sets that explained less by hundreds, all for one reason."""
+    """A quarter of a diagnosis went to sets that explained less by hundreds, all for one reason."""
     best = fitted(frozenset({"anchor_point_error"}), "best", 0.0)
     given = fitted(frozenset({"drum_eccentricity"}), "given", -4325.0)
     company = fitted(frozenset({"drum_eccentricity", "drum_gain"}), "near", score)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from effect_cases import lengthened
 
 from seecr.commands.data import Commands
 from seecr.compiled.columns import (
@@ -57,7 +58,7 @@ def test_derivatives_by_length_are_those_of_differences(
     there, pull, tension = batch.pull_and_change(tables, at)
     assert there.gradient == pytest.approx(at.gradient, abs=1e-11 * tables.scale.max())
     assert there.states[..., TENSION] == pytest.approx(at.states[..., TENSION], rel=1e-11)
-    sides = tables.lengthened(step), tables.lengthened(-step)
+    sides = lengthened(tables, step), lengthened(tables, -step)
     force, own = batch.change_by_cable(*sides, at)
     assert np.all(tension < 0.0)
     assert tension == pytest.approx(own / (2.0 * step), rel=1e-5)
@@ -67,7 +68,7 @@ def test_derivatives_by_length_are_those_of_differences(
 def test_a_slack_cable_does_not_change() -> None:
     found = predicted("demobot_cogiro", ())
     longer = with_rest(found.tables, rest_for(found.tables, np.full((5, 8), 0.7)))
-    longer.cables[:, 3] = found.tables.lengthened(0.1).cables[:, 3]
+    longer.cables[:, 3] = lengthened(found.tables, 0.1).cables[:, 3]
     _at, pull, tension = batch.pull_and_change(longer, here(longer))
     assert np.all(tension[:, 3] == 0.0) and np.all(pull[:, :, 3] == 0.0)
     assert np.all(np.delete(tension, 3, axis=1) < 0.0)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from effect_cases import experiment_of
+from effect_cases import experiment_of, lengthened
 
 from seecr.commands.data import Commands
 from seecr.commands.path import Path
@@ -52,7 +52,7 @@ def test_a_change_is_the_difference_of_what_both_tables_say(kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_cables_own_change_adds_up_to_that_of_all(kind: str) -> None:
     tables, at = solved(kind)
-    plus, minus = tables.lengthened(1e-4), tables.lengthened(-1e-4)
+    plus, minus = lengthened(tables, 1e-4), lengthened(tables, -1e-4)
     force, tension = batch.change(plus, minus, at)
     each, own = batch.change_by_cable(plus, minus, at)
     assert each.shape == (*force.shape, tables.cables.shape[1])
