@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -23,26 +24,37 @@ from seecr.effects import Term
 from seecr.pose import Array, pose_add, pose_difference
 
 ROBOT = soft_cogiro()
-DATA = measured(ROBOT, points=4)
-READ = np.concatenate([DATA.position, DATA.quat_wxyz], axis=1)
-# 3 4 0 mm and 0 0.6 0.8 mrad times the number of the row
-OFF = np.arange(DATA.n_rows)[:, None] * 1e-3 * np.array([3.0, 4.0, 0.0, 0.0, 0.6, 0.8])
+
+
+@cache
+def readings() -> Measurements:
+    return measured(ROBOT, points=4)
+
+
+def poses_read() -> Array:
+    return np.concatenate([readings().position, readings().quat_wxyz], axis=1)
+
+
+def off_by_row() -> Array:
+    """3 4 0 mm and 0 0.6 0.8 mrad times the number of the row."""
+    rows = np.arange(readings().n_rows)
+    return rows[:, None] * 1e-3 * np.array([3.0, 4.0, 0.0, 0.0, 0.6, 0.8])
 
 
 def tracked(wanted: Array | None, *model: Term, **changes: object) -> Tracking:
-    data = replace(DATA, wanted=wanted, **changes)  # type: ignore[arg-type]
+    data = replace(readings(), wanted=wanted, **changes)  # type: ignore[arg-type]
     found = compare(ROBOT, data, model).tracking
     assert found is not None
     return found
 
 
 def test_distances_are_lengths_of_vectors_from_the_wanted_poses() -> None:
-    found, n = tracked(pose_add(READ, -OFF)), DATA.n_rows
+    found, n = tracked(pose_add(poses_read(), -off_by_row())), readings().n_rows
     mean_square = np.mean(np.arange(n) ** 2.0)
     assert found.wanted and not found.through_tracker
     place, turn = found.away
     assert (place.kind, place.unit, place.rows, place.row) == ("position", "m", n, n - 1)
-    assert place.line == DATA.line[-1]
+    assert place.line == readings().line[-1]
     assert place.max == pytest.approx(5e-3 * (n - 1)) and turn.max == pytest.approx(1e-3 * (n - 1))
     assert place.rms == pytest.approx(5e-3 * np.sqrt(mean_square))
     assert turn.rms == pytest.approx(1e-3 * np.sqrt(mean_square))
@@ -50,43 +62,47 @@ def test_distances_are_lengths_of_vectors_from_the_wanted_poses() -> None:
 
 def test_without_wanted_poses_distances_are_from_the_commanded_ones() -> None:
     found = tracked(None)
-    off = np.linalg.norm(pose_difference(READ, DATA.command_pose)[:, :3], axis=1)
+    off = np.linalg.norm(pose_difference(poses_read(), readings().command_pose)[:, :3], axis=1)
     assert not found.wanted and found.away[0].rms == pytest.approx(np.sqrt(np.mean(off**2)))
-    lengths = replace(DATA, command_pose=None, command_lengths=ROBOT.nominal_lengths(READ))
+    lengths = replace(
+        readings(), command_pose=None, command_lengths=ROBOT.nominal_lengths(poses_read())
+    )
     assert compare(ROBOT, lengths).tracking is None
 
 
 def test_only_what_was_wanted_and_read_counts() -> None:
-    wanted = pose_add(READ, -OFF)
+    wanted = pose_add(poses_read(), -off_by_row())
     wanted[:, 1] = wanted[3, 0] = np.nan  # y not at all, x not in one row
     wanted[:, 3:] = np.nan
-    read = DATA.position.copy()
+    read = readings().position.copy()
     read[-1, 0] = np.nan
     (place,) = tracked(wanted, position=read).away
-    assert place.rows == DATA.n_rows and place.max == pytest.approx(3e-3 * (DATA.n_rows - 2))
-    angles = np.tile([0.1, np.nan, np.nan], (DATA.n_rows, 1))
-    level = np.tile([np.nan, np.nan, np.nan, 1.0, 0.0, 0.0, 0.0], (DATA.n_rows, 1))
+    assert place.rows == readings().n_rows and place.max == pytest.approx(
+        3e-3 * (readings().n_rows - 2)
+    )
+    angles = np.tile([0.1, np.nan, np.nan], (readings().n_rows, 1))
+    level = np.tile([np.nan, np.nan, np.nan, 1.0, 0.0, 0.0, 0.0], (readings().n_rows, 1))
     (turn,) = tracked(level, quat_wxyz=None, angles_rad=angles).away
     assert turn.kind == "orientation" and turn.rms == pytest.approx(0.1)
 
 
 def test_of_a_model_only_what_its_tracker_reads_matters() -> None:
-    plain = tracked(READ, term(ROBOT, "stiffness", factor=3.0))
+    plain = tracked(poses_read(), term(ROBOT, "stiffness", factor=3.0))
     assert not plain.through_tracker and plain.away[0].max < 1e-12
     frame = term(ROBOT, "tracker_frame", shift_x_m=0.01, shift_z_m=-0.02)
-    found = tracked(pose_add(READ, np.array([-0.01, 0, 0.02, 0, 0, 0])), frame)
+    found = tracked(pose_add(poses_read(), np.array([-0.01, 0, 0.02, 0, 0, 0])), frame)
     assert found.through_tracker and found.away[0].max < 1e-12
     assert found.title == "off the wanted poses, read through the model's tracker"
 
 
 def test_files_without_wanted_poses_do_not_count() -> None:
     days = [
-        replace(DATA, path=Path("before.csv")),
-        replace(DATA, path=Path("after.csv"), wanted=pose_add(READ, -OFF)),
+        replace(readings(), path=Path("before.csv")),
+        replace(readings(), path=Path("after.csv"), wanted=pose_add(poses_read(), -off_by_row())),
     ]
     found = compare(ROBOT, together(days)).tracking
-    assert found is not None and found.away[0].rows == DATA.n_rows
-    assert found.away[0].row == 2 * DATA.n_rows - 1
+    assert found is not None and found.away[0].rows == readings().n_rows
+    assert found.away[0].row == 2 * readings().n_rows - 1
 
 
 def planar(folder: Path, head: str, row: str) -> Measurements:

@@ -15,13 +15,17 @@ from crosscheck.diagnosis import search
 from crosscheck.diagnosis.contradicted import contradicted_values
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.measurements.data import Measurements
 from seecr.description.mjcf import load_robot
 from seecr.effects import Terms
 
 ROBOT = load_robot(COGIRO)
 HIDDEN = term(ROBOT, "centre_of_mass", shift_x_m=0.02)
-DATA = measured(ROBOT, [HIDDEN], points=4, seed=3)
 WRONG = term(ROBOT, "centre_of_mass", shift_x_m=0.005)
+
+
+def with_hidden() -> Measurements:
+    return measured(ROBOT, [HIDDEN], points=4, seed=3)
 
 
 def test_fits_from_nearby_values_do_not_move_fixed_ones() -> None:
@@ -43,7 +47,7 @@ def test_fits_from_nearby_values_do_not_move_fixed_ones() -> None:
 
 
 def test_fixed_values_that_the_data_contradict_are_doubted() -> None:
-    found = diagnose(ROBOT, DATA, Terms([WRONG.fixed()]), exclude=made.SLOW)
+    found = diagnose(ROBOT, with_hidden(), Terms([WRONG.fixed()]), exclude=made.SLOW)
     assert found.search is not None
     for step in found.search.steps:
         assert step.fit.terms["centre_of_mass"].vector.tolist() == WRONG.vector.tolist()
@@ -57,7 +61,7 @@ def test_fixed_values_that_the_data_contradict_are_doubted() -> None:
 def test_only_values_that_are_known_are_doubted(known: bool) -> None:
     """What was measured to 0.1 mm is doubted, where the data say 15 mm; what is free is fitted."""
     model = WRONG.measured(shift_x_m=(0.005, 1e-4)) if known else WRONG
-    found = diagnose(ROBOT, DATA, Terms([model]), exclude=made.SLOW)
+    found = diagnose(ROBOT, with_hidden(), Terms([model]), exclude=made.SLOW)
     notes = contradicted_values(found)
     assert list(notes) == ["centre_of_mass"] * known
     told = " ".join(notes.values())

@@ -51,6 +51,7 @@ def a_common_scale_of_the_lengths_takes_the_place_of_the_sheaves(found: dict[str
     assert -0.06 < found["missing"][1]["parameters"]["factor"]["value"] < -0.01
 
 
+@pytest.mark.sweep  # a minute of one processor; test_irma is the real robot of every run
 def test_hangprinter(shared_data: Path) -> None:
     """Four lines whose lengths were commanded; anchors roughly known, one row wrong."""
     found = diagnosed(shared_data / "real" / "hangprinter")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -300,31 +301,36 @@ def lift_by_small_steps(lengths: np.ndarray, amplitude: float, turning: float) -
     again.
     """
     ea, weight, substeps = 1000.0, WEIGHT, 1600
-    stretch, friction, heights = np.zeros(2), np.zeros(2), []
+    stretch, friction, heights = [0.0, 0.0], [0.0, 0.0], []
 
-    def tried(height: float, rest: np.ndarray, start: bool) -> tuple[np.ndarray, ...]:
-        e = np.array([1.0 - height, 1.0 + height]) - rest
-        limit = amplitude * np.sign(e - stretch)
-        z = limit + (friction - limit) * np.exp(-np.abs(e - stretch) / turning)
-        z = np.zeros(2) if start else z
-        return np.maximum(ea * e / rest + z, 0.0), e, z
+    # numbers and not arrays: of two cables they take a quarter of the time
+    def tried(height: float, rest: list[float], start: bool) -> list[tuple[float, float, float]]:
+        """Tension, stretch and friction of both cables."""
+        out = []
+        for k, span in enumerate((1.0 - height, 1.0 + height)):
+            e = span - rest[k]
+            moved = e - stretch[k]
+            limit = math.copysign(amplitude, moved) if moved else 0.0
+            z = 0.0 if start else limit + (friction[k] - limit) * math.exp(-abs(moved) / turning)
+            out.append((max(ea * e / rest[k] + z, 0.0), e, z))
+        return out
 
-    def rests(rest: np.ndarray, start: bool) -> float:
+    def rests(rest: list[float], start: bool) -> float:
         low, high = -0.5, 0.5
         for _ in range(60):
             middle = 0.5 * (low + high)
-            tension = tried(middle, rest, start)[0]
-            low, high = (middle, high) if tension[0] - tension[1] > weight else (low, middle)
+            upper, lower = tried(middle, rest, start)
+            low, high = (middle, high) if upper[0] - lower[0] > weight else (low, middle)
         return low
 
     before = lengths[0]
     for row, target in enumerate(lengths):
         for part in np.linspace(0.0, 1.0, substeps + 1)[1:] if row else [1.0]:
-            rest = before + part * (target - before)
+            rest = (before + part * (target - before)).tolist()
             height = rests(rest, row == 0)
-            tension, e, z = tried(height, rest, row == 0)
-            taut = tension > 0.0
-            stretch[taut], friction[taut] = e[taut], z[taut]
+            for k, (tension, e, z) in enumerate(tried(height, rest, row == 0)):
+                if tension > 0.0:
+                    stretch[k], friction[k] = e, z
         before = target
         heights.append(height)
     return heights
