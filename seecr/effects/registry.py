@@ -101,13 +101,18 @@ def effect_named(name: str) -> type[Effect]:
     """The effect of that name.
 
     Raises:
-        InputError: there is none; lists the known ones, nearest first.
+        InputError: there is none; lists the known ones, nearest first, unless it is a file's name.
     """
     if not isinstance(name, str):
         raise InputError(f"expected the name of an effect, got {name!r}")
     known = catalogue()
     if name in known:
         return known[name]
+    if any(mark in name for mark in "./\\"):
+        raise InputError(
+            f"expected the name of an effect, such as pulley_radius, got {name!r}, which looks "
+            "like a file's name"
+        )
     near = difflib.get_close_matches(name, known, n=len(known), cutoff=0.0)
     raise InputError(f"no effect {name!r}; known, nearest first: {', '.join(near)}")
 

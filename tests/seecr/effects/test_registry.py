@@ -19,6 +19,11 @@ def test_a_layout_is_found_by_name_and_by_class() -> None:
     ("given", "said"),
     [
         ("backlsh", "no effect 'backlsh'; known, nearest first: backlash, "),
+        (
+            "lab/robot.xml",
+            "expected the name of an effect, such as pulley_radius, got 'lab/robot.xml', which "
+            "looks like a file's name$",
+        ),
         (["backlash"], "expected the name of an effect, got \\['backlash'\\]"),
         (float, "expected the name of an effect, or its class, got <class 'float'>"),
     ],
