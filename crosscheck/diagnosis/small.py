@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from crosscheck.fit.effects.gauss_newton import Fit
 from crosscheck.fit.effects.held_out import significantly_improves
 from crosscheck.fit.effects.possible import is_plausible
 from crosscheck.fit.noise.smooth import beyond_smooth
+from seecr.processes import Shared, shared_out
 
 # What is there takes no kind of reading farther off on held-out runs than so many times.
 _FARTHER = 1.1
@@ -94,11 +96,14 @@ def _happens(found: Fit, candidate: Candidate) -> bool:
 def _small_candidates(search: Search, parameters: int) -> list[Candidate]:
     """The small effects that the last model does not have, fitted beside it."""
     held, trials = search.last.fit.terms.names, search.trials
-    return [
-        try_candidate(trials, search.last.fit, c.layout)
+    small = [
+        c.layout
         for c in trials.candidates(trials.problem)
         if c.name not in held and c.why_not is None and len(c.layout) <= parameters
     ]
+    return shared_out(
+        partial(try_candidate, trials, search.last.fit), small, lambda: Shared(search, small)
+    )
 
 
 def spoils(before: Step, step: Step) -> bool:
