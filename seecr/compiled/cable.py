@@ -26,7 +26,7 @@ from seecr.compiled.columns import (
     WEIGHT,
     WINCH_TENSION,
 )
-from seecr.compiled.jit import jit, jit_inner, jit_merged
+from seecr.compiled.jit import jit, jit_inner, jit_merged, jit_pasted
 from seecr.compiled.law import straight_law, strain_of_tension, winch_tension
 from seecr.compiled.pulley import length_in_plane, pulley_geometry
 from seecr.compiled.yielding import along, lift_slope, lowered, soften
@@ -91,7 +91,7 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
     return True
 
 
-@jit_merged
+@jit_pasted
 def _fixed_pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
     """See cable_pull; for a cable whose exit point is not lifted."""
     if row[WEIGHT] > 0.0:
@@ -101,7 +101,7 @@ def _fixed_pull(row, start, move, up, guess, work, force, stiffness, gradient, s
     return _straight_pull(row, start, move, force, stiffness, gradient, state)
 
 
-@jit_inner
+@jit_pasted
 def _straight_pull(row, start, move, force, stiffness, gradient, state):
     before2, growth, now2 = 0.0, 0.0, 0.0
     for k in range(3):
@@ -167,7 +167,7 @@ def _lift(row, across, rise, e, up, f, k2, g2, force, stiffness, gradient):
             )
 
 
-@jit_inner
+@jit_pasted
 def _pulley_pull(row, start, move, up, work, force, stiffness, gradient, state):
     e, f, k2, g2 = work[0], work[1], work[2], work[3]
     across, rise = _plane(row, start, move, up, e)
@@ -198,7 +198,7 @@ def _catenary(row, across, rise, guess, error, jacobian, work):
     return False
 
 
-@jit_inner
+@jit_merged
 def _catenary_pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
     e, f, k2, g2 = work[0], work[1], work[2], work[3]
     across, rise = _plane(row, start, move, up, e)

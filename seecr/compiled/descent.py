@@ -8,7 +8,7 @@ import numpy as np
 
 from seecr.compiled.algebra import cholesky, copy_rows, copy_vector, largest_diagonal, norm
 from seecr.compiled.columns import EA, N_STATE
-from seecr.compiled.jit import jit_allocating, jit_inner
+from seecr.compiled.jit import jit_allocating, jit_inner, jit_pasted
 from seecr.compiled.joints import N_CURRENT, place_joints
 from seecr.compiled.outcomes import (
     CABLE_LAW,
@@ -171,7 +171,7 @@ def solve_one(
         advance(deviation, values, step, length, screws, pose, trial, trial_values, current)
 
 
-@jit_allocating
+@jit_pasted
 def solve_in_stages(
     cables, load, pose, screws, start, start_values, length, scale, radius, reach, limit,
     guess, gradient, hessian, states, slopes, deviation, values, softened, staged, fine, space,

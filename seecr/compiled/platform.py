@@ -41,7 +41,7 @@ from seecr.compiled.columns import (
     WINCH_SIDE,
     WINCH_TENSION,
 )
-from seecr.compiled.jit import jit, jit_allocating, jit_inner
+from seecr.compiled.jit import jit, jit_allocating, jit_inner, jit_pasted
 from seecr.compiled.joints import N_CURRENT, VALUE, joint_columns, onto_joints, place_joints
 from seecr.compiled.law import is_linear
 from seecr.compiled.rotation import rotated_less
@@ -119,7 +119,7 @@ def _add_point(ax, ay, az, fx, fy, fz, per, gradient, hessian):
     hessian[5, 4] -= 0.5 * (fy * az + fz * ay)
 
 
-@jit_inner
+@jit_pasted
 def _other_pull(cables, ready, load, i, dx, dy, dz, guess, work, states):
     """Force and stiffness of a cable that is no linear spring (cable_pull), in work[12:19]."""
     start, move = work[14], work[15]
