@@ -21,6 +21,7 @@ from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.reasons import Why
 from seecr.effects.base import Layout
 from seecr.pose import Array
+from seecr.processes import MOST
 
 NAMES = (
     "cable_length_offset", "drum_gain", "stiffness", "centre_of_mass", "gravity_tilt",
@@ -192,6 +193,22 @@ def test_a_small_effect_beside_what_nobody_explains_is_seen_by_itself() -> None:
     assert is_plausible(way.last.fit.terms["tracker_scale"])
     # the search itself is as it was
     assert way.steps[0] is found.steps[0]
+
+
+@pytest.mark.parametrize("processes", ["1", "2"])
+def test_a_second_small_effect_is_sought_beside_the_first(
+    monkeypatch: pytest.MonkeyPatch, processes: str
+) -> None:
+    made = toy({"tracker_scale": 6.0, "gravity_tilt": 3.0}, NAMES)
+    made.table[:] += 0.8 * np.sin(np.arange(len(made.table)) / 3.0)[:, None]
+    found = searched(made)
+    monkeypatch.setenv(MOST, processes)
+    way = small_effects_alone(found, 3, (0.5, 1.0 / 3.0))
+    assert way is not None and set(way.found) == {"tracker_scale", "gravity_tilt"}
+    beside = {c.name: c for c in way.steps[1].candidates}
+    assert way.found[0] not in beside
+    second = beside[way.found[1]].fit
+    assert second is not None and set(second.terms.names) == set(way.found)
 
 
 def test_what_is_needless_goes_and_what_the_model_had_stays() -> None:
