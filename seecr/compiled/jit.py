@@ -48,7 +48,8 @@ what is computed with them. Each call adds to the compile time.
 
 jit_pasted = njit(**_UNCOUNTED, inline="always")  # type: ignore[call-overload]
 """The same for functions with one caller or two: each becomes part of these, before they are
-compiled. By itself it would be optimised with all that it calls, and once more in its caller.
+compiled, with their settings: it may create arrays where they may. By itself it would be optimised
+with all that it calls, and once more in its caller.
 """
 
 jit_allocating = njit(**_COMMON, _nrt=True)  # type: ignore[call-overload]
