@@ -20,8 +20,9 @@ from sources import ROOT, imports, imports_of, modules, name_of, tree_of
 FLOORS = {
     "seecr.errors": 0, "seecr.compiled": 0, "seecr.threads": 0, "seecr.lazy": 0, "seecr.counted": 0,
     "seecr.files": 1, "seecr.made": 1, "seecr.pose": 1, "seecr.processes": 1,
-    "seecr.curves": 2, "seecr.units": 2, "seecr.arguments": 2, "seecr.result": 2, "seecr.planar": 3,
-    "seecr.description": 3,
+    "seecr.curves": 2, "seecr.units": 2, "seecr.arguments": 2, "seecr.result": 2,
+    "seecr.pose_rows": 2,
+    "seecr.planar": 3, "seecr.description": 3,
     "seecr.commands": 4,
     "seecr.columns": 5, "seecr.effects": 5,
     "seecr.statics": 6,

@@ -22,8 +22,9 @@ from seecr.compiled.columns import (
     TENSION_BY_REST,
     UP,
 )
-from seecr.compiled.jit import jit_allocating
+from seecr.compiled.jit import jit, jit_allocating
 from seecr.compiled.lengthening import change_by_rest
+from seecr.compiled.rotation import rotated_less
 
 
 @jit_allocating
@@ -53,3 +54,36 @@ def rates_of_each_cable(cables, load, poses, screws, deviation, values, length, 
             found[TENSION_BY_REST] = change_by_rest(row, up, keep, space)
             for k in range(3):
                 found[BY_REST + k] = move[k]
+
+
+@jit
+def wrench_by_ends_batch(rates, poses, exits, anchors, longer, wrench, tension):
+    """Change of the wrench (n, 6, m) by each cable, and of its own tension (n, m).
+
+    Exit points move by (m, 3) in base axes, anchor points by (m, 3) in those of the platform, and
+    cables become longer by (n, m).
+    """
+    n, m = tension.shape
+    for r in range(n):
+        w, x, y, z = poses[r, 3], poses[r, 4], poses[r, 5], poses[r, 6]
+        for i in range(m):
+            of = rates[r, i]
+            a, b, c = anchors[i, 0], anchors[i, 1], anchors[i, 2]
+            da, db, dc = rotated_less(w, x, y, z, a, b, c)
+            a, b, c = a + da, b + db, c + dc  # in base axes
+            p, q, s = a - exits[i, 0], b - exits[i, 1], c - exits[i, 2]
+            more = longer[r, i]
+            tension[r, i] = of[TENSION_BY_REST] * more + (
+                of[SLOPE] * p + of[SLOPE + 1] * q + of[SLOPE + 2] * s
+            )
+            for k in range(3):
+                row = STIFFNESS + 3 * k
+                wrench[r, k, i] = of[BY_REST + k] * more - (
+                    of[row] * p + of[row + 1] * q + of[row + 2] * s
+                )
+            u, v, t = wrench[r, 0, i], wrench[r, 1, i], wrench[r, 2, i]
+            d, e, f = of[ARM], of[ARM + 1], of[ARM + 2]
+            g, h, j = of[FORCE], of[FORCE + 1], of[FORCE + 2]
+            wrench[r, 3, i] = e * t - f * v + b * j - c * h
+            wrench[r, 4, i] = f * u - d * t + c * g - a * j
+            wrench[r, 5, i] = d * v - e * u + a * h - b * g

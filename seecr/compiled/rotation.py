@@ -19,11 +19,12 @@ def rotated_less(w, x, y, z, a, b, c):
 
 @jit_inner
 def quaternion_product(a, b, c, d, w, x, y, z):
+    # by pairs: of a rotation and its inverse exactly none is left
     return (
-        a * w - b * x - c * y - d * z,
-        a * x + b * w + c * z - d * y,
-        a * y - b * z + c * w + d * x,
-        a * z + b * y - c * x + d * w,
+        a * w - (b * x + c * y + d * z),
+        a * x + w * b + (c * z - d * y),
+        a * y + w * c + (d * x - b * z),
+        a * z + w * d + (b * y - c * x),
     )
 
 

@@ -13,7 +13,8 @@ from seecr.description.robot import Robot
 from seecr.effects.base import Effect, mean_length, of_length, parameter
 from seecr.effects.setup import Setup
 from seecr.effects.totals import Total
-from seecr.pose import Array, pose_add
+from seecr.pose import Array
+from seecr.pose_rows import moved_by
 
 # Largest radius of a drum, as a part of the mean cable length. Drums of a quarter of it, which turn
 # half a turn in the data, imitated a platform that bends.
@@ -75,7 +76,7 @@ class InitialPoseError(Effect):
     def edit_setup(self, setup: Setup) -> None:
         change = np.concatenate([self.position, self.rotation])
         if np.any(change):
-            setup.zero_pose = pose_add(setup.zero_pose, change)
+            setup.zero_pose = moved_by(setup.zero_pose, change)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,8 @@ import numpy as np
 
 from seecr.effects.base import Effect, Readings, of_length, parameter
 from seecr.effects.setup import Setup
-from seecr.pose import Array, quat_from_rotvec, quat_multiply, quat_rotate
+from seecr.pose import Array, quat_from_rotvec
+from seecr.pose_rows import products, rotated
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +31,8 @@ class TrackerFrame(Effect):
     def edit_readings(self, readings: Readings, setup: Setup) -> None:
         if np.any(self.rotation):
             turn = quat_from_rotvec(self.rotation)
-            readings.position = quat_rotate(turn, readings.position)
-            readings.quat_wxyz = quat_multiply(turn, readings.quat_wxyz)
+            readings.position = rotated(turn, readings.position)
+            readings.quat_wxyz = products(turn, readings.quat_wxyz)
         readings.position = readings.position + self.shift
 
 
@@ -53,10 +54,10 @@ class TrackerTarget(Effect):
 
     def edit_readings(self, readings: Readings, setup: Setup) -> None:
         if np.any(self.shift):
-            readings.position = readings.position + quat_rotate(readings.quat_wxyz, self.shift)
+            readings.position = readings.position + rotated(readings.quat_wxyz, self.shift)
         if np.any(self.rotation):
             turn = quat_from_rotvec(self.rotation)
-            readings.quat_wxyz = quat_multiply(readings.quat_wxyz, turn)
+            readings.quat_wxyz = products(readings.quat_wxyz, turn)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,8 @@ import numpy as np
 
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot
-from seecr.pose import Array, pose_add, pose_difference
+from seecr.pose import Array
+from seecr.pose_rows import changes_between, moved_by
 from seecr.statics import batch
 from seecr.statics.starts import start_of
 from seecr.statics.tables import Tables
@@ -45,11 +46,11 @@ class Coordinates:
     def moved(self, there: Array, steps: Array) -> Array:
         """Coordinates after steps (n, d) [m]; rotations in a step are times the robot's length."""
         change = steps * np.where(self.robot.hinges, 1.0 / self.robot.length, 1.0)
-        return there + change if self.robot.joints else pose_add(there, change)
+        return there + change if self.robot.joints else moved_by(there, change)
 
     def between(self, there: Array, before: Array) -> Array:
         """Steps (n, d) [m] from ``before`` to other coordinates."""
-        change = there - before if self.robot.joints else pose_difference(there, before)
+        change = there - before if self.robot.joints else changes_between(there, before)
         return np.asarray(change * np.where(self.robot.hinges, self.robot.length, 1.0))
 
     def evaluated(self, tables: Tables, there: Array, commanded: Array) -> batch.Evaluation:

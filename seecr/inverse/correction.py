@@ -25,7 +25,8 @@ from seecr.holding.unheld import why_not_held, without_span
 from seecr.inverse.history import REACHED, lengths_with_history
 from seecr.inverse.nearest import Nearest, Reaching, nearest, poses_in_place
 from seecr.inverse.told import told_lengths
-from seecr.pose import Array, pose_difference
+from seecr.pose import Array
+from seecr.pose_rows import changes_between
 from seecr.prediction.experiment import Experiment, Prediction, effects_of
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics.solution import Solution
@@ -102,7 +103,7 @@ class Correction(Result):
     @property
     def left(self) -> Array:
         """(n, 6) [m, rad] from the wanted pose to the platform's equilibrium."""
-        return pose_difference(self.solution.pose, self.wanted)
+        return changes_between(self.solution.pose, self.wanted)
 
     @property
     def stays(self) -> NDArray[np.bool_]:
@@ -506,7 +507,7 @@ def _degrees(turned: Array) -> float:
 def _rests_at(poses: Array, solution: Solution) -> NDArray[np.bool_]:
     """(n,) whether the platform is at rest at poses (n, 7), to within a micrometre."""
     size = np.where(np.arange(6) < 3, 1.0, solution.robot.length)
-    off = np.abs(pose_difference(solution.pose, poses) * size).max(axis=1)
+    off = np.abs(changes_between(solution.pose, poses) * size).max(axis=1)
     return np.asarray(solution.converged & (off < REACHED))
 
 

@@ -18,7 +18,8 @@ from seecr.effects.base import Effect
 from seecr.holding.lengths import Held, hold_again
 from seecr.inverse.aitken import damped, to_their_limit
 from seecr.inverse.told import told_lengths
-from seecr.pose import Array, pose_difference
+from seecr.pose import Array
+from seecr.pose_rows import changes_between
 from seecr.prediction.experiment import Experiment, Prediction
 
 REACHED = 1e-6
@@ -68,7 +69,7 @@ def lengths_with_history(
         prediction = Experiment(robot, replace(commands, lengths=told, told=True)).predict(effects)
         if not (prediction.has_history or prediction.setup.laws):
             return told, prediction
-        missed = np.abs(pose_difference(prediction.pose, commands.pose) * size).max(axis=1)
+        missed = np.abs(changes_between(prediction.pose, commands.pose) * size).max(axis=1)
         late = number >= _LATE and prediction.has_history
         left = _left(missed[held.fine], robot)
         if best is None or left < least:

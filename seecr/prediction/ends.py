@@ -17,15 +17,12 @@ import numpy as np
 
 from seecr.compiled.columns import (
     ARM,
-    BY_REST,
     FORCE,
     RADIUS,
-    SLOPE,
-    STIFFNESS,
-    TENSION_BY_REST,
     WEIGHT,
 )
-from seecr.pose import Array, cross
+from seecr.compiled.rates import wrench_by_ends_batch
+from seecr.pose import Array
 from seecr.statics.tables import Tables
 
 
@@ -45,29 +42,9 @@ class CableRates:
         return self.table[..., FORCE : FORCE + 3]
 
     @property
-    def stiffness(self) -> Array:
-        """(n, m, 3, 3) [N/m] minus its derivative by the anchor point."""
-        return self.table[..., STIFFNESS : STIFFNESS + 9].reshape(*self.table.shape[:2], 3, 3)
-
-    @property
-    def slope(self) -> Array:
-        """(n, m, 3) [N/m] derivative of the tension by the anchor point."""
-        return self.table[..., SLOPE : SLOPE + 3]
-
-    @property
     def arm(self) -> Array:
         """(n, m, 3) [m] anchor point as seen from the platform's origin, base axes."""
         return self.table[..., ARM : ARM + 3]
-
-    @property
-    def force_by_rest(self) -> Array:
-        """(n, m, 3) [N/m] derivative of the force by the rest length."""
-        return self.table[..., BY_REST : BY_REST + 3]
-
-    @property
-    def tension_by_rest(self) -> Array:
-        """(n, m) [N/m] derivative of the tension by the rest length."""
-        return self.table[..., TENSION_BY_REST]
 
 
 def are_by_point(tables: Tables) -> bool:
@@ -79,31 +56,25 @@ def are_by_point(tables: Tables) -> bool:
     return not bool(np.any(heavy & over))
 
 
-def wrench_by_rest(rates: CableRates) -> Array:
-    """(n, 6, m) derivative of the wrench [N, N m] by each cable's rest length."""
-    force = rates.force_by_rest
-    return _wrench(force, cross(rates.arm, force))
+def wrench_by_rest(rates: CableRates, poses: Array) -> tuple[Array, Array]:
+    """Derivatives of the wrench (n, 6, m) [N, N m] and tension (n, m) by each rest length."""
+    n, m = rates.table.shape[:2]
+    still = np.zeros((m, 3))
+    return wrench_by_ends(rates, poses, still, still, np.ones((n, m)))
 
 
 def wrench_by_ends(
-    rates: CableRates, exit_moves: Array, anchor_moves: Array, longer: Array
+    rates: CableRates, poses: Array, exit_moves: Array, anchor_moves: Array, longer: Array
 ) -> tuple[Array, Array]:
     """Change of the wrench (n, 6, m) by each cable, and of its own tension (n, m).
 
     Args:
-        rates: of the cables.
-        exit_moves: (m, 3) how the exit points move. anchor_moves: (n, m, 3) the anchor points on
-            the platform; both in base axes.
+        rates: of the cables at the poses (n, 7).
+        exit_moves: (m, 3) how the exit points move, base axes. anchor_moves: (m, 3) the anchor
+            points, platform axes.
         longer: (n, m) how much longer the cables become.
     """
-    move = anchor_moves - exit_moves
-    force = rates.force_by_rest * longer[..., None]
-    force = force - (rates.stiffness @ move[..., None])[..., 0]
-    moment = cross(rates.arm, force) + cross(anchor_moves, rates.force)
-    tension = np.sum(rates.slope * move, axis=2) + rates.tension_by_rest * longer
-    return _wrench(force, moment), tension
-
-
-def _wrench(force: Array, moment: Array) -> Array:
-    """Forces and moments (n, m, 3) as wrenches (n, 6, m)."""
-    return np.swapaxes(np.concatenate([force, moment], axis=2), 1, 2)
+    n, m = longer.shape
+    wrench, tension = np.empty((n, 6, m)), np.empty((n, m))
+    wrench_by_ends_batch(rates.table, poses, exit_moves, anchor_moves, longer, wrench, tension)
+    return wrench, tension

@@ -20,14 +20,8 @@ from seecr.description.joints import motion_columns
 from seecr.effects.base import Effect, Readings
 from seecr.effects.checked import is_built_in
 from seecr.effects.terms import Terms
-from seecr.pose import (
-    Array,
-    pose_add,
-    quat_conjugate,
-    quat_multiply,
-    quat_rotate,
-    rotvec_from_quat,
-)
+from seecr.pose import Array
+from seecr.pose_rows import changes_between, moved_by
 from seecr.prediction.ends import CableRates, are_by_point, wrench_by_ends, wrench_by_rest
 from seecr.prediction.experiment import Experiment, Prediction, read, senses
 from seecr.prediction.shifts import OF_SHAPE, Shift, Sides, blocks_of_cables, positions, shifted
@@ -97,8 +91,7 @@ def length_sensitivities(at: Prediction) -> Array:
 
 
 def _by_length(at: Prediction) -> Array:
-    rates = cable_rates(at)
-    return _response_to_wrench(at, wrench_by_rest(rates), rates.tension_by_rest)
+    return _response_to_wrench(at, *wrench_by_rest(cable_rates(at), at.pose))
 
 
 def cable_rates(at: Prediction) -> CableRates:
@@ -152,7 +145,7 @@ def _read_apart(at: Prediction, sensors: Sequence[Effect], steps: Array) -> Arra
     change = np.repeat(steps, n, axis=0)
     pose, tensions = np.tile(at.pose, (k, 1)), np.tile(at.tensions, (k, 1))
     ahead, behind = (
-        read(sensors, at.setup, pose_add(pose, s * change[:, :6]), tensions + s * change[:, 6:])
+        read(sensors, at.setup, moved_by(pose, s * change[:, :6]), tensions + s * change[:, 6:])
         for s in (1.0, -1.0)
     )
     return np.moveaxis(0.5 * readings_difference(ahead, behind).reshape(k, n, width), 0, 2)
@@ -231,10 +224,11 @@ class _ByWrench:
         """Derivatives (n, 6 + m, m) by where each cable begins or ends, ``apart`` (m, 1)."""
         exits = (sides.plus.exit_points - sides.minus.exit_points) / apart
         anchors = (sides.plus.anchor_points - sides.minus.anchor_points) / apart
-        moved = quat_rotate(self.at.pose[:, None, 3:], anchors)
         longer = sides.longer(apart[:, 0])
-        wrench, own = wrench_by_ends(cable_rates(self.at), exits, moved, longer)
-        return _response_to_wrench(self.at, wrench, own)
+        rates = cable_rates(self.at)
+        return _response_to_wrench(
+            self.at, *wrench_by_ends(rates, self.at.pose, exits, anchors, longer)
+        )
 
     def _sides(self, shift: Shift) -> Sides:
         plus = self.experiment.setup(shift.plus.effects)
@@ -256,7 +250,7 @@ class _ByWrench:
             if not shift.physical:
                 return read(side.effects, at.setup, at.pose, at.tensions)
             step = (0.5 * sign * apart) * change
-            moved = pose_add(at.pose, step[:, :6])
+            moved = moved_by(at.pose, step[:, :6])
             return read(side.effects, at.setup, moved, at.tensions + step[:, 6:])
 
         return readings_difference(seen(shift.plus, 1.0), seen(shift.minus, -1.0)) / apart
@@ -405,7 +399,5 @@ def _walk_of(experiment: Experiment, at: Prediction, terms: Terms) -> batch.Eval
 
 def readings_difference(a: Readings, b: Readings) -> Array:
     """Readings a minus b, (n, 6 + m): position, rotation vector from b to a, tensions."""
-    turn = quat_multiply(a.quat_wxyz, quat_conjugate(b.quat_wxyz))
-    return np.concatenate(
-        [a.position - b.position, rotvec_from_quat(turn), a.tensions - b.tensions], axis=1
-    )
+    poses, before = (np.concatenate([one.position, one.quat_wxyz], axis=1) for one in (a, b))
+    return np.concatenate([changes_between(poses, before), a.tensions - b.tensions], axis=1)

@@ -37,7 +37,8 @@ from seecr.compiled.outcomes import (
 )
 from seecr.compiled.platform import add_skew, evaluate_batch
 from seecr.compiled.walk import change_on_the_way, walk_in_order
-from seecr.pose import Array, quat_conjugate, quat_multiply
+from seecr.pose import Array, quat_conjugate
+from seecr.pose_rows import deviated, products
 from seecr.statics.tables import Tables, take
 from seecr.threads import in_parts, run_parts
 
@@ -437,13 +438,11 @@ def put_evaluation(whole: Evaluation, rows: NDArray[np.integer], part: Evaluatio
 
 def platform_poses(tables: Tables, deviation: Array) -> Array:
     """Poses (n, 7) from deviations (n, 7) from the commanded ones."""
-    quat = quat_multiply(deviation[:, 3:], tables.poses[:, 3:])
-    quat = quat / np.linalg.norm(quat, axis=1, keepdims=True)
-    return np.concatenate([tables.poses[:, :3] + deviation[:, :3], quat], axis=1)
+    return deviated(tables.poses, deviation)
 
 
 def deviations(tables: Tables, poses: Array) -> Array:
     """Deviations (n, 7) of poses (n, 7) from the commanded ones."""
-    quat = quat_multiply(poses[:, 3:], quat_conjugate(tables.poses[:, 3:]))
+    quat = products(poses[:, 3:], quat_conjugate(tables.poses[:, 3:]))
     quat = np.where(quat[:, :1] < 0.0, -quat, quat)
     return np.concatenate([poses[:, :3] - tables.poses[:, :3], quat], axis=1)

@@ -25,7 +25,8 @@ from seecr.compiled.outcomes import (
 from seecr.counted import between, counted, rows_words
 from seecr.description.robot import Robot
 from seecr.errors import InputError
-from seecr.pose import Array, rotvec_from_quat
+from seecr.pose import Array
+from seecr.pose_rows import rotation_vectors
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics import batch
 from seecr.statics.inertia import mass_matrices
@@ -375,7 +376,7 @@ def certify(robot: Robot, tables: Tables, found: batch.Evaluation) -> Solution:
         evaluation=check,
         command=tables.poses,
         pose=_blank(batch.platform_poses(tables, moved), lost),
-        deviation=_blank(np.concatenate([moved[:, :3], rotvec_from_quat(turn)], axis=1), lost),
+        deviation=_blank(np.concatenate([moved[:, :3], rotation_vectors(turn)], axis=1), lost),
         tensions=_blank(check.states[..., TENSION], lost),
         slack=batch.is_slack(tables, check),
         rest_lengths=tables.cables[..., REST],

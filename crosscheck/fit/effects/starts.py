@@ -25,7 +25,8 @@ from crosscheck.fit.least_squares.state import State, derivatives, evaluate
 from seecr.compiled.outcomes import CONVERGED
 from seecr.effects import Term, Terms
 from seecr.effects.base import Effect, Layout
-from seecr.pose import Array, pose_add, pose_difference
+from seecr.pose import Array
+from seecr.pose_rows import changes_between, moved_by
 from seecr.prediction.experiment import Prediction
 from seecr.prediction.parted import PartedPrediction
 from seecr.prediction.sensitivity import motion_of, sensitivities, with_inverse
@@ -285,8 +286,8 @@ class _Forces:
         # the readings are freed of what the sensors add, by the model
         self.rows = rows & np.isfinite(read).all(axis=1)
         self.poses = at.pose.copy()
-        off = pose_difference(measured[self.rows], read[self.rows])
-        self.poses[self.rows] = pose_add(at.pose[self.rows], off)
+        off = changes_between(measured[self.rows], read[self.rows])
+        self.poses[self.rows] = moved_by(at.pose[self.rows], off)
 
     def terms(self, values: Array) -> Terms:
         """The model with the effect."""

@@ -24,13 +24,8 @@ from seecr.description.joints import locked
 from seecr.description.robot import Robot
 from seecr.effects import catalogue
 from seecr.effects.base import Readings
-from seecr.pose import (
-    Array,
-    quat_conjugate,
-    quat_multiply,
-    rotvec_from_quat,
-    rxyz_from_quat,
-)
+from seecr.pose import Array, quat_conjugate, rxyz_from_quat
+from seecr.pose_rows import products, rotation_vectors
 from seecr.prediction.experiment import Experiment, Prediction
 from seecr.prediction.parted import Parted, rates_by_length
 
@@ -122,7 +117,7 @@ class Problem:
         turned = data.angles_rad
         if data.quat_wxyz is not None:
             home = quat_conjugate(self.robot.reference_pose[3:])
-            turned = rotvec_from_quat(quat_multiply(data.quat_wxyz, home))
+            turned = rotation_vectors(products(data.quat_wxyz, home))
         for k, values in enumerate(np.concatenate([data.position, turned], axis=1).T):
             some = values[np.isfinite(values)]
             fixed[k] &= len(some) >= _ROWS and np.ptp(some) <= _ROUNDING
@@ -157,10 +152,8 @@ class Problem:
         """Measured minus predicted, (n, 6 + m), NaN where nothing was read."""
         data = self.data
         if data.quat_wxyz is not None:
-            turn = quat_multiply(data.quat_wxyz, quat_conjugate(readings.quat_wxyz))
-            turned = np.full((data.n_rows, 3), np.nan)
-            known = np.isfinite(turn).all(axis=1)
-            turned[known] = rotvec_from_quat(turn[known])
+            home = quat_conjugate(readings.quat_wxyz)
+            turned = rotation_vectors(products(data.quat_wxyz, home))
         elif self.uses_angles:
             turned = data.angles_rad - rxyz_from_quat(readings.quat_wxyz)
             turned = (turned + np.pi) % (2 * np.pi) - np.pi
