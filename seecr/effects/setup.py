@@ -196,7 +196,7 @@ class Setup:
         reference applies.
         """
         told = self.commanded_change
-        if np.any(self.backlash):
+        if self.backlash.any():
             told = play(told, self.commands.starts, 0.5 * self.backlash, self.commands.passed)
         paid = told * (1.0 + self.length_gain) + self.extra_length
         if self.commands.absolute:
@@ -251,7 +251,7 @@ class Setup:
     def has_history(self) -> bool:
         """Whether a row depends on the rows before it."""
         return any(
-            bool(np.any(getattr(self, name)))
+            bool(np.asarray(getattr(self, name)).any())
             for name, item in QUANTITIES.items()
             if item.history is History.GIVES
         )

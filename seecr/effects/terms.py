@@ -70,7 +70,7 @@ class Term:
 
     def with_vector(self, values: Array) -> Term:
         """The same effect with other values (p,); what is known of them stays."""
-        return replace(self, vector=values)
+        return Term(self.layout, values, self.knowledge, self.own)
 
     def fixed(self, *names: str) -> Term:
         """The same, its values never to be fitted: those of the named parameters, or all.

@@ -186,7 +186,7 @@ class Experiment:
     def setup(self, effects: Sequence[Effect], commands: Commands | None = None) -> Setup:
         """The setup as the effects leave it."""
         setup = self._edits_of(self.commands if commands is None else commands).by(effects)
-        if np.any(setup.backlash):
+        if setup.backlash.any():
             # backlash also depends on what the winches did on the way to the rows
             path = self.path
             setup.commands = path.given_turning if commands is None else path.turning

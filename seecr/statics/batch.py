@@ -150,7 +150,9 @@ def descend(
 
 def _refuse_no_length(tables: Tables, found: Evaluation) -> None:
     """Rows in which an effect leaves a cable no length have no result, whatever was computed."""
-    found.outcome[np.any(tables.cables[..., REST] <= 0.0, axis=1)] = NO_LENGTH
+    rest = tables.cables[..., REST]
+    if not rest.min(initial=np.inf) > 0.0:
+        found.outcome[(rest <= 0.0).any(axis=1)] = NO_LENGTH
 
 
 def motions(tables: Tables, at: Evaluation) -> Array:

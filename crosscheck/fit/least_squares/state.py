@@ -103,6 +103,8 @@ def _on_measured_branch(problem: Problem, state: State) -> State:
     data, at = problem.data, state.prediction
     if data.quat_wxyz is None or at.has_history or at.setup.laws or problem.robot.joints:
         return state
+    if at.solved.all() and np.abs(state.white).max(initial=0.0) <= _FAR_OFF**0.5:
+        return state  # as most are
     size = np.nansum(state.table**2, axis=1) / np.maximum(problem.measured.sum(axis=1), 1)
     whole = np.isfinite(data.position).all(axis=1) & np.isfinite(data.quat_wxyz).all(axis=1)
     rows = np.flatnonzero(problem.use & whole & ((size > _FAR_OFF) | ~at.solved))
@@ -140,12 +142,17 @@ def _compared(
     white = table[problem.counted]
     valid = bool(np.all(prediction.solved[problem.use])) and bool(np.all(np.isfinite(white)))
     chi2 = float(white @ white) if valid else np.inf
-    diagonal = np.log(np.diagonal(factor, axis1=1, axis2=2)) - np.log(problem.reading_sigma)
-    log_det = 2.0 * float(diagonal[problem.counted].sum()) if problem.sigma.length_m else 0.0
+    log_det = _log_det(problem, factor) if problem.sigma.length_m else 0.0
     return State(
         terms, prediction, raw, np.where(problem.measured, table, np.nan), white, factor,
         chi2, log_det, experiment,
     )  # fmt: skip
+
+
+def _log_det(problem: Problem, factor: Array) -> float:
+    """Of the counted rows' noise over that of the readings alone."""
+    diagonal = np.log(np.diagonal(factor, axis1=1, axis2=2)) - np.log(problem.reading_sigma)
+    return 2.0 * float(diagonal[problem.counted].sum())
 
 
 def _as_likely(problem: Problem, state: State, cost: Array) -> State:
