@@ -63,7 +63,7 @@ def test_what_thousands_of_starts_find_is_found() -> None:
         for pose in [*commands_of(robot, 5, random), HARD]:
             found = equilibria(robot, pose)
             assert found.converged.all() and np.all(np.diff(found.energy) >= 0)
-            rests = rests_of_starts(robot, pose, 3000, random)
+            rests = rests_of_starts(robot, pose, 1500, random)
             there += len(rests)
             lost += [(name, r) for r in rests if not same(robot, found.pose, r).any()]
     assert there > 90 and len(lost) <= 0.01 * there

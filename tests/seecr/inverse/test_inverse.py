@@ -26,6 +26,7 @@ from seecr.pose import pose_add, pose_difference
 from seecr.prediction.experiment import Experiment, Prediction, predict
 from seecr.workspace.zones import balance_equations, feasible
 
+MANY = ("hysteresis", "creep", "exit_friction", "backlash", "cable_weight")
 TENSION_ONLY = {"tracker_frame", "tracker_target", "tracker_scale", "tension_scale"}
 
 
@@ -469,7 +470,8 @@ def test_lengths_are_found_where_cables_slip_only_on_the_way(
 @pytest.mark.slow
 @pytest.mark.parametrize(("n", "names"), [
     (2000, ("hysteresis",)),
-    (400, ("hysteresis", "creep", "exit_friction", "backlash", "cable_weight")),
+    (100, MANY),
+    pytest.param(400, MANY, marks=pytest.mark.sweep),
 ])  # fmt: skip
 def test_lengths_that_go_to_and_fro_come_to_rest(n: int, names: tuple[str, ...]) -> None:
     """A tenth of the first was not reached; the second ended in an error of NumPy."""
