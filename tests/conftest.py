@@ -15,6 +15,10 @@ os.environ.setdefault("SEECR_PROCESSES", "1")
 import pytest
 from stale import forget_stale
 
+# tests, figures and parsed sources are many objects: to collect them took a quarter of the time of
+# what makes them
+gc.set_threshold(100_000, 50, 100)
+
 
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Forget what was compiled from older sources, before any worker starts to use it.
@@ -34,14 +38,8 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Six thousand tests and all modules stay: the garbage collector need not go through them.
-
-    Figures and parsed sources are many objects: to collect them took a quarter of the time of
-    what draws and parses.
-    """
-    gc.collect()
+    """Six thousand tests and all modules stay: the garbage collector need not go through them."""
     gc.freeze()
-    gc.set_threshold(100_000, 50, 100)
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:

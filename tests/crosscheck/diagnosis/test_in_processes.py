@@ -18,9 +18,7 @@ pytestmark = [
 ]
 
 ROBOT = load_robot(COGIRO)
-FEW = (
-    "pulley_radius", "gravity_tilt", "drum_gain", "length_scale", "hysteresis",
-)  # fmt: skip
+FEW = ("pulley_radius", "gravity_tilt", "drum_gain", "length_scale")
 
 
 def test_steps_with_rivals_are_the_same_to_the_last_bit(monkeypatch: pytest.MonkeyPatch) -> None:
