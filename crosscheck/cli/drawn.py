@@ -45,7 +45,7 @@ def _drawn(found: Comparison | Diagnosis, path: Path, made: Made) -> None:
 
 @contextmanager
 def _uncollected() -> Iterator[None]:
-    """Without garbage collection, which takes a seventh of the time of drawing."""
+    """Without garbage collection, which takes an eighth of the time of drawing."""
     before = gc.isenabled()
     gc.disable()
     try:

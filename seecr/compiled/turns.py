@@ -83,11 +83,12 @@ def add_rows(poses, changes, out):
 def deviate_rows(deviation, poses, out):
     """Poses (n, 7) that deviate from ``poses`` by displacements and quaternions (n, 7)."""
     for r in range(len(out)):
+        i, j = r % len(deviation), r % len(poses)
         for k in range(3):
-            out[r, k] = poses[r, k] + deviation[r, k]
+            out[r, k] = poses[j, k] + deviation[i, k]
         w, x, y, z = quaternion_product(
-            deviation[r, 3], deviation[r, 4], deviation[r, 5], deviation[r, 6],
-            poses[r, 3], poses[r, 4], poses[r, 5], poses[r, 6],
+            deviation[i, 3], deviation[i, 4], deviation[i, 5], deviation[i, 6],
+            poses[j, 3], poses[j, 4], poses[j, 5], poses[j, 6],
         )  # fmt: skip
         size = math.sqrt(w * w + x * x + y * y + z * z)
         out[r, 3], out[r, 4], out[r, 5], out[r, 6] = w / size, x / size, y / size, z / size

@@ -11,40 +11,12 @@ where dA and dB move the points, and M is the moment about the platform's origin
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from seecr.compiled.columns import (
-    ARM,
-    FORCE,
-    RADIUS,
-    WEIGHT,
-)
+from seecr.compiled.columns import RADIUS, WEIGHT
 from seecr.compiled.rates import wrench_by_ends_batch
 from seecr.pose import Array
 from seecr.statics.tables import Tables
-
-
-@dataclass(frozen=True, eq=False)
-class CableRates:
-    """What cables pull with at n poses, and how that changes.
-
-    Attributes:
-        table: (n, m, N_RATES), see :func:`seecr.statics.batch.rates_of_cables`.
-    """
-
-    table: Array
-
-    @property
-    def force(self) -> Array:
-        """(n, m, 3) [N] on the platform."""
-        return self.table[..., FORCE : FORCE + 3]
-
-    @property
-    def arm(self) -> Array:
-        """(n, m, 3) [m] anchor point as seen from the platform's origin, base axes."""
-        return self.table[..., ARM : ARM + 3]
 
 
 def are_by_point(tables: Tables) -> bool:
@@ -56,25 +28,26 @@ def are_by_point(tables: Tables) -> bool:
     return not bool(np.any(heavy & over))
 
 
-def wrench_by_rest(rates: CableRates, poses: Array) -> tuple[Array, Array]:
+def wrench_by_rest(rates: Array, poses: Array) -> tuple[Array, Array]:
     """Derivatives of the wrench (n, 6, m) [N, N m] and tension (n, m) by each rest length."""
-    n, m = rates.table.shape[:2]
+    n, m = rates.shape[:2]
     still = np.zeros((m, 3))
     return wrench_by_ends(rates, poses, still, still, np.ones((n, m)))
 
 
 def wrench_by_ends(
-    rates: CableRates, poses: Array, exit_moves: Array, anchor_moves: Array, longer: Array
+    rates: Array, poses: Array, exit_moves: Array, anchor_moves: Array, longer: Array
 ) -> tuple[Array, Array]:
     """Change of the wrench (n, 6, m) by each cable, and of its own tension (n, m).
 
     Args:
-        rates: of the cables at the poses (n, 7).
+        rates: (n, m, N_RATES) of the cables at the poses (n, 7), see
+            :func:`seecr.statics.batch.rates_of_cables`.
         exit_moves: (m, 3) how the exit points move, base axes. anchor_moves: (m, 3) the anchor
             points, platform axes.
         longer: (n, m) how much longer the cables become.
     """
     n, m = longer.shape
     wrench, tension = np.empty((n, 6, m)), np.empty((n, m))
-    wrench_by_ends_batch(rates.table, poses, exit_moves, anchor_moves, longer, wrench, tension)
+    wrench_by_ends_batch(rates, poses, exit_moves, anchor_moves, longer, wrench, tension)
     return wrench, tension

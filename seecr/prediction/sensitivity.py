@@ -22,7 +22,7 @@ from seecr.effects.checked import is_built_in
 from seecr.effects.terms import Terms
 from seecr.pose import Array
 from seecr.pose_rows import changes_between, moved_by
-from seecr.prediction.ends import CableRates, are_by_point, wrench_by_ends, wrench_by_rest
+from seecr.prediction.ends import are_by_point, wrench_by_ends, wrench_by_rest
 from seecr.prediction.experiment import Experiment, Prediction, read, senses
 from seecr.prediction.shifts import OF_SHAPE, Shift, Sides, blocks_of_cables, positions, shifted
 from seecr.statics import batch
@@ -94,10 +94,9 @@ def _by_length(at: Prediction) -> Array:
     return _response_to_wrench(at, *wrench_by_rest(cable_rates(at), at.pose))
 
 
-def cable_rates(at: Prediction) -> CableRates:
-    """What each cable pulls with at a prediction, and how that changes."""
-    made = _kept(at, "cable_rates", lambda at: batch.rates_of_cables(at.tables, at.found))
-    return CableRates(made)
+def cable_rates(at: Prediction) -> Array:
+    """What each cable pulls with at a prediction, and how that changes, (n, m, N_RATES)."""
+    return _kept(at, "cable_rates", lambda at: batch.rates_of_cables(at.tables, at.found))
 
 
 def read_by_length(at: Prediction) -> Array:

@@ -74,7 +74,22 @@ def test_rotation_vectors_are_as_by_numpy() -> None:
     )
 
 
-def test_one_row_is_for_all_and_shapes_are_kept() -> None:
+@pytest.mark.parametrize(("fast", "plain", "a", "b"), PAIRS)
+def test_one_row_is_for_all(
+    fast: Callable[..., Array], plain: Callable[..., Array], a: int, b: int
+) -> None:
+    one, other = poses(0)[:, a:], poses(1)[:, b : 3 if fast is rotated else 7]
+    for left, right in ((one[5:6], other), (one, other[5:6])):
+        np.testing.assert_allclose(fast(left, right), plain(left, right), rtol=0, atol=1e-14)
+
+
+def test_one_row_is_moved_by_all_changes_and_all_by_one() -> None:
+    changes = 0.3 * np.random.default_rng(2).normal(size=(len(ANGLES), 6))
+    for some, by in ((poses(0)[5:6], changes), (poses(0), changes[5:6])):
+        np.testing.assert_allclose(moved_by(some, by), pose_add(some, by), rtol=0, atol=1e-14)
+
+
+def test_shapes_are_kept() -> None:
     turn, places = poses(0)[5, 3:], poses(1)[:, :3]
     np.testing.assert_allclose(rotated(turn, places), quat_rotate(turn, places), atol=1e-14)
     pose = poses(0)[4]

@@ -10,6 +10,7 @@ from seecr.holding.balance import straight_balance
 from seecr.holding.distribution import distribute
 from seecr.holding.inside import can_balance, innermost
 from seecr.inverse.nearest.turned import turned_in_place
+from seecr.pose_rows import changes_between, moved_by, rotated
 from seecr.prediction.experiment import Experiment
 from seecr.prediction.sensitivity import sensitivities
 from seecr.statics.tables import assemble
@@ -41,6 +42,8 @@ def compile_rests() -> None:
     for name, values in EFFECTS.items():
         terms = seecr.Terms([seecr.Term.of(robot, name, **values)])
         sensitivities(experiment, terms, experiment.predict(terms.effects))
+    changes_between(moved_by(poses, np.zeros(6)), poses)
+    rotated(poses[:, 3:], poses[:, :3])
 
 
 def compile_margins() -> None:

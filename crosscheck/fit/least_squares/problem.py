@@ -152,8 +152,8 @@ class Problem:
         """Measured minus predicted, (n, 6 + m), NaN where nothing was read."""
         data = self.data
         if data.quat_wxyz is not None:
-            home = quat_conjugate(readings.quat_wxyz)
-            turned = rotation_vectors(products(data.quat_wxyz, home))
+            back = quat_conjugate(readings.quat_wxyz)
+            turned = rotation_vectors(products(data.quat_wxyz, back))
         elif self.uses_angles:
             turned = data.angles_rad - rxyz_from_quat(readings.quat_wxyz)
             turned = (turned + np.pi) % (2 * np.pi) - np.pi

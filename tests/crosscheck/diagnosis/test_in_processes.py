@@ -18,7 +18,10 @@ pytestmark = [
 ]
 
 ROBOT = load_robot(COGIRO)
-FEW = ("pulley_radius", "gravity_tilt", "drum_gain", "length_scale")
+FEW = (
+    "pulley_radius", "gravity_tilt", "stiffness", "drum_gain", "tracker_frame", "length_scale",
+    "cable_length_offset", "hysteresis",
+)  # fmt: skip
 
 
 def test_steps_with_rivals_are_the_same_to_the_last_bit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -26,7 +29,7 @@ def test_steps_with_rivals_are_the_same_to_the_last_bit(monkeypatch: pytest.Monk
         term(ROBOT, "pulley_radius", radius_m=0.006),
         term(ROBOT, "gravity_tilt", tilt_x_rad=0.03),
     ]
-    data = measured(ROBOT, hidden, points=8)
+    data = measured(ROBOT, hidden, points=10)
     alone = diagnose(ROBOT, data, only=FEW).as_json()
     assert {one["effect"] for one in alone["missing"]} == {"pulley_radius", "gravity_tilt"}
     forked = list[int]()

@@ -112,7 +112,7 @@ def test_threads_may_ask_at_once() -> None:
     wrong: list[float] = []
 
     def ask(first: int) -> None:
-        for k in range(2_500):
+        for k in range(4_000):
             one, other = pairs[(first + k) % 8], pairs[k % 8]
             found = edits.by([one[0], other[1]]).mass - base.mass
             if abs(found - one[0].added - other[1].added) > 1e-9:

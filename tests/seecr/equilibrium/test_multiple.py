@@ -55,7 +55,8 @@ def same(robot: Robot, poses: Array, one: Array) -> Array:
 
 
 @pytest.mark.slow
-def test_what_thousands_of_starts_find_is_found() -> None:
+@pytest.mark.parametrize("starts", [1500, pytest.param(3000, marks=pytest.mark.sweep)])
+def test_what_thousands_of_starts_find_is_found(starts: int) -> None:
     """All but one in a hundred: there are rests to which one start in 40,000 leads."""
     there, lost = 0, []
     for name in ("demobot_off_centre", "demobot_cogiro", "cogiro_large", "demobot_parallel"):
@@ -63,7 +64,7 @@ def test_what_thousands_of_starts_find_is_found() -> None:
         for pose in [*commands_of(robot, 5, random), HARD]:
             found = equilibria(robot, pose)
             assert found.converged.all() and np.all(np.diff(found.energy) >= 0)
-            rests = rests_of_starts(robot, pose, 1500, random)
+            rests = rests_of_starts(robot, pose, starts, random)
             there += len(rests)
             lost += [(name, r) for r in rests if not same(robot, found.pose, r).any()]
     assert there > 90 and len(lost) <= 0.01 * there

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from effect_cases import experiment_of, random_term
 
+from seecr.compiled.columns import ARM, FORCE
 from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.prediction import sensitivity
-from seecr.prediction.ends import CableRates, are_by_point
+from seecr.prediction.ends import are_by_point
 from seecr.prediction.experiment import Prediction
 from seecr.prediction.parted import forget
 from seecr.prediction.sensitivity import cable_rates, sensitivities
@@ -72,17 +73,19 @@ def test_what_a_prediction_forgot_is_computed_again(names: tuple[str, ...], froz
 def test_the_force_is_what_the_platform_is_held_with() -> None:
     at, _terms, _found = predicted("demobot_cogiro", LIGHT)
     rates = cable_rates(at)
-    assert np.linalg.norm(rates.force, axis=2) == pytest.approx(at.tensions, rel=1e-9)
+    force, arm = rates[..., FORCE : FORCE + 3], rates[..., ARM : ARM + 3]
+    assert np.linalg.norm(force, axis=2) == pytest.approx(at.tensions, rel=1e-9)
     weight, length = at.setup.mass * at.setup.gravity, at.setup.robot.length
     off = 1e-6 * float(np.linalg.norm(weight))
-    assert rates.force.sum(axis=1) == pytest.approx(np.tile(-weight, (6, 1)), abs=off)
-    moment = np.cross(rates.arm, rates.force).sum(axis=1)
+    assert force.sum(axis=1) == pytest.approx(np.tile(-weight, (6, 1)), abs=off)
+    moment = np.cross(arm, force).sum(axis=1)
     assert np.abs(moment).max() < off * length
 
 
 def test_a_row_whose_cables_cannot_be_solved_changes_nothing() -> None:
     at, _terms, _found = predicted("demobot_cogiro", HEAVY)
     at.found.deviation[2] = np.nan
-    rates = CableRates(batch.rates_of_cables(at.tables, at.found))
-    assert np.all(rates.table[2] == 0.0)
-    assert np.all(np.linalg.norm(rates.force[[0, 1, 3, 4, 5]], axis=2) > 0.0)
+    rates = batch.rates_of_cables(at.tables, at.found)
+    assert np.all(rates[2] == 0.0)
+    force = rates[[0, 1, 3, 4, 5], :, FORCE : FORCE + 3]
+    assert np.all(np.linalg.norm(force, axis=2) > 0.0)
