@@ -17,12 +17,12 @@ from seecr.lazy import lazily
 
 if TYPE_CHECKING:
     from crosscheck.add import Addition, add_effect, add_effects
-    from crosscheck.calibration.result import Calibrated, calibrate
+    from crosscheck.calibration import Calibrated, calibrate
     from crosscheck.comparison.limits import Limits, exceeded, load_limits
     from crosscheck.comparison.residuals import compare
     from crosscheck.comparison.result import Comparison
+    from crosscheck.diagnosis.diagnose import diagnose
     from crosscheck.diagnosis.result import Diagnosis, MissingEffect
-    from crosscheck.diagnosis.verdict import diagnose
     from crosscheck.errors import CrosscheckError, UnsolvedError
     from crosscheck.fit.noise.tolerance import Tolerance
     from crosscheck.fit.reasons import DiagnosisVerdict
@@ -48,12 +48,12 @@ if TYPE_CHECKING:
 # Imported when first used: SciPy, MuJoCo and the compiled loop take a while to load.
 _MODULES = {
     "add": ("Addition", "add_effect", "add_effects"),
-    "calibration.result": ("Calibrated", "calibrate"),
+    "calibration": ("Calibrated", "calibrate"),
     "comparison.limits": ("Limits", "exceeded", "load_limits"),
     "comparison.residuals": ("compare",),
     "comparison.result": ("Comparison",),
     "diagnosis.result": ("Diagnosis", "MissingEffect"),
-    "diagnosis.verdict": ("diagnose",),
+    "diagnosis.diagnose": ("diagnose",),
     "errors": ("CrosscheckError", "UnsolvedError"),
     "fit.noise.tolerance": ("Tolerance",),
     "fit.reasons": ("DiagnosisVerdict",),

@@ -28,8 +28,8 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 from rerun.experimental import ViewerClient
 
+from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.recording import write_case_recording, write_diagnosis_recording
 from crosscheck.report import write_page
 from crosscheck.suite.cases import Case, select, shipped_cases

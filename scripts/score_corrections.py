@@ -18,8 +18,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from crosscheck.calibration.result import calibrate
-from crosscheck.diagnosis.verdict import diagnose
+from crosscheck.calibration import calibrate
+from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.suite.poses import demobot_sweep
 from crosscheck.twin.make import make_twin
 from crosscheck.twin.measure import measure

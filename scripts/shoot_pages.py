@@ -16,7 +16,7 @@ from pathlib import Path
 import browser
 
 from crosscheck.comparison import compare
-from crosscheck.diagnosis.verdict import diagnose
+from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.planning import make_plan
 from crosscheck.report import write_page
 from crosscheck.twin.make import Twin, make_twin

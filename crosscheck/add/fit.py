@@ -2,37 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Protocol, TypeAlias, runtime_checkable
 
-import numpy as np
-
 from crosscheck.add.result import Addition
-from crosscheck.add.weigh import base_of, weigh, whiteness_of
+from crosscheck.add.weigh import weigh
 from crosscheck.errors import CrosscheckError, UnsolvedError
-from crosscheck.fit.effects.candidates import Trials, candidates_for, try_candidate
-from crosscheck.fit.effects.gauss_newton import Fit, fit
-from crosscheck.fit.least_squares.known import firmer
-from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.least_squares.state import State
-from crosscheck.fit.noise.outliers import outlying_rows, without_outliers
-from crosscheck.fit.preparation.prepare import Progress, prepare
-from crosscheck.fit.reasons import Why
+from crosscheck.fit.reasons import Refusal
 from crosscheck.given import GivenModel, GivenRobot, basis_of, model_of, robot_of
+from crosscheck.inference.catalogue import Catalogue, candidates
+from crosscheck.inference.fit import TRACKER, Data, Fit, fit, unfitted
+from crosscheck.inference.noise import Noise
+from crosscheck.inference.search import Search
 from crosscheck.measurements.read import GivenData, measurements_of
+from crosscheck.preparation.prepare import Progress, prepare
 from seecr.arguments import silent
 from seecr.description.robot import Robot
 from seecr.effects import ApartLayout, Own, Term, Terms, layout_of
 from seecr.effects.base import Layout
 from seecr.errors import InputError
-from seecr.pose import Array
 
-# Steps of a fit, and how often it may be continued after that many.
-_STEPS, _TIMES = 40, 2
-# Most times that outliers are looked for. A tracker that throws one row in ten far off has more
-# than that now and then; the diagnosis allows as many.
-_PASSES, _MOST_OUTLIERS = 3, 0.15
+# Prior width of values, in plausible sizes: the user knows that the effects are there.
+_WIDE = 10.0
 
 
 @runtime_checkable
@@ -46,9 +39,6 @@ class HasTerms(Protocol):
 
 GivenSeveral: TypeAlias = Iterable[Term | str] | str | HasTerms
 """Names of effects, effects with their values, or a result that has some."""
-
-Fitter: TypeAlias = Callable[[Problem, Terms, Array], Fit]
-"""Fits effects to a problem, given the effects of the model and the noise."""
 
 
 def add_effect(
@@ -78,12 +68,7 @@ def add_effect(
         UnsolvedError: rows have no equilibrium, or the fit does not converge.
     """
     robot = robot_of(robot)
-    layout = layout_of(name, robot)
-
-    def fitter(problem: Problem, terms: Terms, factor: Array) -> Fit:
-        return _fitted(problem, terms, layout, factor)
-
-    return _added(robot, data, [layout], model, progress, fitter, per)
+    return _added(robot, data, [], [layout_of(name, robot)], model, progress, per)
 
 
 def add_effects(
@@ -112,20 +97,7 @@ def add_effects(
     """
     robot = robot_of(robot)
     valued, named = _several(effects, robot)
-
-    def fitter(problem: Problem, terms: Terms, factor: Array) -> Fit:
-        every = {term.name: term for term in (*terms, *valued)}
-        known = {term.name: term for term in terms if term.knowledge.any}
-        start = Terms((every | known).values())
-        if not named:
-            return _to_the_end(problem, start, factor)
-        for layout in named:
-            best = _fitted(problem, start, layout, factor)
-            start = best.terms
-        return best
-
-    layouts = [*(term.layout for term in valued), *named]
-    return _added(robot, data, layouts, model, progress, fitter)
+    return _added(robot, data, valued, named, model, progress)
 
 
 def _several(effects: GivenSeveral, robot: Robot) -> tuple[list[Term], list[Layout]]:
@@ -152,70 +124,42 @@ def _several(effects: GivenSeveral, robot: Robot) -> tuple[list[Term], list[Layo
 
 
 def _added(
-    robot: GivenRobot, data: GivenData, layouts: Sequence[Layout],
-    model: GivenModel, progress: Progress, fitter: Fitter, per: str | None = None,
+    robot: Robot, given: GivenData, valued: Sequence[Term], named: Sequence[Layout],
+    model: GivenModel, progress: Progress, per: str | None = None,
 ) -> Addition:  # fmt: skip
-    robot = robot_of(robot)
-    data = measurements_of(data, robot)
+    data = measurements_of(given, robot)
     terms, said = model_of(model, robot)
-    names = [layout.name for layout in layouts]
-    had = terms.names
+    names, had = [*(t.name for t in valued), *(one.name for one in named)], terms.names
     if per is not None:
-        terms = Terms([*terms.without(names[0]), _apart(terms, layouts[0], per)])
+        terms = Terms([*terms.without(names[0]), _apart(terms, named[0], per)])
     ready = prepare(robot, data, terms)
-    problem, notes = ready.problem, [*said, *ready.all_notes]
+    what = " + ".join(names)
     if ready.refusal is not None:
-        kind = UnsolvedError if ready.refusal.unsolved else CrosscheckError
-        why = f"{ready.refusal}; {' + '.join(names)} was not fitted: {ready.refusal.remedy}"
-        raise kind(f"{data.path}: {why}")
-    terms = ready.terms
-    for layout in layouts:
-        _refuse(problem, layout)
-    progress(f"fitting {' + '.join(names)}", 0.0)
-    factor = problem.noise(problem.experiment.predict(terms.effects))
-    best = fitter(problem, terms, factor)
-    progress("looking for outliers", 0.4)
-    cleaned, best = _fitted_without_outliers(
-        problem, best, lambda some: fitter(some, terms, factor)
-    )
-    notes += cleaned.left_out[len(problem.left_out) :]
-    problem = cleaned
-    firmness = _firmness(problem, best)
-    if firmness > 1.0:
-        terms = firmer(terms, firmness)
-        best = fitter(problem, terms, factor)
+        raise _refused(f"{data.path}", ready.refusal, what)
+    _refuse_lacking(ready.problem.data.path, candidates(ready.problem), names)
+    progress(f"fitting {what}", 0.0)
+    adding = _Adding(Data.of(ready.problem, ready.terms), f"{data.path}")
+    best = adding.fitted(ready.terms, valued, named)
     progress("predicting held-out runs", 0.6)
     # effects that are free in the data were fitted in advance: they are not in the model before
-    before = terms.only(name for name in terms.names if name in had or name not in names)
-    return weigh(problem, before, names, factor, best, notes, basis_of(model, robot), firmness)
+    before = ready.terms.only(n for n in ready.terms.names if n in had or n not in names)
+    base = adding.without(best, names, before)
+    notes = [*said, *ready.all_notes]
+    return weigh(best, base, before, names, notes, basis_of(model, robot))
 
 
-def _fitted_without_outliers(
-    problem: Problem, best: Fit, again: Callable[[Problem], Fit]
-) -> tuple[Problem, Fit]:
-    """The problem without isolated outliers, and the fit to the rest of its rows.
-
-    One in ten rows may be far off, so that two neighbours now and then both are; one that is much
-    less so is seen without the other.
-    """
-    out = np.zeros(problem.data.n_rows, dtype=bool)
-    cleaned = problem
-    for _ in range(_PASSES):
-        more = outlying_rows(cleaned, best.state, _MOST_OUTLIERS, together=2)
-        if not more.any():
-            break
-        out |= more
-        cleaned = without_outliers(problem, out)
-        best = again(cleaned)
-    return cleaned, best
+def _refused(path: str, refusal: Refusal, what: str) -> CrosscheckError:
+    kind = UnsolvedError if refusal.unsolved else CrosscheckError
+    return kind(f"{path}: {refusal}; {what} was not fitted: {refusal.remedy}")
 
 
-def _firmness(problem: Problem, best: Fit) -> float:
-    """How much firmer than the data, compared with what is stated, independent values count."""
-    if not best.terms.knowledge.measured.any():
-        return 1.0
-    white = whiteness_of(problem, best)
-    return 1.0 if white.is_noise else white.inflation
+def _refuse_lacking(
+    path: object, every: Sequence[tuple[Layout, object]], names: Sequence[str]
+) -> None:
+    for layout, why in every:
+        if why is not None and layout.name in names:
+            words = getattr(why, "words", why)
+            raise CrosscheckError(f"{path}: {layout.name} cannot be fitted to these data: {words}")
 
 
 def _apart(terms: Terms, layout: Layout, kind: str) -> Term:
@@ -225,43 +169,97 @@ def _apart(terms: Terms, layout: Layout, kind: str) -> Term:
     return term if known else replace(term, own=Own(kind, {}))
 
 
-def _refuse(problem: Problem, layout: Layout) -> None:
-    reason = next(c.why_not for c in candidates_for(problem) if c.name == layout.name)
-    if reason is not None:
-        raise CrosscheckError(
-            f"{problem.data.path}: {layout.name} cannot be fitted to these data: {reason.words}"
+class _Adding:
+    """Fits of effects beside others, each from its most promising starts."""
+
+    def __init__(self, data: Data, path: str) -> None:
+        self.data, self.path = data, path
+
+    def fitted(self, terms: Terms, valued: Sequence[Term], named: Sequence[Layout]) -> Fit:
+        """The fit of a model with effects that have values, and others that are only named."""
+        every = {t.name: t for t in (*terms, *valued)}
+        known = {t.name: t for t in terms if t.knowledge.any}
+        start = Terms((every | known).values())
+        new = [one for one in named if not (one.name in start and _is_placed(start[one.name]))]
+        best = (
+            self._to_the_end(start, None, " + ".join(start.names))
+            if len(new) < len(named) or not new
+            else None
         )
+        for layout in new:
+            best = self._from_starts(start, layout)
+            start = best.terms
+        assert best is not None
+        return best
+
+    def without(self, best: Fit, names: Sequence[str], before: Terms) -> Fit:
+        """The model without the named effects, refitted if it has others."""
+        rest = before.only(n for n in before.names if n not in names)
+        if rest:
+            return self._to_the_end(rest, None, f"the model without {' + '.join(names)}")
+        return replace(unfitted(self.data, rest), noise=best.noise, weight=best.weight)
+
+    def _from_starts(self, terms: Terms, layout: Layout) -> Fit:
+        """The best fit with one more effect, from its present values and its promising starts."""
+        rest = terms.without(layout.name)
+        fits = []
+        if layout.name in terms:
+            fits.append(self._to_the_end(terms, None, layout.name))
+        considered = replace_considered(self.data, layout.name)
+        search = Search(considered, Catalogue.of(considered, rest))
+        key = search.stood | {layout.name}
+        if search.plain.valid:
+            base = search.begin()
+            scores = search.scores_about(base)
+            if layout.name in scores.about.columns:
+                search.fit(scores, key, _WIDE)
+            found = search.cache.get(key)
+            if found is not None:
+                fits.append(self._to_the_end(found.fit.terms, found.fit.state, layout.name))
+            # where another effect is missing, a fit from far off may give up one kind of readings
+            # to explain the others; beginning at nothing, with the noise that was, it does not
+            begun = base.fit.terms.with_term(Term(layout, layout.null))
+            if self.data.state(begun, base.fit.state).valid:
+                fits.append(self._to_the_end(begun, base.fit.state, layout.name, base.fit.noise))
+        if not fits:
+            raise UnsolvedError(
+                f"{self.path}: {layout.name} cannot be fitted to these data: no start of it has a "
+                "solution, or it moves no reading"
+            )
+        return min(fits, key=lambda one: one.cost)
+
+    def _to_the_end(
+        self, terms: Terms, near: State | None, what: str, noise: Noise | None = None
+    ) -> Fit:
+        """A fit from given values with exact derivatives, until it converges.
+
+        Raises:
+            UnsolvedError: rows have no solution, or the fit does not converge.
+        """
+        state = self.data.state(terms, near)
+        if not state.valid:
+            raise UnsolvedError(
+                f"{self.path}: {what}: some rows could not be solved at the start of the fit"
+            )
+        # a tracker's frame and what is free in the data have no plausible size: they stay as wide
+        sizeless = (TRACKER, *self.data.free)
+        widths = {name: _WIDE for name in terms.names if name not in sizeless}
+        found = fit(self.data, state, widths, noise=noise)
+        found = fit(replace(self.data, frozen=False), found.state, widths, noise=found.noise)
+        if not found.settled:
+            raise UnsolvedError(
+                f"{self.path}: the fit of {what} did not converge; nothing was added: find what "
+                "else is missing with crosscheck diagnose, or fix known values in the model"
+            )
+        return found
 
 
-def _fitted(problem: Problem, terms: Terms, layout: Layout, factor: Array) -> Fit:
-    """The best joint fit, from the effect's present values and its most promising starts."""
-    fits = [_to_the_end(problem, terms, factor)] if layout.name in terms else []
-    if fits and fits[0].valid and _is_placed(terms[layout.name]):
-        return fits[0]
-    base = base_of(problem, terms, [layout.name], factor)
-    tried = try_candidate(Trials(problem, factor), base, layout)
-    if tried.fit is not None:
-        fits.append(_to_the_end(problem, tried.fit.terms, factor, tried.fit.state))
-    good = [found for found in fits if found.valid]
-    if not good:
-        reason = tried.why_not
-        unsolved = reason is None or reason.why is Why.UNSOLVED
-        kind = UnsolvedError if unsolved else CrosscheckError
-        why = reason or fits[0].status.value
-        raise kind(f"{problem.data.path}: {layout.name} cannot be fitted to these data: {why}")
-    return min(good, key=lambda found: found.chi2)
+def replace_considered(data: Data, name: str) -> Data:
+    """The same data, on which one effect alone may be missing."""
+    problem = data.problem.considering(frozenset({name}))
+    return replace(data, problem=problem)
 
 
 def _is_placed(term: Term) -> bool:
     """Whether an independent measurement, or separate values, tell where to start the fit."""
     return term.knowledge.any or isinstance(term.layout, ApartLayout)
-
-
-def _to_the_end(problem: Problem, terms: Terms, factor: Array, near: State | None = None) -> Fit:
-    """A fit that is continued until it converges, a few times at most."""
-    found = fit(problem, terms, factor, near, iterations=_STEPS)
-    for _ in range(_TIMES):
-        if found.settled:
-            break
-        found = fit(problem, found.terms, factor, found.state, iterations=_STEPS)
-    return found

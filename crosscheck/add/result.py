@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from crosscheck.comparison.coloured import Coloured
-from crosscheck.fit.effects.evidence import FALSE_ALARM
 from crosscheck.fit.least_squares.problem import Rms
 from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
+from crosscheck.inference.priors import FALSE_ALARM
 from crosscheck.model.fitted import Fitted
 from crosscheck.units import with_error
 from seecr.counted import counted

@@ -6,24 +6,22 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from crosscheck.add.result import Addition
 from crosscheck.comparison.coloured import coloured_noise
-from crosscheck.errors import UnsolvedError
-from crosscheck.fit.effects.candidates import null_fit, seen_directions
 from crosscheck.fit.effects.contradictions import contradictions
-from crosscheck.fit.effects.evidence import FALSE_ALARM, p_value
-from crosscheck.fit.effects.gauss_newton import Fit, fit
-from crosscheck.fit.effects.held_out import HeldOut, hold_out, improves, pays, unfitted
 from crosscheck.fit.effects.nothing import distance_from_nothing, is_nothing
-from crosscheck.fit.effects.systematic import moved_together
-from crosscheck.fit.least_squares.known import firmer
-from crosscheck.fit.least_squares.problem import Problem, Rms, rms_by_kind
-from crosscheck.fit.least_squares.state import evaluate
-from crosscheck.fit.noise.whiteness import Whiteness, whiteness
+from crosscheck.fit.least_squares.problem import Rms, rms_by_kind
+from crosscheck.fit.noise.whiteness import whiteness
+from crosscheck.inference.catalogue import About, Catalogue
+from crosscheck.inference.fit import Fit, unfitted
+from crosscheck.inference.held_out import hold_out, improves, pays
+from crosscheck.inference.noise import outliers
+from crosscheck.inference.priors import FALSE_ALARM
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import provenance_of, renewed, with_fit
-from seecr.counted import counted, some
+from seecr.counted import some
 from seecr.description.robot import Robot
 from seecr.effects import Terms
 from seecr.pose import Array
@@ -34,51 +32,42 @@ _IMPLAUSIBLE = 5.0
 # Parameters with a larger correlation than this can hardly be determined separately.
 _CORRELATED = 0.95
 _MOST_NAMED = 4
-# Held-out runs are not predicted better than they are fitted, except by chance. If their chi2 is
-# below this part of the fit's, the fit has ended in a local minimum.
-_HOLLOW = 0.9
+# Another effect counts if it gains this part of what the best one does.
+_PART_OF_BEST = 0.5
 
 
 def weigh(
-    problem: Problem, terms: Terms, names: Sequence[str], factor: Array, best: Fit,
-    notes: Sequence[str], basis: Model, firmness: float = 1.0,
-) -> Addition:  # fmt: skip
+    best: Fit, base: Fit, terms: Terms, names: Sequence[str], notes: Sequence[str], basis: Model
+) -> Addition:
     """Judge what the named effects are worth in the best fit, against the model without them.
 
     Args:
-        problem: the data. terms: effects before. names: of the new ones. factor: of the noise.
-        best: the fit with all of them. notes: about the data. basis: the model to write into.
-        firmness: by how much independently measured values were made firmer for this fit
-            (:func:`crosscheck.fit.least_squares.known.firmer`).
-
-    Raises:
-        UnsolvedError: the fit did not converge, or ended in a local minimum.
+        best: the fit with all of them. base: the fit without them. terms: the model as it stood.
+        names: of the new effects. notes: about the data. basis: the model to write into.
     """
-    base = base_of(problem, terms, names, factor)
-    some_left = any(name not in names for name in terms.names)
-    without = hold_out(problem, base, factor) if some_left else unfitted(problem, base)
-    best, held = _out_of_hollows(problem, factor, best)
-    _refuse_unsettled(problem, names, best, held)
+    problem = best.data.problem
+    far = outliers(best.data.chain, best.weight, problem.data.n_rows)
+    if far.any():
+        best, base = best.with_far_off(far), base.with_far_off(far)
+        lines = problem.data.lines_of(far)
+        notes = [*notes, f"outliers, given little weight and not included in these errors: {lines}"]
+        problem = best.data.problem
+    without, held = hold_out(base), hold_out(best)
     own = np.isin([effect for effect, _key in best.terms.labels], list(names))
-    white = whiteness_of(problem, best)
+    near = best.state.white[~far[problem.row_of]]
+    white = whiteness(problem.only(~far), near, int(best.seen.sum()))
+    factor = best.data.factor
     coloured = None if white.is_noise else coloured_noise(problem, best.state, factor)
     noise = white.is_noise or (coloured is not None and not coloured.open)
-    # standard errors are too small if the noise is larger than stated or autocorrelated, and also
-    # if another effect is still missing
-    moved = np.zeros_like(best.covariance) if noise else moved_together(problem, best)
-    inflation = max(white.inflation, firmness)
-    known = firmer(best.terms, 1.0 / firmness)
-    covariance = _no_wider(known, inflation**2 * best.covariance + moved)
-    fitted = _split(known, best, np.sqrt(np.diag(covariance)))
-    # autocorrelated noise looks like an effect more easily than white noise of its size
-    larger = max(1.0, white.scale) if coloured is None else white.inflation
-    drop = (base.chi2 - best.chi2) / larger**2
-    p = p_value(drop, seen_directions(best, own), False)
+    # standard errors are too small if another effect is still missing
+    moved = np.zeros_like(best.covariance) if noise else _moved_together(best)
+    covariance = _no_wider(best.terms, best.covariance + moved)
+    fitted = _split(best.terms, best, np.sqrt(np.diag(covariance)))
+    drop = best.metric.power(base.left) - best.metric.power(best.left)
+    p = float(special.chdtrc(max(int((best.seen & own).sum()), 1), max(drop, 0.0)))
     distance, count = distance_from_nothing(best.terms, covariance, own)
-    before, after = (
-        rms_by_kind(problem, evaluate(problem, terms, factor).raw),
-        rms_by_kind(problem, best.state.raw),
-    )
+    stood = unfitted(best.data, terms)
+    before, after = rms_by_kind(problem, stood.state.raw), rms_by_kind(problem, best.state.raw)
     errors = {"before": before, "after": after, "held_out": held.rms}
     return Addition(
         names=tuple(names),
@@ -99,64 +88,42 @@ def weigh(
             *_widened(best, np.sqrt(np.diag(moved)), own),
         ),
         notes=tuple(dict.fromkeys(notes)),
-        model=_model(problem, basis, fitted, names, errors, best.with_idle(covariance)),
+        model=_model(best, basis, fitted, names, errors, covariance),
     )
+
+
+def _moved_together(best: Fit) -> Array:
+    """How far values would move together if another effect were in the model (omitted variables).
+
+    If a fit leaves structure, something else acts, and the fitted values have absorbed what it has
+    in common with them. The catalogue shows how much that may be.
+
+    Returns:
+        The covariance (p, p) of the moves by the effects that explain most of the remainder, at
+        most as large as the largest.
+    """
+    about = About(Catalogue.of(best.data, best.terms), best)
+    every = [about.moves(k) for k in about.columns if k in about.promises]
+    most = max((gain for gain, _move in every), default=0.0)
+    some = [move for gain, move in every if gain > _PART_OF_BEST * most > 0.0]
+    if not some:
+        return np.zeros((len(best.terms), len(best.terms)))
+    moves = np.array(some)
+    largest, power = np.abs(moves).max(axis=0), np.sqrt((moves**2).sum(axis=0))
+    alike = moves * np.divide(largest, power, out=np.zeros_like(power), where=power > 0.0)
+    return np.asarray(alike.T @ alike)
 
 
 def _model(
-    problem: Problem, basis: Model, fitted: Sequence[Fitted], names: Sequence[str],
+    best: Fit, basis: Model, fitted: Sequence[Fitted], names: Sequence[str],
     errors: Mapping[str, Rms], covariance: Array,
 ) -> Model:  # fmt: skip
     """The new model; effects that neither it had nor ``names`` has are new as well."""
+    problem = best.data.problem
     source = provenance_of(problem.data.name, f"crosscheck add {' + '.join(names)}")
     fresh = [f.term.name for f in fitted if f.term.name not in (*basis.names, *names)]
-    new = with_fit(basis, fitted, [*names, *fresh], source, errors, covariance)
+    new = with_fit(basis, fitted, [*names, *fresh], source, errors, best.with_idle(covariance))
     return renewed(new, problem.robot, problem.data)
-
-
-def base_of(problem: Problem, terms: Terms, names: Sequence[str], factor: Array) -> Fit:
-    """The model without the named effects, refitted."""
-    rest = Terms(term for term in terms if term.name not in names)
-    base = null_fit(problem, rest, factor, refit=bool(rest))
-    if not base.valid:
-        why = base.status.value
-        raise UnsolvedError(f"{problem.data.path}: the model without {' + '.join(names)}: {why}")
-    return base
-
-
-def _out_of_hollows(problem: Problem, factor: Array, best: Fit) -> tuple[Fit, HeldOut]:
-    """The fit and its held-out errors; if these hint at a local minimum, refitted from a fold."""
-    held = hold_out(problem, best, factor)
-    if not _hollow(best, held):
-        return best, held
-    k = int(np.argmin(held.chi2 / np.maximum(held.readings, 1.0)))
-    other = fit(problem, best.terms.with_vector(held.values[k]), factor, best.state)
-    if not (other.valid and other.chi2 < best.chi2):
-        return best, held
-    return other, hold_out(problem, other, factor)
-
-
-def _hollow(best: Fit, held: HeldOut) -> bool:
-    return held.valid and float(held.chi2.sum()) < _HOLLOW * best.chi2
-
-
-def _refuse_unsettled(problem: Problem, names: Sequence[str], best: Fit, held: HeldOut) -> None:
-    if best.valid and best.settled and not _hollow(best, held):
-        return
-    why = "ended in a local minimum: held-out runs are predicted better than they are fitted"
-    if not best.valid:
-        why = f"failed, as {best.status.value}"
-    elif not best.settled:
-        why = f"did not converge in {counted(best.iterations, 'step')}"
-    raise UnsolvedError(
-        f"{problem.data.path}: the fit of {' + '.join(names)} {why}; nothing was added: find what "
-        "else is missing with crosscheck diagnose, or fix known values in the model"
-    )
-
-
-def whiteness_of(problem: Problem, found: Fit) -> Whiteness:
-    """Test the residuals of a fit."""
-    return whiteness(problem, found.state.white, int(np.sum(np.isfinite(found.stderr))))
 
 
 def _no_wider(terms: Terms, covariance: Array) -> Array:

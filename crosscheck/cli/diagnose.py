@@ -99,7 +99,7 @@ def command(
         text = json_text({"made": made, "robot": fingerprint(machine), **found.as_json()})
         write_text(folder / "diagnosis.json", text + "\n")
         with page_beside(found, folder / "diagnosis.html", made, figures):
-            if not no_recording and found.search is not None:
+            if not no_recording and found.path is not None:
                 from crosscheck.recording import write_diagnosis_recording
 
                 write_diagnosis_recording(found, folder / "diagnosis.rrd")

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.calibration.joint_fit.joint import JointFit, Setting
-from crosscheck.calibration.noise.colour import WHITE, chain_of
-from crosscheck.calibration.noise.restricted import estimate
-from crosscheck.calibration.noise.robust import outliers, row_weights
-from crosscheck.calibration.unknown.beside import unknown_beside
-from crosscheck.calibration.unknown.not_noise import is_not_noise
+from crosscheck.comparison.outliers import side_by_side
 from crosscheck.fit.least_squares.problem import Problem, kinds_stated
 from crosscheck.fit.least_squares.state import State
+from crosscheck.inference.evidence import Linear, MemberColumns, averaged
+from crosscheck.inference.fields import fields_about
+from crosscheck.inference.fit import Data, fit
+from crosscheck.inference.noise import NoisePrior, chain_of, outliers
+from crosscheck.inference.priors import FIELD_WIDTHS, MAY_BE_UNKNOWN, UNKNOWN
 from seecr.counted import counted
 from seecr.effects import Terms
 from seecr.pose import Array
@@ -67,21 +67,32 @@ def coloured_noise(problem: Problem, state: State, factor: Array) -> Coloured | 
     if not state.valid or problem.n_readings < _LEAST_READINGS:
         return None
     stated = [kind.name for kind in kinds_stated(problem)]
-    setting = Setting(problem, factor, chain_of(problem))
-    weight = row_weights(setting.chain, WHITE, state.white)
-    none, blank = np.zeros(0), np.zeros((len(state.white), 0))
-    colour = estimate(setting.chain, WHITE, weight, blank, state.white, none)
-    weight = row_weights(setting.chain, colour, state.white)
-    left = JointFit(state.of(Terms()), blank, none, colour, weight, settled=True)
-    scale, rho = colour.by_kind(problem)
+    data = Data(problem, factor, chain_of(problem))
+    left = fit(data, state.of(Terms(term.fixed() for term in state.terms)))
+    scale, rho = left.noise.by_kind(problem)
     if any(scale[name] > _LARGER * _too_small(name in stated, rho[name]) for name in scale):
         return None
-    if is_not_noise(setting, left, stated):
+    if NoisePrior.of(problem).is_unknown(left.noise) > MAY_BE_UNKNOWN:
         return None
-    if unknown_beside(setting, left, len(stated) == len(scale)).is_there:
+    every = fields_about(left)
+    kinds = [what for what, _columns in every]
+    odds = [
+        _log_odds(left.white, left.metric.white(columns))
+        - np.log(len(set(kinds))) - np.log(kinds.count(what))
+        for what, columns in every
+    ]  # fmt: skip
+    if odds and float(np.logaddexp.reduce(odds)) + UNKNOWN > 0.0:
         return None
-    far = int(outliers(setting.chain, weight, problem.data.n_rows).sum())
-    return Coloured(scale, rho, far, any(size > _LARGER for size in scale.values()))
+    far = outliers(data.chain, left.weight, problem.data.n_rows)
+    if side_by_side(problem, far):
+        return None
+    return Coloured(scale, rho, int(far.sum()), any(size > _LARGER for size in scale.values()))
+
+
+def _log_odds(left: Array, columns: Array) -> float:
+    """ln odds of a field beside nothing, both whitened, with equal priors."""
+    group = MemberColumns(np.arange(columns.shape[1]), np.array(FIELD_WIDTHS))
+    return averaged(Linear.of(columns, left, {"field": group}).solved({}).gains("field"))
 
 
 def _too_small(stated: bool, rho: float) -> float:

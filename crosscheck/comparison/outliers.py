@@ -12,24 +12,20 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.calibration.joint_fit.joining import layouts
-from crosscheck.calibration.joint_fit.joint import Setting, tempered
-from crosscheck.calibration.joint_fit.stages import start_of, with_noise
-from crosscheck.calibration.linear_evidence.priors import widths_of
-from crosscheck.calibration.noise.colour import chain_of
-from crosscheck.calibration.noise.robust import outliers
-from crosscheck.calibration.unknown.not_noise import outliers_cluster
 from crosscheck.fit.least_squares.problem import Problem
-from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.fit.noise.outliers import outlying_rows
-from seecr.effects import Term, Terms
+from crosscheck.inference.catalogue import Catalogue
+from crosscheck.inference.fit import Data
+from crosscheck.inference.noise import outliers
+from crosscheck.inference.search import Search
+from seecr.effects import Terms
 
 # A fit of more rows takes too long for a comparison; fewer readings do not carry one.
 _MOST_ROWS, _LEAST_READINGS = 400, 60
 
 
 def rows_far_off(problem: Problem, terms: Terms) -> NDArray[np.bool_]:
-    """(n,) outliers; none if too many are, or neighbours of each other: they are structure then.
+    """(n,) outliers; none if too many are: they are structure then.
 
     Of more than 400 rows, and of too few readings, those that are far off the others as they are.
 
@@ -37,21 +33,24 @@ def rows_far_off(problem: Problem, terms: Terms) -> NDArray[np.bool_]:
         problem: the data with their noise. terms: the model as it stands.
     """
     every = problem.data.n_rows
+    none = np.zeros(every, dtype=bool)
     if not problem.n_readings:
-        return np.zeros(every, dtype=bool)
-    factor = problem.noise(problem.experiment.predict(terms.effects))
-    state = evaluate(problem, terms, factor)
+        return none
+    data = Data.of(problem, terms)
+    state = data.state(terms)
     if not state.valid or not outlying_rows(problem, state, 1.0, every).any():
-        return np.zeros(every, dtype=bool)
+        return none
     if every > _MOST_ROWS or problem.n_readings < _LEAST_READINGS:
         return outlying_rows(problem, state)
-    setting = Setting(problem, factor, chain_of(problem), frozen=True)
-    absent = Terms(Term(layout, layout.null) for layout in layouts(problem)[0])
-    start = start_of(setting, terms, absent)
-    if not start.valid:
-        return outlying_rows(problem, state)
-    joint = with_noise(setting, tempered(setting, start, widths_of(start.terms, setting.free)))
-    if outliers_cluster(setting, joint):
-        return outlying_rows(problem, joint.state)
-    far = outlying_rows(problem, joint.state, 1.0, every)
-    return far & outliers(setting.chain, joint.weight, every)
+    whole = Search(data, Catalogue.of(data, terms)).everything.fit
+    far = outlying_rows(problem, whole.state, 1.0, every) & outliers(
+        data.chain, whole.weight, every
+    )
+    return outlying_rows(problem, whole.state) if side_by_side(problem, far) else far
+
+
+def side_by_side(problem: Problem, far: NDArray[np.bool_]) -> bool:
+    """Whether rows that are far off follow one another more often than not: they are structure."""
+    run = problem.data.run_index
+    beside = far[1:] & far[:-1] & (run[1:] == run[:-1])
+    return bool(2 * beside.sum() > far.sum() > 1)

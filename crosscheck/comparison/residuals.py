@@ -18,11 +18,11 @@ from crosscheck.fit.effects.contradictions import contradictions
 from crosscheck.fit.least_squares.problem import Problem, Rms, kinds_read, rms_by_kind
 from crosscheck.fit.least_squares.state import State, evaluate
 from crosscheck.fit.noise.whiteness import as_table, whiteness
-from crosscheck.fit.preparation.prepare import Prepared, noise_floor, prepare
 from crosscheck.fit.words import rms_words
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
 from crosscheck.measurements.data import Names
 from crosscheck.measurements.read import GivenData, measurements_of
+from crosscheck.preparation.prepare import Prepared, noise_floor, prepare
 
 _MOST_WORST = 10
 

@@ -7,23 +7,20 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.calibration.sets.linear_search import Names
-from crosscheck.calibration.unknown.varying import Varying
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.quantities import QuantityKind
+from crosscheck.diagnosis.path import ModelPath
 from crosscheck.diagnosis.result import MissingEffect
-from crosscheck.diagnosis.search import Search
 from crosscheck.fit.reasons import DiagnosisVerdict
-from crosscheck.measurements.data import Measurements
+from crosscheck.inference.fields import Varying
 from crosscheck.planning.adding import Extension
-from crosscheck.planning.deciding import telling_models_apart
 from crosscheck.planning.extensions import extensions
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.proposer import Gain, Suggestion, telling_apart
 from crosscheck.planning.words import signal_words
 from crosscheck.units import in_unit, parameter_name
 from seecr.description.robot import Robot
-from seecr.effects import Term, Terms, catalogue
+from seecr.effects import Term, catalogue
 from seecr.pose import Array, rotvec_from_quat
 from seecr.units import with_error
 
@@ -151,57 +148,36 @@ _ALL_AT_ONCE = (
 )
 
 
-NO_OTHERS: Mapping[Names, Terms] = {}
-_WHICH = "to find out which effects are missing:"
-
-
 def measure_next(
-    found: Search,
+    path: ModelPath,
     missing: Sequence[MissingEffect],
     verdict: DiagnosisVerdict,
     where: Sequence[Association],
-    alternatives: Mapping[Names, Terms] = NO_OTHERS,
     seen: Sequence[Varying] = (),
 ) -> list[str]:
     """What to measure to tell effects apart, confirm or find them, a sentence each.
 
     Args:
-        found: the search that leads to what is missing.
+        path: the models that lead to what is missing.
         missing, verdict, where: as in the diagnosis.
-        alternatives: sets of effects of which one is missing, with the model that has it.
-        seen: what something unknown may change, if effects imitate it.
+        seen: what something unknown may change.
     """
-    out = []
-    plan = Planned(found.problem, found.last.fit, found.factor, Reads.of(found.problem.data))
-    is_open = any(effect.rivals for effect in missing) or len(alternatives) > 1
-    options = list(extensions(plan)) if is_open else []
+    out, data = list[str](), path.problem.data
+    plan = Planned(path.problem, path.last.state, path.search.data.factor, Reads.of(data))
+    options = list(extensions(plan)) if any(effect.rivals for effect in missing) else []
     for effect in missing:
         out += _to_separate(plan, options, effect)
         if not effect.rivals:
             out.append(effect.confirmation)
-        if effect.common is not None:
-            out.append(effect.common.advice)
-    if len(alternatives) > 1 or (alternatives and verdict is DiagnosisVerdict.MANY_EFFECTS):
-        ways = telling_models_apart(plan, options, list(alternatives.values()))
-        out += [f"{_WHICH} {way.words} {_signal({'': way.gains[0]})}" for way in ways[:_MOST_WAYS]]
-        out += _to_decide(list(alternatives))
     if verdict is DiagnosisVerdict.MANY_EFFECTS:
         out.append(_CALIBRATE)
     if verdict in (DiagnosisVerdict.MANY_EFFECTS, DiagnosisVerdict.UNKNOWN_EFFECT):
         out += [f"to find {what}: {what.advice}" for what in seen if what.advice]
     if verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
-        out += [_to_find(where), *_set_up_anew(found.problem.data, where), _ALL_AT_ONCE]
+        out += [_to_find(where), _ALL_AT_ONCE]
     if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         out.append("nothing that matters is missing; to find smaller effects, use crosscheck plan")
     return list(dict.fromkeys(out))
-
-
-def _to_decide(alternatives: Sequence[Names]) -> list[str]:
-    """Checks by hand of effects that some of the sets have and not all; of all if it is one set."""
-    every, always = frozenset().union(*alternatives), frozenset.intersection(*alternatives)
-    return [
-        f"{_WHICH} {measured_directly(name)} ({name})" for name in sorted(every - always or every)
-    ]
 
 
 def measured_directly(effect: str) -> str:
@@ -282,17 +258,6 @@ _FIRST = {
     QuantityKind.TIME: _TIME,
     QuantityKind.TEMPERATURE: _TIME,
 }
-
-
-def _set_up_anew(data: Measurements, where: Sequence[Association]) -> list[str]:
-    """How files may have frames of the tracker of their own, if errors go with the run."""
-    goes = any(one.kind is QuantityKind.RUN and one.significant for one in where)
-    if not goes or len(data.files) < 2 or "tracker_frame" in data.free:
-        return []
-    return [
-        "if the tracker was set up anew between the files, its frame may differ: write free = "
-        '["tracker_frame"] into the TOML beside all of them but one, and diagnose again'
-    ]
 
 
 def _to_find(where: Sequence[Association]) -> str:

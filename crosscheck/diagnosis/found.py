@@ -1,94 +1,335 @@
-"""The model that a diagnosis ends with: its previous effects and the missing ones, together."""
+"""Puts what a search found into a diagnosis: what is listed, what is not and why, what is left."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
+from dataclasses import replace
 
-from crosscheck.diagnosis.result import Diagnosis, MissingEffect
-from crosscheck.diagnosis.steps import shown_stages
-from crosscheck.fit.effects.gauss_newton import Fit
-from crosscheck.fit.effects.systematic import moved_by_others
-from crosscheck.fit.reasons import DiagnosisVerdict
-from crosscheck.model.fitted import Fitted
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.calibration import JointErrors
+from crosscheck.comparison.associations import Association, associations
+from crosscheck.diagnosis.advice import check_of, measure_next
+from crosscheck.diagnosis.model import refitted_names, with_found
+from crosscheck.diagnosis.path import ModelPath, path_to
+from crosscheck.diagnosis.result import (
+    PROBABLE,
+    Chances,
+    Diagnosis,
+    MissingEffect,
+    NotListed,
+    Rival,
+)
+from crosscheck.diagnosis.words import noise_notes, sentence_of, size_notes
+from crosscheck.fit.effects.contradictions import contradictions
+from crosscheck.fit.least_squares.problem import KINDS, Problem, Rms, rms_by_kind
+from crosscheck.fit.noise.tolerance import LeftOver, Tolerance, doubt_of, remainder_of
+from crosscheck.fit.noise.unstated import overestimated
+from crosscheck.fit.noise.whiteness import whiteness
+from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
+from crosscheck.fit.words import shown
+from crosscheck.inference.catalogue import name_of
+from crosscheck.inference.fields import detectable_size
+from crosscheck.inference.fit import Fit
+from crosscheck.inference.hypothesis import Hypothesis
+from crosscheck.inference.noise import outliers
+from crosscheck.inference.priors import SURE
+from crosscheck.inference.search import Search
+from crosscheck.inference.verdict import Judgement
+from crosscheck.planning.sight import Sight
+from crosscheck.preparation.prepare import noise_floor
+from crosscheck.units import parameter_name
+from seecr.effects import effect_named
 from seecr.pose import Array
 from seecr.prediction.model import Model
 
-__all__ = ["found_covariance", "found_effects", "refitted"]
+# Most quantities that the unexplained part is said to be associated with, and fields named.
+_MOST_WHERE, _MOST_FIELDS = 5, 3
+# What is less probable is outside an interval of 95 % whatever it does to a value.
+_MATTERS = 1.0 - SURE
 
 
-def found_effects(found: Diagnosis) -> tuple[Fitted, ...]:
-    """All effects of the model and those that are listed, fitted together.
+def diagnosis_of(
+    search: Search, said: Judgement, notes: Sequence[str], sight: Sight, tolerance: Tolerance,
+    basis: Model,
+) -> Diagnosis:  # fmt: skip
+    """The diagnosis that follows from a judgement.
 
-    Empty if there is no verdict. Where more is missing than is listed, the values are those with
-    which the listed effects explain most by themselves, and not those listed, which are nearer to
-    the truth beside the rest and make no model without it. Their standard errors then include by
-    how much another missing effect may shift them, as those of ``crosscheck add`` do.
+    Args:
+        search, said: the search, and what may be said of it. notes: notes about the data.
+        sight: what these data can show. tolerance: from where on a remainder matters.
+        basis: the model as it was given.
     """
-    if found.search is None:
-        return ()
-    step = shown_stages(found)[1].step
-    best, stderr = step.fit, _widened(found) * step.fit.stderr
-    if found.verdict is DiagnosisVerdict.MANY_EFFECTS and not step.whiteness.is_noise:
-        # a fit of its own knows nothing of what else is missing
-        moved = moved_by_others(found.search.problem, best)
-        stderr = np.hypot(step.whiteness.inflation * stderr, moved)
-    listed = [_by_itself(one, best, stderr) for one in found.missing]
-    names = {one.term.name for one in listed}
-    own = [(term, best.terms.part(term.name)) for term in best.terms if term.name not in names]
-    had = [Fitted(term, stderr[part], best.at_bound[part]) for term, part in own]
-    return (*had, *listed)
+    problem = search.data.problem
+    far = outliers(search.data.chain, search.best.fit.weight, problem.data.n_rows)
+    alone = said.verdict is DiagnosisVerdict.EFFECTS_FOUND
+    path = _without_outliers(path_to(search, said.sure, alone), far)
+    chances, floor = _chances(search, said), _floor(search, said)
+    missing = _missing(search, said, path)
+    unknown = said.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
+    last = path.last
+    white = whiteness(problem, last.state.white, int(last.fit.seen.sum()))
+    where: tuple[Association, ...] = ()
+    if unknown:
+        where = tuple(associations(problem, last.fit.white, last.state.prediction)[:_MOST_WHERE])
+    left = _left(path, search.best, floor, tolerance, white.lag)
+    verdict = said.verdict
+    if unknown and not left.important and not left.undecided:
+        some, none = DiagnosisVerdict.EFFECTS_FOUND, DiagnosisVerdict.NO_EFFECT_MISSING
+        verdict = some if missing else none
+    large = [search.best.fit.terms[name_of(k)] for k in said.implausible]
+    doubts = _contradicted(search, missing, verdict)
+    more = (
+        *contradictions(t for t in last.fit.terms if t.name not in doubts),
+        *doubts.values(),
+        *notes,
+        *([] if unknown else noise_notes(search.best.fit, far)),
+        *size_notes(large),
+        *overestimated(problem, last.rms),
+    )
+    out = Diagnosis(
+        verdict=verdict,
+        sentence=sentence_of(
+            said, missing, path, chances, left if verdict is not said.verdict else None
+        ),
+        missing=tuple(missing),
+        before=path.first.rms,
+        after=last.rms,
+        held_out=last.held_out.rms,
+        floor=floor,
+        candidates=tuple(_not_listed(search, said, missing)),
+        measure_next=tuple(
+            measure_next(path, missing, verdict, where, chances.seen if unknown else ())
+        ),
+        notes=tuple(dict.fromkeys(more)),
+        path=path,
+        whiteness=white,
+        where=where,
+        left=left,
+        chances=chances,
+        sight=sight,
+    )
+    return replace(
+        out, model=with_found(out, basis), refitted=refitted_names(out, basis),
+    )  # fmt: skip
 
 
-def _by_itself(listed: MissingEffect, best: Fit, stderr: Array) -> Fitted:
-    """A listed effect with its values and errors (p,) in the fit of just the listed effects."""
-    if listed.effect not in best.terms:
-        return Fitted(listed.term, listed.stderr, listed.at_bound)
-    part = best.terms.part(listed.effect)
-    error = np.maximum(stderr[part], listed.stderr)
-    return Fitted(best.terms[listed.effect], error, best.at_bound[part])
+def _contradicted(
+    search: Search, missing: Sequence[MissingEffect], verdict: DiagnosisVerdict
+) -> dict[str, str]:
+    """Notes, by effect of the model, where known values explain less than others would.
+
+    A wrong value that no fit may change is a missing effect in disguise: others are found in its
+    place.
+    """
+    out = dict[str, str]()
+    if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
+        return out
+    what = " + ".join(effect.effect for effect in missing) or "what was tried"
+    for term in search.every.stood:
+        new = search.contradicted(term) if term.knowledge.any else None
+        if new is not None:
+            held = term.knowledge.fixed | term.knowledge.measured
+            rows = zip(new.layout.names, new.layout.units, new.vector, held, strict=True)
+            free = ", ".join(
+                f"{parameter_name(n, unit)} = {shown(v, unit)}" for n, unit, v, own in rows if own
+            )
+            out[term.name] = (
+                f"what the model takes for known of {term.name} contradicts these data: fitted to "
+                f"them it would be {free}, which explains far more than {what}. Check it first"
+            )
+    return out
 
 
-def refitted(found: Diagnosis, own: Model) -> tuple[str, ...]:
-    """Effects of a model that agree with the data only with other values than it has."""
-    if found.verdict is not DiagnosisVerdict.NO_EFFECT_MISSING:
-        return ()
-    return tuple(
-        one.term.name
-        for one in found_effects(found)
-        if one.term.name in own.names and _differs(one.term.vector, own.terms[one.term.name].vector)
+def _without_outliers(path: ModelPath, far: NDArray[np.bool_]) -> ModelPath:
+    """The path, with rows that are far off marked, so that rms errors leave them out."""
+    if not far.any():
+        return path
+    stages = []
+    for stage in path.stages:
+        fit = stage.fit.with_far_off(far)
+        rms = rms_by_kind(fit.data.problem, stage.held_out.raw)
+        stages.append(replace(stage, fit=fit, held_out=replace(stage.held_out, rms=rms)))
+    return replace(path, problem=path.problem.with_far_off(far), stages=tuple(stages))
+
+
+# --- what is listed -------------------------------------------------------------------------------
+
+
+def _missing(search: Search, said: Judgement, path: ModelPath) -> list[MissingEffect]:
+    """The listed effects in the order of adding.
+
+    Their values are those of the listed effects alone where these are all that is missing, else
+    those of the best hypothesis, which are nearer to the truth.
+    """
+    alone = said.verdict is DiagnosisVerdict.EFFECTS_FOUND
+    fit = path.last.fit if alone else search.best.fit
+    spread = _spread_by_others(search, said, fit)
+    keys = search.every.keys_of(fit.terms)
+    out = []
+    for index, stage in enumerate(path.stages[1:], start=1):
+        name = stage.added
+        if name not in fit.terms or keys[name] not in said.sure:
+            continue
+        term, part = fit.terms[name], fit.terms.part(name)
+        stderr = np.hypot(fit.stderr[part], spread[part])
+        alike = dict.fromkeys(map(name_of, said.classes.alike(keys[name])))
+        rivals = [
+            Rival(other, search.every.members[other].layout) for other in alike
+            if other != name and other not in fit.terms and other in search.every.members
+        ]  # fmt: skip
+        out.append(
+            MissingEffect(
+                term=term,
+                stderr=stderr,
+                at_bound=fit.at_bound[part],
+                rivals=tuple(rivals),
+                check=check_of(term, search.data.problem.robot, stderr),
+                rms=stage.rms,
+                held_out_rms=stage.held_out.rms,
+                share=path.removed_by(index),
+                probability=min(said.classes.of(keys[name]), 1.0),
+            )
+        )
+    return out
+
+
+def _spread_by_others(search: Search, said: Judgement, fit: Fit) -> Array:
+    """How far values (p,) are, rms, from those of models with a further effect, by its probability.
+
+    The errors of a fit hold if just its effects are missing. A heavier platform beside a wrong
+    length takes a part of what the length explains: if the data leave it a chance of 30 %, the
+    length is known no better than the two models agree on it (Hoeting et al. 1999).
+    """
+    had = set(search.every.keys_of(fit.terms).values())
+    likely = {
+        members[0]: p for members, p in said.classes.classes
+        if p > _MATTERS and not had & set(members)
+    }  # fmt: skip
+    square = np.zeros(len(fit.terms))
+    if likely:
+        about = search.every.about(fit)
+        for key, p in likely.items():
+            if key in about.columns:
+                square += p * about.moves(key)[1] ** 2
+    return np.sqrt(square)
+
+
+# --- what is not listed ---------------------------------------------------------------------------
+
+
+def _not_listed(
+    search: Search, said: Judgement, missing: Sequence[MissingEffect]
+) -> list[NotListed]:
+    """All effects that are not listed, the most probable first."""
+    listed = {one.effect: one for one in missing}
+    alike = {name: one.effect for one in missing for name in one.indistinguishable}
+    none = search.cache[search.stood]
+    assert none is not None
+    chances, rows = _by_effect(search, said), list[NotListed]()
+    layouts = {m.layout.name: m.layout for k, m in search.every.members.items() if "@" not in k}
+    for name, layout in layouts.items():
+        if name in listed or name in search.every.stood:
+            continue
+        alone = search.cache.get(search.stood | {name})
+        score = 0.0 if alone is None else alone.score - none.score
+        why = _why_not(search, said, name, chances.get(name, 0.0), alike, tuple(listed))
+        rows.append(NotListed(name, layout.effect.title, score, why))
+    for name, why in search.every.reasons.items():
+        rows.append(NotListed(name, effect_named(name).title, 0.0, why))
+    return sorted(rows, key=lambda row: (-chances.get(row.effect, 0.0), -row.score))
+
+
+def _why_not(
+    search: Search, said: Judgement, name: str, p: float, alike: dict[str, str],
+    listed: tuple[str, ...],
+) -> Reason:  # fmt: skip
+    if name in alike:
+        return Reason(Why.ALIKE, by=(alike[name],))
+    if name not in search.none_about.columns:
+        return Reason(Why.UNSEEN)
+    if said.verdict is DiagnosisVerdict.UNKNOWN_EFFECT and p > PROBABLE:
+        return Reason(Why.MAY_IMITATE)
+    if said.verdict is DiagnosisVerdict.MANY_EFFECTS and p > PROBABLE:
+        return Reason(Why.NOT_SURE, p=p)
+    if listed and said.verdict is not DiagnosisVerdict.MANY_EFFECTS:
+        return Reason(Why.CARRIES_LITTLE if p > PROBABLE else Why.NOT_NEEDED_BESIDE, p=p, by=listed)
+    return Reason(Why.NOT_SURE if p > PROBABLE else Why.IMPROBABLE, p=p)
+
+
+def _by_effect(search: Search, said: Judgement) -> dict[str, float]:
+    """Probability of each effect, in any form."""
+    out = dict.fromkeys(search.every.effects, 0.0)
+    for key, p in said.classes.member.items():
+        if name_of(key) in out:
+            out[name_of(key)] = min(out[name_of(key)] + p, 1.0)
+    return out
+
+
+def _chances(search: Search, said: Judgement) -> Chances:
+    """The probabilities, by names of effects."""
+    classes = list[tuple[tuple[str, ...], float]]()
+    seen = set[str]()
+    for members, p in said.classes.classes:
+        names = tuple(n for n in dict.fromkeys(map(name_of, members)) if n not in seen)
+        names = tuple(n for n in names if n in search.every.effects)
+        seen |= set(names)
+        if names:
+            classes.append((names, p))
+    posterior = said.posterior
+    unknown = said.verdict in (DiagnosisVerdict.UNKNOWN_EFFECT, DiagnosisVerdict.MANY_EFFECTS)
+    kinds = [search.every.kinds[k] for k, p in posterior.fields.items() if p > _MATTERS / 2.0]
+    seen_in = (
+        tuple(dict.fromkeys(kinds))[:_MOST_FIELDS]
+        if unknown and posterior.unknown > PROBABLE
+        else ()
+    )
+    together = None
+    if said.verdict is DiagnosisVerdict.MANY_EFFECTS:
+        none = search.cache[search.stood]
+        assert none is not None
+        before = rms_by_kind(search.data.problem, search.plain.raw)
+        together = JointErrors.of(before, search.calibrated.fit)
+    shown = None if seen_in else detectable_size(search.best.fit)
+    return Chances(
+        _by_effect(search, said), tuple(classes), posterior.unknown, seen_in, shown, together
     )
 
 
-def _differs(new: Array, old: Array) -> bool:
-    """Whether values differ; those of single files or runs, which differ in number, do not."""
-    return new.shape == old.shape and bool((new != old).any())
+# --- what is left ---------------------------------------------------------------------------------
 
 
-def _widened(found: Diagnosis) -> float:
-    """Factor by which standard errors of all listed effects exceed those of the fit."""
-    if found.verdict is DiagnosisVerdict.MANY_EFFECTS:
-        return 1.0
-    best, factors = shown_stages(found)[1].step.fit, list[float]()
-    for one in found.missing:
-        own = best.stderr[best.terms.part(one.term.name)]
-        seen = np.isfinite(own) & (own > 0.0) & np.isfinite(one.stderr)
-        factors += (one.stderr[seen] / own[seen]).tolist()
-    return min(factors, default=1.0)
+def _floor(search: Search, said: Judgement) -> Rms:
+    """The rms errors of the noise at its estimated size.
 
-
-def found_covariance(found: Diagnosis) -> Array | None:
-    """(p, p) covariance of the values of :func:`found_effects`, in their order.
-
-    None unless the listed effects are all that is missing, because it would be too small.
+    Beside something unknown it is no larger than stated: the estimate may take a part of what is
+    unknown for noise, which would then never be large enough to matter.
     """
-    if found.search is None or found.verdict is not DiagnosisVerdict.EFFECTS_FOUND:
-        return None
-    best, effects = shown_stages(found)[1].step.fit, found_effects(found)
-    every = np.arange(len(best.terms))
-    order = np.concatenate([every[best.terms.part(one.term.name)] for one in effects])
-    whole = best.with_idle(_widened(found) ** 2 * best.covariance)[np.ix_(order, order)]
-    # some are wider still, by what a further effect would do to them
-    listed = np.concatenate([one.stderr for one in effects]) ** 2
-    seen = np.isfinite(listed) & np.isfinite(np.diag(whole))
-    whole[np.diag_indices_from(whole)] += np.where(seen, listed - np.diag(whole), 0.0).clip(0.0)
-    return np.asarray(whole)
+    floor = noise_floor(search.data.problem, search.best.fit.state)
+    scale = search.best.fit.noise.scale
+    if said.verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
+        scale = np.minimum(scale, 1.0)
+    return {
+        kind.key: None if floor[kind.key] is None else float(scale[k]) * (floor[kind.key] or 0.0)
+        for k, kind in enumerate(KINDS)
+    }
+
+
+def _left(
+    path: ModelPath, best: Hypothesis, floor: Rms, tolerance: Tolerance, lag: float
+) -> LeftOver:
+    """How far the last model's errors exceed the noise, and whether that matters.
+
+    Errors of commanded lengths move all readings of a row together, by much more than the noise of
+    each. If lengths are noisy, whitened residuals are therefore used, in units of the readings' own
+    noise.
+    """
+    problem: Problem = path.problem
+    rms, noise = path.last.rms, floor
+    if problem.sigma.length_m:
+        sigma = np.broadcast_to(problem.reading_sigma, problem.measured.shape)
+        rms = rms_by_kind(problem, np.nan_to_num(path.last.state.table) * sigma)
+        noise = rms_by_kind(problem, sigma.copy())
+    rho = max(lag, float(np.max(best.fit.noise.rho)), 0.0)
+    return remainder_of(rms, noise, tolerance, problem.data.sigma, doubt_of(problem, rho))

@@ -3,32 +3,37 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from crosscheck.calibration import JointErrors
 from crosscheck.comparison.associations import Association
-from crosscheck.diagnosis.chances import NOT_WEIGHED, Chances
-from crosscheck.diagnosis.common_part import CommonPart
-from crosscheck.diagnosis.rivals import Rival
-from crosscheck.diagnosis.search import Search
+from crosscheck.diagnosis.path import ModelPath
 from crosscheck.fit.least_squares.problem import Rms
 from crosscheck.fit.noise.tolerance import LeftOver
 from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Refusal
 from crosscheck.fit.words import rms_words, value_lines, value_records
+from crosscheck.inference.fields import Varying
 from crosscheck.planning.sight import Sight
-from seecr.effects import Term, Terms
-from seecr.effects.base import Layout
+from seecr.effects import ApartLayout, Layout, Term, Terms
 from seecr.files import plain
 from seecr.pose import Array
+from seecr.prediction.model import Model
 from seecr.result import Record, Result
 
-if TYPE_CHECKING:
-    from crosscheck.diagnosis.kept import Diagnosed
-    from seecr.prediction.model import Model
+PROBABLE = 0.5
+"""An effect that is not listed is called probable from this probability on."""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An effect that explains the data as well as the one listed, and its parameters."""
+
+    name: str
+    layout: Layout
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,8 +50,6 @@ class MissingEffect(Result):
         held_out_rms: the same on held-out runs.
         share: part of the unexplained chi2 (on held-out runs) that it removed.
         probability: posterior probability that it, or an equivalent, is missing.
-        common: what its values of all cables have in common, if another effect explains that as
-            well; None otherwise.
     """
 
     term: Term
@@ -58,7 +61,6 @@ class MissingEffect(Result):
     held_out_rms: Rms
     share: float
     probability: float
-    common: CommonPart | None = None
 
     @property
     def effect(self) -> str:
@@ -66,9 +68,15 @@ class MissingEffect(Result):
         return self.term.name
 
     @property
+    def per(self) -> str:
+        """What it has other values for: "file" or "run"; "" if all rows share them."""
+        return self.layout.kind if isinstance(self.layout, ApartLayout) else ""
+
+    @property
     def title(self) -> str:
         """The effect in words."""
-        return self.layout.effect.title
+        title = self.layout.effect.title
+        return f"{title}, another in each {self.per}" if self.per else title
 
     @property
     def indistinguishable(self) -> tuple[str, ...]:
@@ -121,7 +129,7 @@ class MissingEffect(Result):
             **self.rms,
             "held_out": self.held_out_rms,
             "share_of_error_removed": self.share,
-            **({} if self.common is None else {"common_part": self.common.as_json()}),
+            **({"per": self.per} if self.per else {}),
         }
 
 
@@ -145,6 +153,70 @@ class NotListed:
         return {"effect": self.effect, "score": self.score, "why_not": str(self.why_not)}
 
 
+@dataclass(frozen=True)
+class Chances:
+    """Posterior probabilities of effects, of classes of equivalent effects, and of the unknown.
+
+    Attributes:
+        effect: for each effect of the catalogue, the probability that it is missing.
+        classes: members, the likeliest first, and the probability that one of them is missing; the
+            most probable class first.
+        unknown: probability of something that no effect of the catalogue is.
+        seen: what something unknown may change, the likeliest first.
+        shown: by kind of reading, the rms size from which on a smooth unknown effect would show;
+            None if it could hide at any size, or if one is there.
+        together: errors and noise of the fit of all effects; None if it was not made.
+    """
+
+    effect: dict[str, float]
+    classes: tuple[tuple[tuple[str, ...], float], ...]
+    unknown: float
+    seen: tuple[Varying, ...] = ()
+    shown: Rms | None = None
+    together: JointErrors | None = None
+
+    @property
+    def looks_like(self) -> str:
+        """A sentence, after a space, about what something unknown may change; "" if unsaid."""
+        return f" It looks like {' or '.join(self.seen)}." if self.seen else ""
+
+    @property
+    def words(self) -> str:
+        """What these data can show of unknown effects, a sentence; "" if one may be there."""
+        if self.seen:
+            return ""
+        if self.shown is None:
+            return (
+                "these data could not reveal an unknown effect of any size: the effects of the "
+                "catalogue can fit everything"
+            )
+        return (
+            "an unknown effect that varies smoothly over the workspace would have been detected "
+            f"from about {rms_words(self.shown)} rms on"
+        )
+
+    def as_json(self) -> dict[str, Any]:
+        """``catalogue``, ``classes``, ``calibrated`` and ``unknown`` of ``diagnosis.json``."""
+        unknown: dict[str, object] = {"probability": self.unknown, "shown_from": self.shown}
+        if self.seen:
+            likeliest, *others = self.seen
+            unknown |= {"seen_in": likeliest, **({"or_in": others} if others else {})}
+        place = {n: k for k, (members, _p) in enumerate(self.classes) for n in members}
+        return {
+            "catalogue": [
+                {"effect": name, "probability": p, "class": place[name]}
+                for name, p in sorted(self.effect.items(), key=lambda item: -item[1])
+            ],
+            "classes": [{"members": list(m), "probability": p} for m, p in self.classes],
+            "unknown": unknown,
+            **({} if self.together is None else {"calibrated": self.together.as_json()}),
+        }
+
+
+# What diagnosis.json has if no probabilities were computed.
+_NOT_WEIGHED: dict[str, list[object]] = {"catalogue": [], "classes": []}
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis(Result):
     """The complete result of a diagnosis.
@@ -157,14 +229,15 @@ class Diagnosis(Result):
         candidates: effects that are not listed, the most probable or the best first.
         measure_next: what to measure next, in words.
         notes: what was assumed, left out or estimated.
-        search: the steps with every model; None without a verdict.
-        whiteness: test of the residuals.
+        path: the models from the one that stood to what was found; None without a verdict.
+        whiteness: test of the residuals of the last of them.
         where: what the unexplained part is associated with, the strongest first.
         refusal: why there is no verdict; None if there is one.
         left: the remainder beyond noise, and whether it matters; None without a verdict.
         chances: posterior probabilities of all effects; None without a verdict.
         sight: what the data can show and what not, whatever the verdict; None without one.
-        of: the robot, the data and the model that it is of.
+        model: the model with the missing effects, fitted together; None without a verdict.
+        refitted: effects of the given model that agree with the data only with other values.
     """
 
     verdict: DiagnosisVerdict
@@ -177,31 +250,15 @@ class Diagnosis(Result):
     candidates: tuple[NotListed, ...] = ()
     measure_next: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-    search: Search | None = None
+    path: ModelPath | None = None
     whiteness: Whiteness | None = None
     where: tuple[Association, ...] = ()
     refusal: Refusal | None = None
     left: LeftOver | None = None
     chances: Chances | None = None
     sight: Sight | None = None
-    of: Diagnosed | None = None
-
-    @property
-    def model(self) -> Model | None:
-        """The model with the missing effects, to be saved or used; None without a verdict.
-
-        All its effects are fitted together, as ``crosscheck diagnose --model-out`` writes them.
-        """
-        return self._model
-
-    @cached_property
-    def _model(self) -> Model | None:
-        return None if self.of is None else self.of.with_found(self)
-
-    @property
-    def refitted(self) -> tuple[str, ...]:
-        """Effects of the given model that agree with the data only with other values."""
-        return () if self.of is None else self.of.refitted(self)
+    model: Model | None = None
+    refitted: tuple[str, ...] = ()
 
     @property
     def converged(self) -> bool:
@@ -215,12 +272,6 @@ class Diagnosis(Result):
             return self.sentence
         why = str(self.refusal)
         return f"{why[0].upper()}{why[1:]}."
-
-    @property
-    def within_catalogue(self) -> bool:
-        """Whether probabilities assume the catalogue though something unknown is there."""
-        imitated = self.chances is not None and self.chances.imitated is not None
-        return self.verdict is DiagnosisVerdict.UNKNOWN_EFFECT and not imitated
 
     @property
     def terms(self) -> Terms:
@@ -275,7 +326,7 @@ class Diagnosis(Result):
                 "residual": self.whiteness,
                 "where": self.where,
                 "notes": self.notes,
-                **(NOT_WEIGHED if self.chances is None else self.chances.as_json()),
+                **(_NOT_WEIGHED if self.chances is None else self.chances.as_json()),
             }
         )
         return document

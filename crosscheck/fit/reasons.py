@@ -34,27 +34,12 @@ class Why(Enum):
     NOT_MOVED = "these commands do not vary the quantity that it depends on"
     UNSEEN = "not visible in these data: its plausible size moves no reading"
     GAINS_NOTHING = "explains nothing beside the others"
-    IMPOSSIBLE = "would need values that no robot can have"
-    UNSOLVED = "could not be fitted: some rows could not be solved with it"
-    CHANCE = "not significant (p = {p:.2g})"
-    CHANCE_OVER_ALL = "not significant (p = {p:.2g}, corrected for all effects tried)"
-    PROMISES_LESS = "promises to explain less than the others"
-    EXPLAINS_LITTLE = "explains too little for its {parameters}"
-    NOT_PREDICTIVE = "does not improve the prediction of held-out runs"
-    EXPLAINED_BETTER = "{by} explains the same better"
-    NOT_NEEDED = "not needed"
     ALIKE = "indistinguishable from {by}, which is listed"
-    IN_COMMON = "may be what all cables have in common of {by}, which is listed"
     NOT_NEEDED_BESIDE = "not needed once {by} {are} in the model (probability {chance})"
     CARRIES_LITTLE = "probable ({chance}), but it explains little once {by} {are} in the model"
-    DOES_LITTLE = "probable ({chance}), but it does little beside the others that are probable"
     NOT_SURE = "probable ({chance}) but not certain"
-    REPLACEABLE = "probable ({chance}) but not certain: others together explain as much without it"
     IMPROBABLE = "explains too little (probability {chance})"
-    OPEN = "open: one of the sets that explain as much has it (probability {chance})"
-    IMITATES = "not certain: its {parameters} can imitate much of the unexplained error"
     MAY_IMITATE = "not certain: it may imitate an unknown effect"
-    EXPLAINS_PART = "not certain: it explains a part, but structure remains"
 
 
 _LACKING = {
@@ -75,9 +60,8 @@ class Reason:
     Attributes:
         why: the kind of reason.
         parameters: number of parameters of the effect. rows: number of rows of the data.
-        p: p-value of what it explains, or a probability, see ``why``.
-        by: effects that explain it better, or as well.
-        beside: effects of the model beside which it was tried; empty for the model as it stood.
+        p: its probability.
+        by: effects that explain as much.
     """
 
     why: Why
@@ -85,7 +69,6 @@ class Reason:
     rows: int = 0
     p: float = 1.0
     by: tuple[str, ...] = ()
-    beside: tuple[str, ...] = ()
 
     @property
     def lacking(self) -> bool:
@@ -98,15 +81,13 @@ class Reason:
         return self.why.value.format(
             parameters=counted(self.parameters, "parameter"),
             rows=counted(self.rows, "row"),
-            p=min(1.0, self.p),
             chance=probability_words(self.p),
             by=", ".join(self.by),
             are="is" if len(self.by) == 1 else "are",
         )
 
     def __str__(self) -> str:
-        text = f"not a candidate: {self.words}" if self.lacking else self.words
-        return f"{text}, tried with {', '.join(self.beside)} in the model" if self.beside else text
+        return f"not a candidate: {self.words}" if self.lacking else self.words
 
 
 def by_reason(reasons: Mapping[str, Reason]) -> list[str]:

@@ -169,7 +169,11 @@ def import_case(
     measured = _one([part for part, _noise in parts])
     sigma = _sigma(takes, [noise for _part, noise in parts])
     measured = replace(
-        measured, sigma=sigma, free=frames.free, stands=np.ones(measured.n_rows, dtype=bool)
+        measured,
+        sigma=sigma,
+        sigma_source="dwell_scatter",
+        free=frames.free,
+        stands=np.ones(measured.n_rows, dtype=bool),
     )
     off = off_commands(frames, *_rests(robot, takes)) if choices.aligned else []
     notes = (*said, *strays, frames.how, *off, _noise(measured))

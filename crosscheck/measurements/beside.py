@@ -14,6 +14,8 @@ from seecr.effects import catalogue
 from seecr.files import Toml, read_toml
 
 _SIGMAS = tuple(item.name for item in fields(Sigma))
+# Where stated noise comes from, the default first.
+SOURCES = ("stated", "dwell_scatter", "revisited")
 
 
 @dataclass(frozen=True)
@@ -21,13 +23,14 @@ class Beside:
     """The content of the TOML.
 
     Attributes:
-        sigma: stated noise.
+        sigma: stated noise. source: where it comes from, one of :data:`SOURCES`.
         told: ``lengths = "told"``: lengths are told lengths.
         stands: ``start = "first_row"``: runs start at their first row.
         free: names of effects that every fit of these data includes.
     """
 
     sigma: Sigma = field(default_factory=Sigma)
+    source: str = SOURCES[0]
     told: bool = False
     stands: bool = False
     free: tuple[str, ...] = ()
@@ -46,8 +49,15 @@ def read_beside(path: Path) -> Beside:
     if not isinstance(table, dict):
         raise toml.error("sigma must be a table, [sigma]", "sigma")
     said = {key: choice(toml, key) for key in CHOICES}
-    sigma = Sigma(**{key: _sigma(toml, key, value) for key, value in table.items()})
-    return Beside(sigma, said["lengths"] == "told", said["start"] == "first_row", _free(toml))
+    source = _source(toml, table)
+    values = {key: _sigma(toml, key, value) for key, value in table.items() if key != "source"}
+    return Beside(
+        Sigma(**values),
+        source,
+        said["lengths"] == "told",
+        said["start"] == "first_row",
+        _free(toml),
+    )
 
 
 def _check_names(toml: Toml) -> None:
@@ -64,6 +74,14 @@ def _check_names(toml: Toml) -> None:
             raise toml.error(text, name)
 
 
+def _source(toml: Toml, table: dict[str, object]) -> str:
+    source = table.get("source", SOURCES[0])
+    if source not in SOURCES:
+        words = " or ".join(f'"{word}"' for word in SOURCES)
+        raise toml.error(f"source must be {words}, got {source!r:.60}", "source")
+    return str(source)
+
+
 def _free(toml: Toml) -> tuple[str, ...]:
     names = toml.content.get("free", [])
     sensing = [name for name, effect in catalogue().items() if effect.place == "sensing"]
@@ -76,8 +94,9 @@ def _free(toml: Toml) -> tuple[str, ...]:
 def _sigma(toml: Toml, key: str, value: object) -> float:
     if key not in _SIGMAS:
         # Nearest first, so that the likely one is read first.
-        likeness = {k: difflib.SequenceMatcher(None, key, k).ratio() for k in _SIGMAS}
-        known = ", ".join(sorted(_SIGMAS, key=lambda k: -likeness[k]))
+        keys = (*_SIGMAS, "source")
+        likeness = {k: difflib.SequenceMatcher(None, key, k).ratio() for k in keys}
+        known = ", ".join(sorted(keys, key=lambda k: -likeness[k]))
         raise toml.error(f"unknown key {key} in [sigma]; known are {known}", key)
     kind, _, unit = key.rpartition("_")
     if isinstance(value, str):

@@ -120,6 +120,7 @@ class Measurements(Result):
         loads: known loads, or None.
         stands: (n,) bool, rows whose run starts at its first row instead of the reference pose.
         sigma: stated noise.
+        sigma_source: where it comes from: "stated", "dwell_scatter" (a lower bound) or "revisited".
         sigma_ratio: (n, 4) noise of each row relative to that, by kind: files may differ.
         free: names of effects that every fit of these data includes: the tracker's frame, if it was
             estimated from the data. free_in: indices of the files that state so, by the effects'
@@ -153,6 +154,7 @@ class Measurements(Result):
     free: tuple[str, ...] = ()
     free_in: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     sigma: Sigma = field(default_factory=Sigma)
+    sigma_source: str = "stated"
     sigma_ratio: Array = _FILLED_IN
     files: tuple[str, ...] = ()
     file: NDArray[np.int64] = _FILLED_IN

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crosscheck.given import GivenRobot, robot_of
-from crosscheck.measurements.beside import Beside, read_beside
+from crosscheck.measurements.beside import SOURCES, Beside, read_beside
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.dwells import averaged_dwells
 from crosscheck.measurements.notice import notice
@@ -92,7 +92,9 @@ def _stated(data: Measurements, sigma: Sigma | None) -> Measurements:
         return data
     ratio = data.sigma_ratio.copy()
     ratio[:, [item.name in sigma.stated for item in fields(Sigma)]] = 1.0
-    return replace(data, sigma=replace(data.sigma, **sigma.stated), sigma_ratio=ratio)
+    whole = replace(data.sigma, **sigma.stated)
+    # what the caller states is no lower bound
+    return replace(data, sigma=whole, sigma_ratio=ratio, sigma_source=SOURCES[0])
 
 
 def _measured(path: Path, robot: Robot, sigma_path: str | Path | None) -> Measurements:
@@ -222,6 +224,7 @@ def _load(columns: Columns, robot: Robot, sigma_path: str | Path | None) -> Meas
         stands=np.full(columns.n_rows, beside.stands),
         free=beside.free,
         sigma=beside.sigma,
+        sigma_source=beside.source,
         line=columns.table.line,
         unused_columns=columns.unused,
     )

@@ -59,6 +59,7 @@ def together(parts: Sequence[Measurements]) -> Measurements:
         free=tuple(free),
         free_in=free,
         sigma=sigma,
+        sigma_source=_source(parts),
         sigma_ratio=ratio,
         files=tuple(names),
         origins=tuple(_short_names([part.path.resolve() for part in parts], 2)),
@@ -185,6 +186,12 @@ def _noise(parts: Sequence[Measurements], names: Sequence[str]) -> tuple[Sigma, 
         if without:
             notes.append(_taken_over(kind, without, names[stated[0]]))
     return Sigma(**common), np.repeat(ratios, [part.n_rows for part in parts], axis=0), notes
+
+
+def _source(parts: Sequence[Measurements]) -> str:
+    """A lower bound in any file makes the common noise one."""
+    found = [part.sigma_source for part in parts if part.sigma.stated]
+    return "dwell_scatter" if "dwell_scatter" in found else next(iter(found), "stated")
 
 
 def _taken_over(kind: str, without: Sequence[str], other: str) -> str:

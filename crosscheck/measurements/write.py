@@ -46,4 +46,6 @@ def _toml(data: Measurements) -> str:
     for key, value in vars(data.sigma).items():
         if value is not None:
             lines.append(f"{key} = {float(value)!r}")
+    if data.sigma_source != "stated":
+        lines.append(f"source = {json.dumps(data.sigma_source)}")
     return "\n".join(lines) + "\n"

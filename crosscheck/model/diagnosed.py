@@ -7,10 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from seecr.description.fingerprint import check_robot
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
-from seecr.effects import Term, Terms
+from seecr.effects import Term, Terms, apart, effect_named, layout_of
 from seecr.errors import InputError, InputFileError
 from seecr.files import path_of, read_text
 from seecr.made import digits_of
@@ -97,7 +99,10 @@ def _term(path: Path, item: Any, robot: Robot) -> Term:
         for key, cell in given.items()
     }
     try:
-        term = Term.of(robot, name, **{k: v for k, v in values.items() if v is not None})
+        if "per" in item:
+            term = _apart(robot, name, str(item["per"]), values)
+        else:
+            term = Term.of(robot, name, **{k: v for k, v in values.items() if v is not None})
     except InputError as error:
         raise InputFileError.at(path, str(error)) from None
     lacking = [key for key in term.layout.names if values.get(key) is None]
@@ -106,3 +111,14 @@ def _term(path: Path, item: Any, robot: Robot) -> Term:
             path, f"effect {name}: expected a number for {lacking[0]}; is it of another robot?"
         )
     return term
+
+
+def _apart(robot: Robot, name: str, per: str, values: Mapping[str, float | None]) -> Term:
+    """An effect with other values in each file or run: keys are "part: parameter"."""
+    base = layout_of(effect_named(name), robot)
+    parts = tuple(dict.fromkeys(key.rpartition(": ")[0] for key in values))
+    layout = apart(base, per, parts, base.null)
+    vector = [values.get(key) for key in layout.names]
+    null = layout.null.tolist()
+    known = [n if v is None else v for v, n in zip(vector, null, strict=True)]
+    return Term(layout, np.array(known))

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.preparation.prepare import Progress
 from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.planning.adding import NO_LIMITS, Limits
@@ -20,6 +19,7 @@ from crosscheck.planning.planned import Planned, Reads, expected_sigma, kinds_of
 from crosscheck.planning.sight import all_visible
 from crosscheck.planning.upright import upright
 from crosscheck.planning.visibility import EXACT, Signal, signal_left, signals
+from crosscheck.preparation.prepare import Progress
 from seecr.arguments import silent, whole
 from seecr.counted import counted
 from seecr.description.joints import pose_of_values
@@ -147,7 +147,7 @@ def _usable(
     if len(poses) == 0:
         return None
     every = _plan(robot, poses, sigma, reads)
-    tensions = every.base.state.prediction.tensions
+    tensions = every.base.prediction.tensions
     good = trustworthy(every, every) if every.problem.use.any() else every.problem.use
     good = good & (tensions <= limits[1]).all(axis=1) & (tensions >= limits[0]).all(axis=1)
     kept = np.flatnonzero(taut_first(every, good, rows, limits))

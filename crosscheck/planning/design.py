@@ -7,7 +7,6 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from crosscheck.fit.least_squares.imitation import imitated
-from crosscheck.fit.preparation.prepare import Progress
 from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import GivenCommands, commands_of
@@ -29,6 +28,7 @@ from crosscheck.planning.proposer import propose
 from crosscheck.planning.result import Plan, Visible
 from crosscheck.planning.sight import all_visible
 from crosscheck.planning.visibility import Signal, signals, signals_like
+from crosscheck.preparation.prepare import Progress
 from seecr.arguments import silent
 from seecr.counted import counted, some
 from seecr.effects import Term, Terms, layout_of
@@ -127,7 +127,7 @@ def _unsolved(plan: Planned) -> list[str]:
     if len(rows) == 0:
         return []
     lines = plan.problem.data.lines_of(rows)
-    status = plan.base.state.prediction.solution().status[rows[0]].value
+    status = plan.base.prediction.solution().status[rows[0]].value
     return [f"{lines} left out: {status}"]
 
 

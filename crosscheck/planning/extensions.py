@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from crosscheck.fit.effects.candidates import null_fit
+from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.measurements.data import Measurements
 from crosscheck.planning.adding import NO_LIMITS, Adding, Extension, Limits, like
 from crosscheck.planning.places import more_poses
@@ -50,7 +50,7 @@ def extensions(
 def _sensors(plan: Planned, data: Measurements) -> Iterator[Extension]:
     problem, m = plan.problem, plan.problem.robot.n_cables
     if not plan.reads.tensions.any():
-        mean = float(np.mean(plan.base.state.prediction.tensions[problem.use]))
+        mean = float(np.mean(plan.base.prediction.tensions[problem.use]))
         noise = problem.sigma.tension_N or usual_cell(mean)
         yield Extension(
             Adding.TENSIONS,
@@ -109,7 +109,7 @@ def _later(plan: Planned, data: Measurements) -> Iterator[Extension]:
     both = replace(both, run=names, t_s=data.t_s[order % n] + later * shift)
     whole = like(plan, both)
     rest = whole.problem.only(later)
-    base = null_fit(rest, plan.base.terms, whole.factor, refit=False)
+    base = evaluate(rest, plan.base.terms, whole.factor)
     again = replace(whole, problem=rest, base=base)
     yield Extension(Adding.LATER, "repeat the poses an hour later", again)
 

@@ -66,8 +66,8 @@ def held_within(robot: Robot, poses: Array, limits: Limits = NO_LIMITS) -> Array
 
 def trustworthy(candidates: Planned, plan: Planned) -> np.ndarray:
     """(n,) poses with reliable sensitivities: solved, stiff, with no cable about to go slack."""
-    usual = plan.base.state.prediction.solution().smallest_eigenvalue[plan.problem.use]
-    own = candidates.base.state.prediction.solution().smallest_eigenvalue
+    usual = plan.base.prediction.solution().smallest_eigenvalue[plan.problem.use]
+    own = candidates.base.prediction.solution().smallest_eigenvalue
     good = candidates.problem.use & (own > _SOFT * float(np.median(usual)))
     for row, _cable in near_slack(candidates):
         good[row] = False
@@ -105,7 +105,7 @@ def commands_at(problem: Problem, poses: Array) -> Measurements:
 def _planned_poses(plan: Planned) -> Array:
     problem = plan.problem
     pose = problem.data.command_pose
-    pose = plan.base.state.prediction.pose if pose is None else pose
+    pose = plan.base.prediction.pose if pose is None else pose
     return pose[problem.use]
 
 

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.effects.candidates import null_fit
-from crosscheck.fit.effects.gauss_newton import Fit
 from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.least_squares.state import State, evaluate
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.compiled.columns import REST, STRAIN, TENSION
 from seecr.description.robot import Robot
@@ -95,14 +94,14 @@ class Planned:
     """
 
     problem: Problem
-    base: Fit
+    base: State
     factor: Array
     reads: Reads
 
     @property
     def unsolved(self) -> np.ndarray:
         """(n,) bool rows without an equilibrium."""
-        return ~np.asarray(self.base.state.prediction.solved)
+        return ~np.asarray(self.base.prediction.solved)
 
 
 def kinds_of(reads: Collection[str] | str, sigma: Sigma) -> tuple[str, ...]:
@@ -168,7 +167,7 @@ def planned(
             f"({', '.join(reads.kinds)}); expected readings of what moves, or of tension"
         )
     factor = problem.noise(prediction)
-    return Planned(problem, null_fit(problem, model, factor, refit=False), factor, reads)
+    return Planned(problem, evaluate(problem, model, factor), factor, reads)
 
 
 def _as_read(commands: Measurements, readings: Readings, reads: Reads) -> Measurements:
@@ -194,13 +193,13 @@ def _as_read(commands: Measurements, readings: Readings, reads: Reads) -> Measur
 
 def slack_at(plan: Planned) -> NDArray[np.bool_]:
     """(n, m) bool which cables are slack where the model rests."""
-    return plan.base.state.prediction.slack
+    return plan.base.prediction.slack
 
 
 def near_slack(plan: Planned) -> list[tuple[int, int]]:
     """Rows and cables about to go slack or taut, where small errors change which cables pull."""
-    states = plan.base.state.prediction.found.states
-    rest = plan.base.state.prediction.tables.cables[..., REST]
+    states = plan.base.prediction.found.states
+    rest = plan.base.prediction.tables.cables[..., REST]
     stretch = states[..., STRAIN] * rest
     taut = states[..., TENSION] > 0
     if not taut.any():

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from crosscheck.fit.least_squares.state import derivatives
-from crosscheck.fit.preparation.prepare import Progress
 from crosscheck.measurements.data import Measurements
 from crosscheck.planning.adding import MORE_POSES, Adding, Extension
 from crosscheck.planning.greedy import Wanted, chosen_poses
 from crosscheck.planning.planned import Planned, slack_at
 from crosscheck.planning.visibility import EXACT, Signal, signal_left, signals_together
+from crosscheck.preparation.prepare import Progress
 from seecr.arguments import silent
 from seecr.counted import counted
 from seecr.effects import Term
@@ -192,10 +192,10 @@ def telling_apart(
 
 def _pair(plan: Planned, name: str, rival: Layout) -> dict[str, Signal]:
     """Signal of an effect at its values, and of all that could imitate it: rival and the rest."""
-    shapes = rival.effect.shapes(plan.base.state.prediction.setup)
+    shapes = rival.effect.shapes(plan.base.prediction.setup)
     shape = shapes[0] if shapes else {}
     terms = plan.base.terms.with_term(Term(rival, rival.start(shape)))
-    columns = derivatives(plan.problem, plan.base.state.of(terms), frozen=True) * terms.scale
+    columns = derivatives(plan.problem, plan.base.of(terms), frozen=True) * terms.scale
     own = terms.own(name)
     signal = columns[:, own] @ terms.sizes[own]
     return {

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.fit.effects.gauss_newton import Fit
 from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.least_squares.state import State
 from crosscheck.fit.reasons import Reason, Why, by_reason
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.result import Visible
@@ -80,7 +80,7 @@ class Sight:
         }
 
 
-def sight_of(problem: Problem, base: Fit, factor: Array) -> Sight:
+def sight_of(problem: Problem, base: State, factor: Array) -> Sight:
     """What data can show beside a model.
 
     Args:

@@ -16,12 +16,11 @@ from functools import cached_property, lru_cache
 import numpy as np
 from scipy import optimize, special
 
-from crosscheck.fit.effects.candidates import candidates_for
-from crosscheck.fit.effects.starts import amplitude_columns
 from crosscheck.fit.least_squares import imitation
 from crosscheck.fit.least_squares.imitation import basis, beside
 from crosscheck.fit.least_squares.known import free_derivatives
 from crosscheck.fit.reasons import Reason, Why
+from crosscheck.inference.catalogue import amplitude_columns, candidates
 from crosscheck.planning.planned import Planned
 from seecr.effects.base import Layout
 from seecr.pose import Array
@@ -83,12 +82,11 @@ def signals(plan: Planned) -> tuple[dict[str, Signal], dict[str, Reason]]:
     found: dict[str, Signal] = {}
     missing: dict[str, Reason] = {}
     span = _of_model(plan)
-    for candidate in candidates_for(plan.problem):
-        layout = candidate.layout
+    for layout, why_not in candidates(plan.problem):
         if layout.name in plan.base.terms:
             continue
-        if candidate.why_not is not None:
-            missing[layout.name] = candidate.why_not
+        if why_not is not None:
+            missing[layout.name] = why_not
             continue
         shape = _middle_shape(plan, layout)
         if shape is None:
@@ -109,11 +107,11 @@ def signals_like(plan: Planned, like: Mapping[str, Signal]) -> dict[str, Signal]
 
 def _of_model(plan: Planned) -> Array:
     """Basis (N, k) of what the model's own effects can imitate, since they are fitted together."""
-    return basis(free_derivatives(plan.problem, plan.base.state))
+    return basis(free_derivatives(plan.problem, plan.base))
 
 
 def _middle_shape(plan: Planned, layout: Layout) -> dict[str, float] | None:
-    shapes = layout.effect.shapes(plan.base.state.prediction.setup)
+    shapes = layout.effect.shapes(plan.base.prediction.setup)
     return shapes[len(shapes) // 2] if shapes else None
 
 

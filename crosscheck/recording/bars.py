@@ -6,8 +6,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from crosscheck.diagnosis.path import Stage
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.steps import Stage, floor_of
 from crosscheck.fit.least_squares.problem import Kind, kinds_read
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.units import short
@@ -27,14 +27,14 @@ def write_bars(
     recording: Recording, index: rr.TimeColumn, found: Diagnosis, stages: list[Stage]
 ) -> None:
     """One block per kind of reading: bars from half the noise to the error on held-out runs."""
-    assert found.search is not None
-    for block, kind in enumerate(kinds_read(found.search.problem)):
+    assert found.path is not None
+    for block, kind in enumerate(kinds_read(found.path.problem)):
         _block(recording, index, found, stages, kind, block * _block_height(len(stages)))
 
 
 def view(found: Diagnosis, stages: list[Stage]) -> rrb.Spatial2DView:
     """The bars' view."""
-    assert found.search is not None
+    assert found.path is not None
     height = _height(found, stages)
     return rrb.Spatial2DView(
         name="rms error on held-out runs, logarithmic; the line is the noise",
@@ -53,8 +53,8 @@ def share(found: Diagnosis, stages: list[Stage]) -> float:
 
 
 def _height(found: Diagnosis, stages: list[Stage]) -> float:
-    assert found.search is not None
-    return len(kinds_read(found.search.problem)) * _block_height(len(stages))
+    assert found.path is not None
+    return len(kinds_read(found.path.problem)) * _block_height(len(stages))
 
 
 def _block_height(rows: int) -> float:
@@ -69,8 +69,8 @@ def _block(
     kind: Kind,
     top: float,
 ) -> None:
-    values = np.array([kind.factor * (s.step.held_out.rms[kind.key] or 0.0) for s in stages])
-    floor = kind.factor * floor_of(found, kind)
+    values = np.array([kind.factor * (s.held_out.rms[kind.key] or 0.0) for s in stages])
+    floor = kind.factor * (found.floor.get(kind.key) or 0.0)
     ends = _places(values, values, floor)
     rows = top + _HEAD + _ROW * (np.arange(len(stages)) + 0.5)
     lit = np.array([_lit(stage, found) for stage in stages], dtype=np.uint8)
@@ -115,7 +115,7 @@ def _lit(stage: Stage, found: Diagnosis) -> Rgba:
     if not stage.added:
         calm = found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
         return colours.SILVER if calm else colours.VERMILION
-    return colours.SKY if stage.listed else colours.SILVER
+    return colours.SKY
 
 
 def _words(

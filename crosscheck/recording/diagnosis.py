@@ -13,8 +13,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from crosscheck.diagnosis.path import Stage
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.steps import Stage, stages_of
 from crosscheck.fit.least_squares.problem import Kind
 from crosscheck.recording import bars, misfit
 from crosscheck.recording.diagnosis_words import model_words, pose_words, verdict_words
@@ -40,12 +40,11 @@ def write_diagnosis_recording(found: Diagnosis, path: str | Path) -> None:
     Raises:
         CrosscheckError: the file cannot be written.
     """
-    stages = stages_of(found)
-    if not stages:
+    if found.path is None:
         _write_words(found, path)
         return
-    assert found.search is not None
-    shown = Misfit(found.search.problem, stages[0].state)
+    stages = list(found.path.stages)
+    shown = Misfit(found.path.problem, stages[0].state)
     with recording_file(path, _name(found), _blueprint(found, stages, shown)) as recording:
         scene = Scene(recording, shown.problem.robot, shown.seen, _top_tension(stages))
         scene.surroundings()
@@ -55,8 +54,8 @@ def write_diagnosis_recording(found: Diagnosis, path: str | Path) -> None:
 
 
 def _name(found: Diagnosis) -> str:
-    assert found.search is not None
-    problem = found.search.problem
+    assert found.path is not None
+    problem = found.path.problem
     return f"diagnosis of {problem.robot.name}, {problem.data.name}"
 
 
@@ -147,7 +146,7 @@ def _plots(
         plots.line_by_runs(recording, entity, index, sizes, starts, stage.label, shade, 1.5)
     entity = f"plot/{kind.name}/left_out"
     steps = rr.TimeColumn(MODEL_STEP, sequence=range(len(stages)))
-    rms = [kind.factor * (stage.step.held_out.rms[kind.key] or 0.0) for stage in stages]
+    rms = [kind.factor * (stage.held_out.rms[kind.key] or 0.0) for stage in stages]
     recording.scalars(entity, steps, rms)
     plots.as_line(recording, entity, "rms on held-out runs", colours.SILVER, 2.0)
 

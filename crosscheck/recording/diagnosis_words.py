@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from crosscheck.diagnosis.path import Stage
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
-from crosscheck.diagnosis.steps import Stage, floor_of
 from crosscheck.diagnosis.words import removed
-from crosscheck.fit.least_squares.problem import rms_by_kind
 from crosscheck.recording import misfit, words
 from crosscheck.recording.misfit import Misfit
 from crosscheck.recording.words import plain
@@ -52,8 +51,6 @@ def model_words(found: Diagnosis, stages: list[Stage], k: int, shown: Misfit, wo
     finding = next((f for f in found.missing if f.effect == stage.added), None)
     if finding is not None:
         parts.append(_finding(finding))
-    elif stage.added:
-        parts.append("Not certain: it explains a part, but structure remains.\n")
     elif found.candidates and len(stages) == 1:
         parts.append(_candidates(found))
     line = int(shown.problem.data.line[worst])
@@ -62,9 +59,9 @@ def model_words(found: Diagnosis, stages: list[Stage], k: int, shown: Misfit, wo
 
 
 def _errors(found: Diagnosis, stage: Stage, shown: Misfit) -> str:
-    fitted = rms_by_kind(shown.problem, stage.state.raw)
+    fitted = stage.rms
     values = [
-        (stage.step.held_out.rms[kind.key], fitted[kind.key], floor_of(found, kind))
+        (stage.held_out.rms[kind.key], fitted[kind.key], found.floor.get(kind.key) or 0.0)
         for kind in shown.kinds
     ]
     return words.errors(shown.kinds, values, ("held-out runs", "fitted runs", "noise"))

@@ -10,7 +10,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from crosscheck.diagnosis.steps import drawn, magnification, views_of
+from crosscheck.diagnosis.path import drawn, magnification, views_of
 from crosscheck.fit.least_squares.problem import POSITION, Kind, Problem, kinds_read
 from crosscheck.fit.least_squares.state import State
 from crosscheck.recording.axes import bounds, draw_axes

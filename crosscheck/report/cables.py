@@ -19,7 +19,7 @@ from matplotlib.ticker import MaxNLocator
 from crosscheck.comparison.cable_space import cable_errors, cable_lengths
 from crosscheck.comparison.quantities import channels
 from crosscheck.comparison.travel import travel
-from crosscheck.diagnosis.steps import Drawn
+from crosscheck.diagnosis.path import Drawn
 from crosscheck.fit.least_squares.problem import KINDS, TENSION, Problem
 from crosscheck.report.drawing import (
     AFTER,

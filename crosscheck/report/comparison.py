@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from markupsafe import Markup
 
 from crosscheck.comparison.result import Comparison, Group
-from crosscheck.diagnosis.steps import Standing
+from crosscheck.diagnosis.path import Standing
 from crosscheck.fit.least_squares.problem import KINDS, Rms
 from crosscheck.report.cables import draw_wall, walls_of
 from crosscheck.report.drawing import BEFORE, CALM

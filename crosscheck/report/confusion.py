@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.patches import Rectangle
 
+from crosscheck.diagnosis.path import ModelPath
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.search import Search
-from crosscheck.fit.effects.starts import amplitude_columns
 from crosscheck.fit.least_squares.imitation import basis, beside, imitated
 from crosscheck.fit.reasons import Why
+from crosscheck.inference.catalogue import About
 from crosscheck.report.drawing import BEFORE, INK, WIDTH, blank, image, styled
 from seecr.pose import Array
 
@@ -48,12 +48,11 @@ class Confusion:
 
 def confusion_of(found: Diagnosis) -> Confusion | None:
     """Of the effects found, their rivals and the best of the others, at the final model."""
-    if found.search is None:
+    if found.path is None:
         return None
-    columns = {}
-    names = _names(found)
-    for name in names:
-        own = _columns(found.search, name)
+    columns, about = {}, found.path.search.every.about(found.path.last.fit)
+    for name in _names(found):
+        own = _columns(found.path, about, name)
         if own is not None and float(np.sum(own**2)) > 0.0:
             columns[name] = own
     kept = tuple(columns)
@@ -77,20 +76,14 @@ def _names(found: Diagnosis) -> list[str]:
     return list(dict.fromkeys(names))[: _FEW if found.missing else _MANY]
 
 
-def _columns(found: Search, name: str) -> Array | None:
+def _columns(path: ModelPath, about: About, name: str) -> Array | None:
     """(N, p) what an effect does beside the base model, by plausible sizes."""
-    final = found.last.fit
-    if name in final.terms:
-        own = final.jacobian[:, final.terms.part(name)]
-    else:
-        tried = (c.layout for c in found.steps[0].candidates if c.name == name)
-        layout = next(tried, None)
-        if layout is None:
-            return None
-        shapes = layout.effect.shapes(final.state.prediction.setup)
-        null = layout.start(shapes[0] if shapes else {})
-        own = amplitude_columns(found.problem, final, layout, null) * layout.scale
-    had = np.array([effect in found.base for effect, _key in final.terms.labels], dtype=bool)
+    final = path.last.fit
+    key = path.search.every.keys_of(final.terms).get(name, name)
+    own = about.columns.get(key)
+    if own is None:
+        return None
+    had = np.array([effect in path.base for effect, _key in final.terms.labels], dtype=bool)
     return beside(own, basis(final.jacobian[:, had]))
 
 

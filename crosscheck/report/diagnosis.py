@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from markupsafe import Markup
 
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.steps import noise_is_other, shown_stages, stages_of
-from crosscheck.diagnosis.words import probability_name, within_words
+from crosscheck.diagnosis.words import noise_is_other, probability_name, within_words
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.words import rms_words
 from crosscheck.report.cables import draw_wall, walls_of
@@ -34,7 +33,6 @@ class _Searched:
         twins: effects that imitate each other.
         caption: of the map.
         together: whether the noise of the lengths couples the readings.
-        unsure: whether some steps are not listed.
         added: names of the effects that the last model has beyond the given one.
         tint: colour of what the last model does not explain.
     """
@@ -48,14 +46,13 @@ class _Searched:
     twins: Sequence[tuple[str, str]] = ()
     caption: str = ""
     together: bool = False
-    unsure: bool = False
     added: Sequence[str] = ()
     tint: str = BEFORE
 
 
 def diagnosis_context(found: Diagnosis) -> dict[str, object]:
     """What the template of a diagnosis asks for."""
-    of = f" of {title_of(found.search.problem)}" if found.search is not None else ""
+    of = f" of {title_of(found.path.problem)}" if found.path is not None else ""
     return {
         "page_title": f"{found.verdict.heading}{of}",
         "heading": f"Diagnosis{of}",
@@ -81,29 +78,26 @@ def diagnosis_context(found: Diagnosis) -> dict[str, object]:
 
 
 def _searched(found: Diagnosis) -> _Searched:
-    if found.search is None:
+    if found.path is None:
         return _Searched()
-    problem = found.search.problem
-    before, after = shown_stages(found)
-    # what the wall overlays is the last model, sure or not: it shows what was tried
-    last = stages_of(found)[-1]
+    problem = found.path.problem
+    before, last = found.path.first, found.path.last
     confusion = confusion_of(found)
     other = noise_is_other(found)
     calm = found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
     alone = CALM if calm else BEFORE
     walls = [draw_wall(wall, alone) for wall in walls_of(problem, before, last)]
-    added = [n for n in last.state.terms.names if n not in found.search.base]
+    added = [n for n in last.state.terms.names if n not in found.path.base]
     return _Searched(
         facts=[*facts(problem, other_noise=other), *_unknown_facts(found)],
         other_noise=other,
         waterfall=Markup(waterfall(found)),  # ours, escaped there; so are the others
-        map=Markup(failure_map(problem, before, after)),
+        map=Markup(failure_map(problem, before, last)),
         confusion="" if confusion is None else Markup(draw_confusion(confusion)),
         walls=[Markup(text) for text in walls],
         twins=[] if confusion is None else confusion.twins,
         caption=caption(problem, before),
         together=bool(problem.sigma.length_m),
-        unsure=not all(stage.listed for stage in stages_of(found)),
         added=added,
         tint=TINT if added else alone,
     )

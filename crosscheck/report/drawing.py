@@ -28,7 +28,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from seecr.pose import Array
 
 # Okabe and Ito (2008): pairs that stay apart for every common kind of colour blindness.
-BEFORE, TINT, AFTER, UNSURE = "#D55E00", "#EFA06B", "#0072B2", "#8a94a0"
+BEFORE, TINT, AFTER = "#D55E00", "#EFA06B", "#0072B2"
 CALM = "#6f7f8f"
 """Of the model as it stands where nothing is missing: no colour of alarm."""
 

@@ -103,8 +103,8 @@ def _parameter(
 
 def _correlations(found: Diagnosis, finding: MissingEffect) -> list[str]:
     """Parameters that the data hold together, the strongest first."""
-    assert found.search is not None
-    best = found.search.last.fit
+    assert found.path is not None
+    best = found.path.last.fit
     every = _spoken(best.terms, finding.effect)
     own = np.flatnonzero(best.terms.own(finding.effect))
     correlation = best.correlation

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.comparison.associations import Association
-from crosscheck.diagnosis.order import Step
+from crosscheck.diagnosis.path import ModelPath, Stage
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.steps import stages_of
-from crosscheck.fit.effects.candidates import Candidate
-from crosscheck.fit.effects.evidence import FALSE_ALARM, p_value
-from crosscheck.fit.noise.whiteness import POOR_FIT, STRUCTURED
-from crosscheck.fit.reasons import DiagnosisVerdict, probability_words
+from crosscheck.fit.noise.whiteness import STRUCTURED
+from crosscheck.fit.reasons import probability_words
+from crosscheck.inference.priors import SURE
 from crosscheck.report.findings import PLAUSIBLE
 from crosscheck.units import chance, in_unit, parameter_name, short
+from seecr.effects import Term
 from seecr.effects.base import Layout
 from seecr.effects.setup import Setup
+
+# Noise within this factor of what was stated is as stated.
+_AS_STATED = 1.25
 
 
 @dataclass(frozen=True)
@@ -38,43 +41,35 @@ class Check:
 
 def checks(found: Diagnosis) -> list[Check]:
     """What speaks for the verdict and what against it."""
-    if found.search is None or found.whiteness is None:
+    path, chances, w = found.path, found.chances, found.whiteness
+    if path is None or chances is None or w is None:
         return []
-    w = found.whiteness
+    scales, _rhos = path.search.best.fit.noise.by_kind(path.problem)
+    sizes = ", ".join(
+        f"{short(value)} times the assumed one ({kind})" for kind, value in scales.items()
+    )
+    unknown = chances.unknown
     out = [
-        Check(
-            "size of the residuals", w.p > POOR_FIT,
-            f"χ² per reading {short(w.chi2 / w.dof)} (p {chance(w.p)})",
-        ),
+        Check("size of the noise", max(scales.values()) < _AS_STATED, sizes),
         Check(
             "neighbouring rows", not w.structured,
             f"their correlation is {short(max(w.lag_errors, w.neighbour_errors))} standard errors "
-            f"from zero; noise stays below {STRUCTURED:g}",
+            f"from zero; white noise stays below {STRUCTURED:g}",
         ),
+        Check(
+            "something unknown", unknown < 1.0 - SURE,
+            f"probability {probability_words(unknown)}",
+        ),
+        Check("effects tried", None, f"{path.tried}, in {len(path.search.cache)} models"),
     ]  # fmt: skip
-    return out + _of_effects(found)
-
-
-def _of_effects(found: Diagnosis) -> list[Check]:
-    assert found.search is not None
-    tried = found.search.tried
-    steps = [stage.step for stage in itertools.takewhile(lambda s: s.listed, stages_of(found))]
-    if len(steps) == 1:
-        smallest = min((c.p for c in steps[0].candidates if c.drop > 0), default=1.0)
-        return [
-            Check("effects tried", None, f"{tried}; none is significant (smallest p, corrected "
-                f"for all of them: {chance(min(1.0, tried * smallest))})")
-            if found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
-            else Check("effects tried", None, str(tried))
-        ]  # fmt: skip
-    better, blocks = _better_runs(steps)
-    worst, largest = max((_largest_sizes(step), step.added) for step in steps[1:])
-    p = max(_chance(steps[k - 1], steps[k]) for k in range(1, len(steps)))
-    bound = _at_bounds(steps[-1])
+    listed = path.stages
+    if not any(stage.added for stage in listed):
+        return out
+    better, blocks = _better_runs(listed)
+    worst, largest = max((_largest_size(stage), stage.added) for stage in listed if stage.added)
+    bound = _at_bounds(listed[-1])
     return [
-        Check("effects tried", None, str(tried)),
-        Check("chance", p < FALSE_ALARM, f"explains the added effects with p {chance(p)}, "
-            "corrected for all effects tried"),
+        *out,
         Check("held-out runs", better == blocks, "each added effect improves the prediction of "
             f"{better} of {blocks}"),
         Check("sizes", worst < PLAUSIBLE and not bound, f"at most {short(worst, 2)} plausible "
@@ -82,28 +77,25 @@ def _of_effects(found: Diagnosis) -> list[Check]:
     ]  # fmt: skip
 
 
-def _better_runs(steps: list[Step]) -> tuple[int, int]:
-    """Runs left out whose error falls with every effect that was added, and all."""
-    falls = [a.held_out.chi2 - b.held_out.chi2 for a, b in itertools.pairwise(steps)]
-    least = np.min(falls, axis=0)
+def _better_runs(stages: Sequence[Stage]) -> tuple[int, int]:
+    """Runs left out whose error falls with every effect that was added, and all.
+
+    Only of steps with the same blocks: those of an effect with values for each run are others.
+    """
+    pairs = [(a.held_out.chi2, b.held_out.chi2) for a, b in itertools.pairwise(stages)]
+    falls = [a - b for a, b in pairs if len(a) == len(b)]
+    least = np.min(falls, axis=0) if falls else np.zeros(0)
     return int(np.sum(least > 0)), len(least)
 
 
-def _largest_sizes(step: Step) -> float:
-    return float(np.max(np.abs(step.fit.terms[step.added].sizes)))
+def _largest_size(stage: Stage) -> float:
+    return float(np.max(np.abs(stage.fit.terms[stage.added].sizes)))
 
 
-def _at_bounds(step: Step) -> list[str]:
+def _at_bounds(stage: Stage) -> list[str]:
     """The effects of a model that have a parameter at its bound."""
-    labels = np.array(step.fit.terms.labels)[step.fit.at_bound]
+    labels = np.array(stage.fit.terms.labels)[stage.fit.at_bound]
     return list(dict.fromkeys(effect for effect, _name in labels.tolist()))
-
-
-def _chance(before: Step, after: Step) -> float:
-    """Chance of the fall of chi2, for as many effects as were tried."""
-    count = len(after.fit.terms[after.added].layout)
-    p = p_value(before.whiteness.chi2 - after.whiteness.chi2, count, False)
-    return min(1.0, p * max(before.tried, 1))
 
 
 @dataclass(frozen=True)
@@ -128,18 +120,15 @@ class CandidateRow:
 
 def candidate_rows(found: Diagnosis) -> list[CandidateRow]:
     """Effects that were tried and are not listed, with the reason, the nearest miss first."""
-    by_name = {}
-    if found.search is not None:
-        by_name = {c.name: c for c in found.search.steps[0].candidates}
     out = []
     for row in (row for row in found.candidates if not row.why_not.lacking):
-        candidate = by_name.get(row.effect)
+        alone = None if found.path is None else found.path.alone(row.effect)
         out.append(
             CandidateRow(
                 effect=row.effect,
                 title=row.title,
-                alone=_alone(found, candidate),
-                needs=_needs(found, candidate),
+                alone=None if alone is None else alone[0],
+                needs="" if alone is None or found.path is None else _needs(found.path, alone[1]),
                 why_not=str(row.why_not),
                 probability=_probability(found, row.effect),
                 together=_together(found, row.effect),
@@ -171,24 +160,9 @@ def _together(found: Diagnosis, effect: str) -> str:
     return ""
 
 
-def _alone(found: Diagnosis, candidate: Candidate | None) -> float | None:
-    """Part of the excess chi2 that the effect takes away by itself, in sample, 0 to 1."""
-    if candidate is None or found.search is None or (candidate.fit or candidate.alone) is None:
-        return None
-    start = found.search.steps[0]
-    excess = start.whiteness.chi2 - start.whiteness.dof
-    return float(np.clip(candidate.drop / excess, 0.0, 1.0)) if excess > 0.0 else None
-
-
-def _needs(found: Diagnosis, candidate: Candidate | None) -> str:
+def _needs(path: ModelPath, term: Term) -> str:
     """What it would take: the parameter that is largest in plausible sizes."""
-    if candidate is None or found.search is None:
-        return ""
-    term = candidate.alone if candidate.fit is None else candidate.fit.terms[candidate.name]
-    if term is None:
-        return ""
-    layout = term.layout
-    setup = found.search.steps[0].fit.state.prediction.setup
+    layout, setup = term.layout, path.first.state.prediction.setup
     size = np.where(_makes_size(layout, setup), term.sizes, 0.0)
     k = int(np.argmax(np.abs(size)))
     factor, unit = in_unit(layout.units[k])

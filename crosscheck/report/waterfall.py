@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 
+from crosscheck.diagnosis.path import Stage
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.steps import Stage, by_block, floor_of, noise_is_other, stages_of
-from crosscheck.fit.least_squares.problem import Kind, kinds_read, rms_by_kind
+from crosscheck.diagnosis.words import noise_is_other
+from crosscheck.fit.least_squares.problem import Kind, kinds_read
 from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.inference.held_out import rms_by_block
 from crosscheck.report.drawing import (
     AFTER,
     BEFORE,
@@ -16,7 +20,6 @@ from crosscheck.report.drawing import (
     GREY,
     INK,
     NOISE,
-    UNSURE,
     blank,
     grid,
     image,
@@ -35,9 +38,9 @@ _ABOVE = 1.15
 
 def waterfall(found: Diagnosis) -> str:
     """One row per model, one panel per kind of reading."""
-    stages = stages_of(found)
-    assert found.search is not None
-    kinds = kinds_read(found.search.problem)
+    assert found.path is not None
+    stages = found.path.stages
+    kinds = kinds_read(found.path.problem)
     with styled():
         figure = blank(0.42 * len(stages) + 1.05)
         panels = figure.subplots(1, len(kinds), sharey=True, squeeze=False)[0]
@@ -53,15 +56,15 @@ def _label(stage: Stage, found: Diagnosis) -> str:
     if rivals and rivals[0]:
         more = f" or {len(rivals[0])} more" if len(rivals[0]) > 1 else f"\nor {rivals[0][0].name}"
         return stage.label + more
-    return stage.label if stage.listed else f"{stage.label}\n(not certain)"
+    return stage.label
 
 
-def _panel(axes: Axes, found: Diagnosis, stages: list[Stage], kind: Kind) -> None:
-    assert found.search is not None
-    problem = found.search.problem
-    values = [(stage.step.held_out.rms[kind.key] or 0.0) * kind.factor for stage in stages]
-    blocks = [by_block(problem, stage, kind) * kind.factor for stage in stages]
-    floor = floor_of(found, kind) * kind.factor
+def _panel(axes: Axes, found: Diagnosis, stages: Sequence[Stage], kind: Kind) -> None:
+    assert found.path is not None
+    problem = found.path.problem
+    values = [(stage.held_out.rms[kind.key] or 0.0) * kind.factor for stage in stages]
+    blocks = [rms_by_block(problem, stage.held_out, kind.key) * kind.factor for stage in stages]
+    floor = (found.floor.get(kind.key) or 0.0) * kind.factor
     top = max(*values, *(float(np.nanmax(b, initial=0.0)) for b in blocks), floor)
     logarithmic = floor > 0.0 and top > _FAR * floor
     if logarithmic:
@@ -79,7 +82,7 @@ def _panel(axes: Axes, found: Diagnosis, stages: list[Stage], kind: Kind) -> Non
         color=GREY, fontsize=7.5, va="top",
     )  # fmt: skip
     for row, (stage, value, runs) in enumerate(zip(stages, values, blocks, strict=True)):
-        in_sample = _in_sample(found, stage, kind)
+        in_sample = _in_sample(stage, kind)
         (_point if logarithmic else _bar)(axes, row, stage, value, _colour(stage, found))
         # beside a dot, which would hide it, and on a bar
         _runs(axes, row + 0.3 * logarithmic, runs)
@@ -103,34 +106,34 @@ def _panel(axes: Axes, found: Diagnosis, stages: list[Stage], kind: Kind) -> Non
 
 
 def _is_noise(found: Diagnosis) -> bool:
-    return found.whiteness is not None and found.whiteness.is_noise
+    """Whether the last model leaves noise, of whatever size."""
+    return found.verdict in (DiagnosisVerdict.EFFECTS_FOUND, DiagnosisVerdict.NO_EFFECT_MISSING)
 
 
-def _in_sample(found: Diagnosis, stage: Stage, kind: Kind) -> float | None:
-    assert found.search is not None
-    value = rms_by_kind(found.search.problem, stage.state.raw)[kind.key]
+def _in_sample(stage: Stage, kind: Kind) -> float | None:
+    value = stage.rms[kind.key]
     return None if value is None else value * kind.factor
 
 
 def _colour(stage: Stage, found: Diagnosis) -> str:
     if not stage.added:
         return CALM if found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING else BEFORE
-    return AFTER if stage.listed else UNSURE
+    return AFTER
 
 
 def _point(axes: Axes, row: int, stage: Stage, value: float, colour: str) -> None:
     """Where the axis has no zero to begin a bar at."""
     axes.plot(
         value, row, marker="o", markersize=11, markeredgewidth=1.6, zorder=2,
-        markeredgecolor=colour, markerfacecolor=colour if stage.listed else "white",
+        markeredgecolor=colour, markerfacecolor=colour,
     )  # fmt: skip
 
 
 def _bar(axes: Axes, row: int, stage: Stage, value: float, colour: str) -> None:
     axes.barh(
         row, value, height=0.52, zorder=2,
-        color=colour if stage.listed else "white", edgecolor=colour,
-        hatch="" if stage.listed else "////", linewidth=0.8,
+        color=colour, edgecolor=colour,
+        linewidth=0.8,
     )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 
-from crosscheck.diagnosis.steps import Drawn, drawn, magnification, views_of
+from crosscheck.diagnosis.path import Drawn, drawn, magnification, views_of
 from crosscheck.fit.least_squares.problem import POSITION, Kind, Problem, kinds_read
 from crosscheck.report.drawing import GREY, INK, MANY, blank, grid, image, styled
 from seecr.counted import counted

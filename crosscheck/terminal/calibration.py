@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from crosscheck.calibration.result import Calibrated
+from crosscheck.calibration import Calibrated
 from crosscheck.model.fitted import Fitted
 from crosscheck.terminal.lines import console_for, rms_table, say, table_of
 from seecr.counted import counted

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.diagnosis.result import MissingEffect, NotListed
+from crosscheck.diagnosis.result import PROBABLE, MissingEffect, NotListed
 from crosscheck.diagnosis.words import equals_of, probability_name, within_words
 from crosscheck.fit.reasons import DiagnosisVerdict, Why, probability_words
 from crosscheck.terminal.lines import console_for, print_parameters, rms_table, say
@@ -26,8 +26,6 @@ _STYLE = {
     DiagnosisVerdict.NO_VERDICT: "bold red",
 }
 _MOST_CANDIDATES, _MOST_PARAMETERS = 6, 9
-# Effects that are not listed are named with their probability from here on.
-_PROBABLE = 0.5
 
 
 def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None) -> None:
@@ -89,7 +87,7 @@ def _print_candidates(console: Console, found: Diagnosis) -> None:
 def _all_the_same(found: Diagnosis, row: NotListed) -> str:
     """That an effect is probable, where its reason has it listed no more and does not say so."""
     chance = 0.0 if found.chances is None else found.chances.effect.get(row.effect, 0.0)
-    if chance < _PROBABLE or "{chance}" in row.why_not.why.value:
+    if chance < PROBABLE or "{chance}" in row.why_not.why.value:
         return ""
     return f" ({probability_name(found)} {probability_words(chance)})"
 
@@ -98,8 +96,8 @@ def _others(found: Diagnosis, rows: Sequence[NotListed]) -> str:
     """How probable the effects are that are not printed, the probable ones by name."""
     chances = {} if found.chances is None else found.chances.effect
     likely = {row.effect: chances[row.effect] for row in rows if row.effect in chances}
-    named = sorted((p, name) for name, p in likely.items() if p >= _PROBABLE)[::-1]
-    rest = [p for p in likely.values() if p < _PROBABLE]
+    named = sorted((p, name) for name, p in likely.items() if p >= PROBABLE)[::-1]
+    rest = [p for p in likely.values() if p < PROBABLE]
     said = [f"{name} {probability_words(p)}" for p, name in named]
     if rest:
         said.append(f"{'others ' if named else ''}{probability_words(max(rest))} or less")

@@ -33,6 +33,7 @@ class CableLengthOffset(Effect):
     """
 
     name: ClassVar[str] = "cable_length_offset"
+    anew: ClassVar[tuple[str, ...]] = ("file", "run")
     place: ClassVar[str] = "actuation"
     title: ClassVar[str] = "constant error of each cable's length"
     advice: ClassVar[str] = (
@@ -63,6 +64,7 @@ class InitialPoseError(Effect):
     """
 
     name: ClassVar[str] = "initial_pose_error"
+    anew: ClassVar[tuple[str, ...]] = ("file", "run")
     place: ClassVar[str] = "actuation"
     title: ClassVar[str] = "platform misplaced when the winches were zeroed"
     needs: ClassVar[tuple[str, ...]] = ("poses",)

@@ -116,6 +116,8 @@ class Effect:
         needs: what the data must have: any of "time", "temperature", "poses" (commands in
             poses), "tensions".
         parent: an effect that this one only makes sense beside or contains, or "".
+        anew: what may have other values of it: each "file", each "run" (a tracker that was set up
+            anew, winches homed before each run), or nothing.
         advice: how to measure it on its own, and after a colon what to expect. ``{name}`` is
             filled with a parameter in millimetres or degrees where those are its units,
             ``{largest}`` and ``{which}`` with the parameter that is the most plausible sizes from
@@ -129,6 +131,7 @@ class Effect:
     title: ClassVar[str] = ""
     needs: ClassVar[tuple[str, ...]] = ()
     parent: ClassVar[str] = ""
+    anew: ClassVar[tuple[str, ...]] = ()
     advice: ClassVar[str] = ""
     renamed: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 

@@ -48,6 +48,7 @@ class ExitPointError(Effect):
     """
 
     name: ClassVar[str] = "exit_point_error"
+    anew: ClassVar[tuple[str, ...]] = ("file", "run")
     place: ClassVar[str] = "geometry"
     title: ClassVar[str] = "misplaced exit points"
     advice: ClassVar[str] = (
@@ -72,6 +73,7 @@ class AnchorPointError(Effect):
     """
 
     name: ClassVar[str] = "anchor_point_error"
+    anew: ClassVar[tuple[str, ...]] = ("file",)
     place: ClassVar[str] = "geometry"
     title: ClassVar[str] = "misplaced anchor points"
     advice: ClassVar[str] = (

@@ -28,6 +28,7 @@ class PlatformMass(Effect):
     """The platform is heavier than assumed: m -> m + added. Positive: heavier."""
 
     name: ClassVar[str] = "platform_mass"
+    anew: ClassVar[tuple[str, ...]] = ("file",)
     place: ClassVar[str] = "load"
     title: ClassVar[str] = "mass of the platform"
     advice: ClassVar[str] = "weigh the platform: expect {mass:.4g} kg, not {mass_nominal:.4g}"
@@ -51,6 +52,7 @@ class CentreOfMass(Effect):
     """
 
     name: ClassVar[str] = "centre_of_mass"
+    anew: ClassVar[tuple[str, ...]] = ("file",)
     place: ClassVar[str] = "load"
     title: ClassVar[str] = "centre of mass of the platform"
     advice: ClassVar[str] = (
@@ -85,6 +87,7 @@ class ExternalWrench(Effect):
     """
 
     name: ClassVar[str] = "external_wrench"
+    anew: ClassVar[tuple[str, ...]] = ("file",)
     place: ClassVar[str] = "load"
     title: ClassVar[str] = "a constant force and moment on the platform"
     advice: ClassVar[str] = "look for a hose or cable that pulls on the platform, and remove it"

@@ -21,6 +21,7 @@ class TrackerFrame(Effect):
     """
 
     name: ClassVar[str] = "tracker_frame"
+    anew: ClassVar[tuple[str, ...]] = ("file", "run")
     place: ClassVar[str] = "sensing"
     title: ClassVar[str] = "the tracker's frame relative to the robot's"
     advice: ClassVar[str] = "register the tracker again on targets fixed to the frame"
@@ -45,6 +46,7 @@ class TrackerTarget(Effect):
     """
 
     name: ClassVar[str] = "tracker_target"
+    anew: ClassVar[tuple[str, ...]] = ("file",)
     place: ClassVar[str] = "sensing"
     title: ClassVar[str] = "the position of the target on the platform"
     advice: ClassVar[str] = "measure where the target sits on the platform"

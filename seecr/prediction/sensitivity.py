@@ -320,14 +320,6 @@ def _motion_at(tables: Tables, found: batch.Evaluation) -> Array:
     return motion_columns(screws, origin) * per[:, None, :]
 
 
-def with_inverse(at: Prediction, inverse: Array) -> Prediction:
-    """The prediction with another inverse of its rows' stiffness (n, d, d).
-
-    An example is a damped inverse, if the rows are at poses that are no equilibria.
-    """
-    return replace(at, kept={"inverse": inverse})
-
-
 def _inverse_stiffness(at: Prediction) -> Array:
     return _inverse_of(at.tables, at.found)
 

@@ -14,7 +14,7 @@ from made_data import measured
 
 import seecr
 from crosscheck.add import add_effect
-from crosscheck.diagnosis.verdict import diagnose
+from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.model.write import Provenance, save_model, with_fit
 from seecr.effects import registry
 from seecr.pose import quat_from_rotvec, quat_rotate

@@ -8,8 +8,8 @@ import pytest
 from made_data import case, refused, run
 from made_diagnoses import readings, robot
 
-from crosscheck.calibration.result import calibrate
-from crosscheck.diagnosis.verdict import diagnose
+from crosscheck.calibration import calibrate
+from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.reasons import Why
 from crosscheck.given import considered

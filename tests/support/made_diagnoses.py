@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 from made_data import measured, term
 
+from crosscheck.diagnosis.diagnose import diagnose as diagnose_with
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.verdict import diagnose as diagnose_with
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot

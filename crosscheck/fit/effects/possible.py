@@ -4,16 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.fit.effects.registration import NAME as TRACKER
 from seecr.description.robot import Robot
 from seecr.effects import Term, Terms
-
-# If structure remains, an effect of more plausible sizes than this is not believed.
-PLAUSIBLE = 20.0
-# Nowhere is an effect of more plausible sizes than this believed: five standard deviations of the
-# widest prior. (The cables of one real robot were truly 20 plausible sizes longer than stated.)
-_EVER = 50.0
-_TARGET = "tracker_target"
 
 
 def can_be(robot: Robot, terms: Terms, stood: Terms) -> bool:
@@ -41,16 +33,6 @@ def _is_stopped(term: Term) -> bool:
     at_bound = (value <= layout.lower) | (value >= layout.upper)
     fitted = ~layout.shape & ~term.knowledge.fixed
     return bool(np.any(at_bound & (value != layout.null) & fitted))
-
-
-def is_plausible(term: Term) -> bool:
-    """Whether an effect has a believable size where others may imitate it."""
-    return largest_size(term) < PLAUSIBLE
-
-
-def hardly_happens(term: Term) -> bool:
-    """Whether an effect is larger than any is; a tracker and its target may be anywhere."""
-    return term.name not in (TRACKER, _TARGET) and largest_size(term) > _EVER
 
 
 def largest_size(term: Term) -> float:

@@ -61,14 +61,6 @@ def inverse_of(matrix: Array) -> Array:
     return np.asarray(half.T @ half)
 
 
-def roots_of(matrices: Array) -> Array:
-    """The Cholesky factors of many such matrices (n, k, k)."""
-    try:
-        return np.asarray(np.linalg.cholesky(matrices), float)
-    except np.linalg.LinAlgError:
-        return np.stack([root_of(one) for one in matrices])
-
-
 def solved(matrix: Array, right: Array) -> Array:
     """The solution x (k,) of matrix x = right, for such a matrix (k, k)."""
     if np.max(np.diag(matrix), initial=0.0) < _USUAL:

@@ -10,8 +10,6 @@ count for less than stated and those values for as much as before: see :func:`fi
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from crosscheck.fit.least_squares.problem import Problem
@@ -31,17 +29,6 @@ def known_readings(terms: Terms) -> tuple[Array, Array]:
     columns = np.zeros((len(own), len(terms)))
     columns[np.arange(len(own)), own] = (terms.scale / known.stderr)[own]
     return columns, ((known.value - terms.null) / known.stderr)[own]
-
-
-def firmer(terms: Terms, factor: float) -> Terms:
-    """The same terms; what was measured independently has standard errors smaller by a factor.
-
-    A fit with noise that is larger by this factor than stated has the same optimum.
-    """
-    return Terms(
-        replace(t, knowledge=replace(t.knowledge, stderr=t.knowledge.stderr / factor))
-        for t in terms
-    )
 
 
 def known_left(terms: Terms) -> Array:

@@ -81,6 +81,10 @@ class Problem:
         """The same problem with some rows marked as outliers."""
         return self._like(far_off=rows)
 
+    def considering(self, names: frozenset[str]) -> Problem:
+        """The same problem, with only some effects that may be missing."""
+        return self._like(considered=names)
+
     def with_groups(self, groups: NDArray[np.int64] | None) -> Problem:
         """The same problem with other groups of rows."""
         return self._like(groups=groups)

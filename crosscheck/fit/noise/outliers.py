@@ -41,11 +41,6 @@ def outlying_rows(
     return np.asarray(rows)
 
 
-def without_outliers(problem: Problem, rows: NDArray[np.bool_]) -> Problem:
-    """The problem without outliers (n,); the last note of ``left_out`` names them."""
-    return problem.without(rows, f"{problem.data.lines_of(rows)} left out as outliers")
-
-
 def _stretch(some: np.ndarray, row: int) -> int:
     """How many neighbours in a row, with this one, are among some rows (n,)."""
     others = np.flatnonzero(~some)

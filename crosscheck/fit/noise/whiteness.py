@@ -21,8 +21,6 @@ _LEAST_PAIRS = 8
 _APART = 1e3
 # Beyond so many standard errors 1 - P is lost in doubles, and tail probabilities simply add up.
 _TAIL = 5.0
-# Largest correlation of residuals that standard errors are scaled for.
-_MOST_ALIKE = 0.98
 
 
 @dataclass(frozen=True)
@@ -52,19 +50,6 @@ class Whiteness:
     def structured(self) -> bool:
         """Whether neighbours are more strongly correlated than noise would be."""
         return max(self.lag_errors, self.neighbour_errors) > STRUCTURED
-
-    @property
-    def inflation(self) -> float:
-        """Factor by which standard errors of fitted values grow over those of the stated noise.
-
-        They grow with the size of the residuals. If these have structure, n residuals with a
-        correlation rho between neighbours also count for only n (1 - rho)/(1 + rho).
-        """
-        grown = max(1.0, self.scale)
-        if not self.structured:
-            return grown
-        rho = min(max(self.lag, self.neighbour, 0.0), _MOST_ALIKE)
-        return float(grown * np.sqrt((1.0 + rho) / (1.0 - rho)))
 
     @property
     def is_noise(self) -> bool:

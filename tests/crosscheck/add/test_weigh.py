@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,9 @@ import crosscheck.add.fit
 from crosscheck.add import add_effect, add_effects, weigh
 from crosscheck.comparison.residuals import compare
 from crosscheck.errors import CrosscheckError, UnsolvedError
-from crosscheck.fit.effects.gauss_newton import fit
-from crosscheck.fit.preparation.prepare import prepare
+from crosscheck.inference import fit as fit_module
+from crosscheck.inference.fit import Data, fit
+from crosscheck.preparation.prepare import prepare
 from crosscheck.terminal.addition import why_not
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
@@ -85,38 +87,42 @@ def test_errors_cover_what_another_missing_effect_does_to_a_value(
         "the standard errors include by how much another missing effect may shift these values"
     )
     assert any(widened in warning for warning in alone.warnings)
-    monkeypatch.setattr(weigh, "moved_together", lambda _p, best: np.zeros_like(best.covariance))
+    monkeypatch.setattr(weigh, "_moved_together", lambda best: np.zeros_like(best.covariance))
     blind = add_effect(parallel, data, "centre_of_mass")
     assert np.max(np.abs(blind.own.term.vector - centre.vector) / blind.own.stderr) > 5.0
     assert not any(widened in warning for warning in blind.warnings)
 
 
-def test_a_fit_knows_whether_it_came_to_an_end() -> None:
+@pytest.fixture
+def one_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fits of a single step."""
+    short = partial(fit_module._settle, steps=1)
+    monkeypatch.setattr(fit_module, "_settle", short)
+    monkeypatch.setattr(crosscheck.add.fit, "fit", partial(fit, rounds=1))
+
+
+def far_from_10_mm() -> Term:
+    return Term.of(robot(), "pulley_radius", radius_m=0.05)
+
+
+def test_a_fit_comes_to_an_end() -> None:
     ready = prepare(robot(), readings(radius_m=0.01), Terms())
-    factor = ready.problem.noise(ready.problem.experiment.predict())
-    start = Terms([Term.of(robot(), "pulley_radius", radius_m=0.05)])
-    assert fit(ready.problem, start, factor).settled
-    assert not fit(ready.problem, start, factor, iterations=1).settled
+    data = Data.of(ready.problem, Terms())
+    assert fit(data, data.state(Terms([far_from_10_mm()]))).settled
 
 
-def test_a_fit_that_did_not_end_is_never_a_number(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(crosscheck.add.fit, "_STEPS", 1)
-    monkeypatch.setattr(crosscheck.add.fit, "_TIMES", 0)
-    monkeypatch.setattr(weigh, "_HOLLOW", 0.0)
-    start = [Term.of(robot(), "pulley_radius", radius_m=0.05)]
-    with pytest.raises(UnsolvedError, match="did not converge in 1 step; nothing was") as e:
-        add_effects(robot(), readings(radius_m=0.01), start)
+@pytest.mark.usefixtures("one_step")
+def test_a_fit_knows_that_it_came_to_no_end() -> None:
+    ready = prepare(robot(), readings(radius_m=0.01), Terms())
+    data = Data.of(ready.problem, Terms())
+    assert not fit(data, data.state(Terms([far_from_10_mm()])), rounds=1).settled
+
+
+@pytest.mark.usefixtures("one_step")
+def test_a_fit_that_did_not_end_is_never_a_number() -> None:
+    with pytest.raises(UnsolvedError, match="did not converge; nothing was added") as e:
+        add_effects(robot(), readings(radius_m=0.01), [far_from_10_mm()])
     assert e.value.exit_status == 3
-
-
-def test_a_fit_in_a_hollow_goes_on_from_where_runs_left_out_did_better(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(crosscheck.add.fit, "_STEPS", 1)
-    monkeypatch.setattr(crosscheck.add.fit, "_TIMES", 0)
-    start = [Term.of(robot(), "pulley_radius", radius_m=0.05)]
-    found = add_effects(robot(), readings(radius_m=0.01), start)
-    assert abs(found.own.term.vector[0] - 0.01) < 4.0 * found.own.stderr[0] and found.pays
 
 
 def test_several_effects_are_added_together() -> None:

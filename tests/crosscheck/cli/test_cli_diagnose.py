@@ -15,14 +15,15 @@ import pytest
 from made_data import case, refused, run, term
 
 from crosscheck.cli.diagnose import _keep
-from crosscheck.diagnosis import verdict as verdict_module
-from crosscheck.diagnosis.verdict import diagnose
-from crosscheck.fit.effects.gauss_newton import FitStatus
+from crosscheck.diagnosis.diagnose import diagnose
+from crosscheck.fit.least_squares.state import State
 from crosscheck.fit.reasons import DiagnosisVerdict, Unfit
+from crosscheck.inference.fit import Data
 from crosscheck.measurements.read import load_measurements
 from crosscheck.measurements.write import write_measurements
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
+from seecr.effects import Terms
 from seecr.prediction.model import load_model
 from seecr.prediction.uncertainty import covariance_of
 
@@ -80,12 +81,12 @@ def test_a_model_that_cannot_be_solved_gives_no_verdict_with_the_reason(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The reason was once empty: "No verdict: ."."""
-    real = verdict_module.null_fit
+    real = Data.state
 
-    def unsolved(*arguments: object, **options: object) -> object:
-        return replace(real(*arguments, **options), status=FitStatus.UNSOLVED_AT_VALUES)
+    def unsolved(data: Data, terms: Terms) -> State:
+        return replace(real(data, terms), chi2=np.inf)
 
-    monkeypatch.setattr(verdict_module, "null_fit", unsolved)
+    monkeypatch.setattr(Data, "state", unsolved)
     robot = made.robot()
     found = diagnose(robot, made.readings(), [term(robot, "stiffness", factor=1.2)])
     assert found.verdict is DiagnosisVerdict.NO_VERDICT

@@ -2,34 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from linear_toy import toy
 from made_data import soft_cogiro, term
+from made_diagnoses import nothing
 
-from crosscheck.calibration.unknown.varying import Varying
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.quantities import EVERYWHERE, QuantityKind
 from crosscheck.diagnosis import advice as what_next
 from crosscheck.diagnosis.advice import check_of, measure_next, measured_directly
-from crosscheck.diagnosis.search import Search, search
+from crosscheck.diagnosis.path import ModelPath
 from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.inference.fields import Varying
 from crosscheck.planning.adding import Adding
 from crosscheck.planning.proposer import Gain, Suggestion
-from seecr.effects import Term, Terms, catalogue, layout_of
+from seecr.effects import Term, catalogue, layout_of
 
 
 @pytest.fixture(scope="module")
-def found() -> Search:
-    made = toy({}, ("tracker_scale",))
-    return search(made.trials, made.base)
+def found() -> ModelPath:
+    path = nothing().path
+    assert path is not None
+    return path
 
 
-def advice(found: Search, *where: Association) -> str:
+def advice(found: ModelPath, *where: Association) -> str:
     line, other = measure_next(found, [], DiagnosisVerdict.UNKNOWN_EFFECT, where)
     assert "crosscheck calibrate fits all effects at once" in other
     return line
@@ -51,26 +51,14 @@ def goes_with(kind: QuantityKind, words: str) -> Association:
     ],
 )
 def test_the_unknown_is_looked_for_where_it_goes(
-    found: Search, kind: QuantityKind, expected: str
+    found: ModelPath, kind: QuantityKind, expected: str
 ) -> None:
     for words in ("commanded z", "the run", "time", "anything"):
         line = advice(found, goes_with(kind, words))
         assert line.startswith(f"the unexplained error depends on {words}: {expected}")
 
 
-def test_files_whose_errors_differ_may_have_other_frames_of_the_tracker(found: Search) -> None:
-    """Two days of a crane had an unknown effect; with a frame each, both effects are found."""
-    data = found.problem.data
-    run, place = goes_with(QuantityKind.RUN, "the run"), goes_with(QuantityKind.PLACE, "x")
-    days = replace(data, files=("monday.csv", "tuesday.csv"))
-    (line,) = what_next._set_up_anew(days, [run])
-    assert 'write free = ["tracker_frame"] into the TOML' in line
-    assert what_next._set_up_anew(data, [run]) == []
-    assert what_next._set_up_anew(days, [place]) == []
-    assert what_next._set_up_anew(replace(days, free=("tracker_frame",)), [run]) == []
-
-
-def test_beside_a_constant_offset_it_is_looked_for_where_the_rest_goes(found: Search) -> None:
+def test_beside_a_constant_offset_it_is_looked_for_where_the_rest_goes(found: ModelPath) -> None:
     """Once it was said to depend on nothing, where it also varied over the workspace."""
     offset = goes_with(QuantityKind.EVERYWHERE, EVERYWHERE)
     start = "a constant offset is 60 % of the mean square of the unexplained error; "
@@ -119,7 +107,7 @@ def test_what_tells_an_effect_from_several_others_is_said_once(
     )
 
 
-def test_what_shows_as_a_hose_is_taken_off_first(found: Search) -> None:
+def test_what_shows_as_a_hose_is_taken_off_first(found: ModelPath) -> None:
     unknown = DiagnosisVerdict.UNKNOWN_EFFECT
     first, *others = measure_next(found, [], unknown, (), seen=[Varying.SPRING])
     assert first == (
@@ -130,31 +118,13 @@ def test_what_shows_as_a_hose_is_taken_off_first(found: Search) -> None:
     assert others == measure_next(found, [], unknown, (), seen=[Varying.READINGS])
 
 
-def test_without_a_lead_the_same_poses_are_repeated(found: Search) -> None:
+def test_without_a_lead_the_same_poses_are_repeated(found: ModelPath) -> None:
     assert advice(found) == (
         "repeat the same poses forward, back and an hour later, to see what the error depends on"
     )
 
 
-def test_where_it_is_open_which_effects_it_is_what_is_not_common_is_checked_by_hand(
-    found: Search, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("crosscheck.diagnosis.advice.extensions", lambda _plan: [])
-    monkeypatch.setattr("crosscheck.diagnosis.advice.telling_models_apart", lambda *_some: [])
-    names = ("gravity_tilt", "stiffness"), ("drum_gain", "stiffness")
-    either = {frozenset(both): Terms() for both in names}  # models that nothing tells apart
-    *checks, _calibrate = measure_next(found, [], DiagnosisVerdict.MANY_EFFECTS, (), either)
-    assert checks == [
-        f"to find out which effects are missing: {measured_directly(name)} ({name})"
-        for name in ("drum_gain", "gravity_tilt")
-    ]
-    one = dict(list(either.items())[:1])
-    *checks, _calibrate = measure_next(found, [], DiagnosisVerdict.MANY_EFFECTS, (), one)
-    assert [check.split()[-1] for check in checks] == ["(gravity_tilt)", "(stiffness)"]
-    assert measure_next(found, [], DiagnosisVerdict.MANY_EFFECTS, ()) == [_calibrate]
-
-
-def test_where_nothing_is_missing_the_plan_is_named(found: Search) -> None:
+def test_where_nothing_is_missing_the_plan_is_named(found: ModelPath) -> None:
     (line,) = measure_next(found, [], DiagnosisVerdict.NO_EFFECT_MISSING, ())
     assert "crosscheck plan" in line
 

@@ -11,8 +11,7 @@ from made_data import measured, term
 from made_diagnoses import POINTS, SIGMA, diagnose_with, none, nothing, pulleys, readings, robot
 
 from crosscheck.comparison.residuals import compare
-from crosscheck.diagnosis.found import _widened, found_covariance, found_effects
-from crosscheck.diagnosis.steps import shown_stages
+from crosscheck.diagnosis.model import found_covariance, found_effects
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.model.write import save_model
 from seecr.prediction.experiment import predict
@@ -55,20 +54,6 @@ def test_where_more_is_missing_than_is_listed_there_is_none(verdict: DiagnosisVe
     assert found_covariance(replace(pulleys(), verdict=verdict)) is None
 
 
-def test_beside_many_effects_errors_of_the_model_are_not_widened_by_those_of_one() -> None:
-    """There each listed effect has an error of its own."""
-    found = pulleys()
-    (listed,) = found.missing
-    wider = replace(found, missing=(replace(listed, stderr=3.0 * listed.stderr),))
-    assert _widened(wider) == pytest.approx(3.0 * _widened(found))
-    assert _widened(replace(wider, verdict=DiagnosisVerdict.MANY_EFFECTS)) == 1.0
-
-
-def test_without_a_search_there_is_no_model() -> None:
-    blind = replace(pulleys(), search=None)
-    assert found_effects(blind) == () and found_covariance(blind) is None
-
-
 def test_a_diagnosis_has_a_model_that_is_kept_compared_and_predicts(tmp_path: Path) -> None:
     found, data = pulleys(), readings(radius_m=0.01)
     assert found.model is not None and found.model is found.model
@@ -100,7 +85,6 @@ def test_the_model_of_a_diagnosis_has_what_was_given_too(tmp_path: Path) -> None
 def test_without_a_verdict_there_is_no_model_and_of_nothing_missing_the_plain_one() -> None:
     plain = nothing().model
     assert none().model is None and plain is not None and plain.names == ()
-    assert replace(nothing(), of=None).model is None
 
 
 def test_the_model_has_the_values_that_explain_most_by_themselves() -> None:
@@ -114,21 +98,3 @@ def test_the_model_has_the_values_that_explain_most_by_themselves() -> None:
     ))  # fmt: skip
     assert kept.term.vector == pytest.approx(listed.term.vector)
     assert kept.stderr == pytest.approx(5.0 * listed.stderr)
-
-
-@pytest.mark.parametrize("p", [0.5, 0.0])
-def test_beside_many_effects_values_are_as_uncertain_as_what_is_missing_may_shift_them(
-    p: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """An exit point was written into a model 26 of its standard errors from the truth."""
-    found = replace(pulleys(), verdict=DiagnosisVerdict.MANY_EFFECTS)
-    first, last = shown_stages(found)
-    white = replace(last.step.whiteness, p=p, scale=2.0, lag_errors=0.0, neighbour_errors=0.0)
-    stages = (first, replace(last, step=replace(last.step, whiteness=white)))
-    monkeypatch.setattr("crosscheck.diagnosis.found.shown_stages", lambda _found: stages)
-    moved = np.full(len(last.step.fit.terms), 1e-3)
-    monkeypatch.setattr("crosscheck.diagnosis.found.moved_by_others", lambda _problem, _fit: moved)
-    own, listed = last.step.fit.stderr[0], found.missing[0].stderr[0]
-    (kept,) = found_effects(found)
-    # where what is listed leaves noise, nothing else shifts it
-    assert kept.stderr[0] == pytest.approx(max(own, listed) if p else np.hypot(2.0 * own, 1e-3))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from crosscheck.diagnosis.verdict import diagnose
+from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.measurements.read import load_measurements
 from crosscheck.twin.answer import unseal
 from crosscheck.twin.make import make_twin

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from crosscheck import compare
-from crosscheck.calibration.result import calibrate
-from crosscheck.diagnosis.verdict import diagnose
+from crosscheck.calibration import calibrate
+from crosscheck.diagnosis.diagnose import diagnose
 
 pytestmark = pytest.mark.slow
 

@@ -14,7 +14,7 @@ import pytest
 from made_data import run
 from true_models import true_terms
 
-from crosscheck.diagnosis.verdict import diagnose
+from crosscheck.diagnosis.diagnose import diagnose
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.files import json_text

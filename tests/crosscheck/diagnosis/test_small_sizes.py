@@ -6,7 +6,7 @@ import pytest
 from made_data import COGIRO, measured, term
 from made_diagnoses import SLOW
 
-from crosscheck.diagnosis.verdict import diagnose
+from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.planning.design import make_plan
 from crosscheck.planning.visibility import NAMED
 from seecr.description.mjcf import load_robot

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from made_data import COGIRO, measured, term
 
+from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.measurements.data import Measurements
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
@@ -79,29 +79,24 @@ FLEXIBLE = (
 # The search takes longest where it is led furthest astray, and where all effects are tried: those
 # run in a sweep, and one of two among few effects. In every run the floor sways beside a known one.
 ALONE = [
-    (bumped_tracker, "cogiro", FLEXIBLE),
-    pytest.param(wavy_target, "cogiro", FLEXIBLE, marks=pytest.mark.sweep),
+    (wavy_target, "cogiro", FLEXIBLE),
     *(
         pytest.param(change, name, (), marks=pytest.mark.sweep)
         for name in ("cogiro", "parallel")
-        for change in (bumped_tracker, lens, lens_from_aside, swaying_floor, rubbing, wavy_target)
+        for change in (lens, lens_from_aside, swaying_floor, rubbing, wavy_target)
     ),
 ]
 BESIDE = [
     (swaying_floor, FLEXIBLE),
     *(
         pytest.param(change, (), marks=pytest.mark.sweep)
-        for change in (bumped_tracker, lens, swaying_floor, rubbing, wavy_target)
+        for change in (lens, swaying_floor, rubbing, wavy_target)
     ),
 ]
 
 
 def robot_named(name: str) -> Robot:
     return load_robot(COGIRO if name == "cogiro" else model_path("demobot_parallel"))
-
-
-def bumped_in_its_run(found: Diagnosis) -> None:
-    assert found.where[0].against == "the run"
 
 
 def swaying_at_its_period(found: Diagnosis) -> None:
@@ -118,7 +113,6 @@ def of_a_place_and_no_period(found: Diagnosis) -> None:
 
 
 WHERE: dict[tuple[Change, str], Callable[[Diagnosis], None]] = {
-    (bumped_tracker, "cogiro"): bumped_in_its_run,
     (swaying_floor, "cogiro"): swaying_at_its_period,
     (rubbing, "cogiro"): of_a_place_and_no_period,
     (wavy_target, "cogiro"): of_a_place_and_no_period,
@@ -147,21 +141,42 @@ def test_an_unknown_effect_is_called_unknown_and_shown_where_it_lives(
 
 
 @pytest.mark.parametrize(("change", "only"), BESIDE, ids=named)
-def test_beside_a_known_effect_the_known_one_alone_is_named(
-    change: Change, only: tuple[str, ...]
-) -> None:
+def test_beside_a_known_effect_nothing_else_is_named(change: Change, only: tuple[str, ...]) -> None:
     robot = robot_named("cogiro")
     data = measured(robot, [term(robot, "pulley_radius", **PULLEY)], points=POINTS, seed=4)
     change(data)
     found = diagnose(robot, data, only=only)
     assert found.verdict == "unknown_effect"
-    assert [f.effect for f in found.missing] == ["pulley_radius"]
-    # what is not modelled pulls at it, by more than noise would
-    assert found.missing[0].values[0] == pytest.approx(0.01, rel=0.1)
+    assert {f.effect for f in found.missing} <= {"pulley_radius"}
+    for one in found.missing:
+        # what is not modelled pulls at it, by more than noise would
+        assert one.values[0] == pytest.approx(0.01, rel=0.1)
     WHERE.get((change, "cogiro"), lambda _found: None)(found)
 
 
-def test_what_outweighs_all_that_is_unknown_is_named_though_a_smooth_field_looks_like_it() -> None:
+@pytest.mark.parametrize("known", [(), ("pulley_radius",)], ids=str)
+def test_a_tracker_that_was_bumped_for_one_run_is_found_as_a_frame_of_each_run(
+    known: tuple[str, ...],
+) -> None:
+    robot = robot_named("cogiro")
+    hidden = [term(robot, name, **PULLEY) for name in known]
+    data = measured(robot, hidden, points=POINTS, seed=3)
+    bumped_tracker(data)
+    found = diagnose(robot, data, only=FLEXIBLE)
+    assert found.verdict == "effects_found"
+    assert {f.effect: f.per for f in found.missing} == {
+        "tracker_frame": "run",
+        **dict.fromkeys(known, ""),
+    }
+    frame = next(f for f in found.missing if f.effect == "tracker_frame")
+    values = dict(zip(frame.layout.names, frame.values, strict=True))
+    run = str(np.unique(data.run)[1])
+    bumped = [values[key] for key in values if f": {run}: shift" in key]
+    error = max(e for k, e in zip(frame.layout.names, frame.stderr, strict=True) if "shift" in k)
+    assert bumped == pytest.approx([8e-4, -5e-4, 6e-4], abs=4.0 * float(error))
+
+
+def test_beside_what_is_much_larger_a_drift_is_seen_and_nothing_false_is_named() -> None:
     """A platform misplaced by 11 mm, and a tracker that drifts by 1.6 mm."""
     off = {"position_x_m": 0.01, "position_z_m": -0.005, "rotation_y_rad": 0.01}
     data = measured(
@@ -172,11 +187,10 @@ def test_what_outweighs_all_that_is_unknown_is_named_though_a_smooth_field_looks
     only = ("initial_pose_error", "exit_point_error", "cable_length_offset", "tracker_target")
     found = diagnose(robot_named("cogiro"), data, only=only)
     assert found.verdict == "unknown_effect"
-    assert [f.effect for f in found.missing] == ["initial_pose_error"]
-    assert found.missing[0].probability > 0.95  # though the drift could be much of its worth
-    assert "; structure remains that no known effect explains" in found.sentence
+    # a cubic of all readings could do what it does: it need not be named, and nothing else may be
+    assert {f.effect for f in found.missing} <= {"initial_pose_error"}
     assert found.sentence.endswith("varies smoothly over the session, in the position.")
     assert any("stationary target" in advice for advice in found.measure_next)
     assert found.where and not any("noise" in note for note in found.notes)
     beside = found.as_json()["unknown"]
-    assert "instead_of" not in beside and beside["seen_in"] == "session"
+    assert "session" in beside["seen_in"] and beside["probability"] > 0.95

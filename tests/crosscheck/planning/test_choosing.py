@@ -11,8 +11,7 @@ from three_cables import THREE
 
 import crosscheck
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.effects.candidates import null_fit
-from crosscheck.fit.preparation.prepare import prepare
+from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_commands
 from crosscheck.measurements.write import write_measurements
@@ -23,6 +22,7 @@ from crosscheck.planning.detours import detours
 from crosscheck.planning.planned import Reads, planned
 from crosscheck.planning.sight import sight_of
 from crosscheck.planning.write import remark_of
+from crosscheck.preparation.prepare import prepare
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Terms
@@ -134,9 +134,7 @@ def test_a_run_that_starts_at_its_first_row_has_nothing_beyond_that(cogiro):
 def sight(robot, data):
     ready = prepare(robot, data, Terms())
     factor = ready.problem.noise(ready.problem.experiment.predict(ready.terms.effects))
-    return sight_of(
-        ready.problem, null_fit(ready.problem, ready.terms, factor, refit=False), factor
-    )
+    return sight_of(ready.problem, evaluate(ready.problem, ready.terms, factor), factor)
 
 
 def test_what_data_can_show_is_known_before_any_verdict(cogiro):

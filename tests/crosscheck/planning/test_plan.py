@@ -10,8 +10,9 @@ import pytest
 from made_data import SIGMA, measured, soft_cogiro, term
 from scipy import stats
 
-from crosscheck.fit.effects.candidates import Trials, null_fit, try_candidate
 from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.least_squares.state import evaluate
+from crosscheck.inference.fit import Data, fit
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.together import together
 from crosscheck.planning.adding import MORE_POSES, Adding
@@ -84,7 +85,7 @@ def test_the_smallest_visible_size_leaves_the_signal_needed(robot, plan):
         sigma=Sigma(1e-12, 1e-12),
     )  # fmt: skip
     problem = Problem(robot, replace(quiet, sigma=SIGMA), SIGMA, np.ones(quiet.n_rows, dtype=bool))
-    base = null_fit(problem, Terms(), problem.noise(problem.experiment.predict()), refit=False)
+    base = evaluate(problem, Terms(), problem.noise(problem.experiment.predict()))
     assert base.chi2 == pytest.approx(found.needed, rel=0.05)
 
 
@@ -104,11 +105,10 @@ def _found(robot, layout, vector, seed):
     hidden = replace(term(robot, layout.name), vector=vector)
     data = measured(robot, [hidden], seed=seed)
     problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
-    factor = problem.noise(problem.experiment.predict())
-    tried = try_candidate(
-        Trials(problem, factor), null_fit(problem, Terms(), factor, refit=False), layout
-    )
-    return tried.fit is not None and tried.p < 0.05 / 24
+    every = Data.of(problem, Terms())
+    tried = fit(every, every.state(Terms([term(robot, layout.name)])), {layout.name: 10.0})
+    fall = every.state(Terms()).chi2 - tried.state.chi2
+    return stats.chi2.sf(fall, tried.seen.sum()) < 0.05 / 24
 
 
 def test_what_is_alike_by_algebra_is_named(plan):
@@ -217,7 +217,7 @@ def test_poses_near_slack_are_flagged():
     parallel = load_robot(model_path("demobot_parallel"))
     commands = measured(parallel, points=4)
     found = make_plan(parallel, commands)
-    states = found.planned.base.state.prediction
+    states = found.planned.base.prediction
     assert found.slack
     tensions = states.tensions
     for (row, cable), (line, name) in zip(near_slack(found.planned), found.slack, strict=True):

@@ -13,11 +13,10 @@ import pytest
 from recordings import Readback, headless_viewer
 
 from crosscheck.comparison.residuals import Comparison, compare
+from crosscheck.diagnosis.path import Stage
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.steps import Stage, stages_of
 from crosscheck.diagnosis.words import removed
 from crosscheck.fit.least_squares.problem import KINDS, POSITION
-from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.recording import bars
 from crosscheck.recording.comparison import write_comparison_recording
 from crosscheck.recording.diagnosis import write_diagnosis_recording
@@ -39,13 +38,14 @@ def found() -> Diagnosis:
 
 @pytest.fixture(scope="module")
 def stages(found: Diagnosis) -> list[Stage]:
-    return stages_of(found)
+    assert found.path is not None
+    return list(found.path.stages)
 
 
 @pytest.fixture(scope="module")
 def shown(found: Diagnosis, stages: list[Stage]) -> Misfit:
-    assert found.search is not None
-    return Misfit(found.search.problem, stages[0].state)
+    assert found.path is not None
+    return Misfit(found.path.problem, stages[0].state)
 
 
 @pytest.fixture(scope="module")
@@ -169,7 +169,7 @@ def test_plots_over_poses_are_each_models_errors(
         for k, stage in enumerate(stages):
             sizes = kind.sizes(shown.problem, stage.state.raw) * kind.factor
             assert back.scalars(f"/plot/{kind.name}/model_{k}") == pytest.approx(sizes)
-        rms = [s.step.held_out.rms[kind.key] * kind.factor for s in stages]  # type: ignore[operator]
+        rms = [s.held_out.rms[kind.key] * kind.factor for s in stages]  # type: ignore[operator]
         assert back.scalars(f"/plot/{kind.name}/left_out", STEP) == pytest.approx(rms)
 
 
@@ -189,15 +189,8 @@ def test_unknown_is_said_and_drawn(tmp_path: Path) -> None:
     write_diagnosis_recording(found, path)
     back = Readback(path)
     assert "# Unknown effect" in back.static("/text/verdict", "TextDocument:text")[0]
-    assert len(back.column("/scene/errors", STEP, STEP)) == len(stages_of(found))
-
-
-def test_what_is_not_sure_is_said_so(found: Diagnosis, tmp_path: Path) -> None:
-    path = tmp_path / "unsure.rrd"
-    write_diagnosis_recording(
-        replace(found, missing=(), verdict=DiagnosisVerdict.UNKNOWN_EFFECT), path
-    )
-    assert "Not certain" in _steps(Readback(path))[1]
+    assert found.path is not None
+    assert len(back.column("/scene/errors", STEP, STEP)) == len(found.path.stages)
 
 
 def test_no_verdict_is_words_alone(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import io
 import itertools
 import re
 import xml.etree.ElementTree as ElementTree
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,21 +21,15 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from PIL import Image
 from written_pages import figures_of, text_of
 
-from crosscheck.calibration.unknown.imitated import Imitated
-from crosscheck.diagnosis.result import Diagnosis, NotListed
-from crosscheck.diagnosis.steps import (
-    by_block,
-    drawn,
-    magnification,
-    shown_stages,
-    stages_of,
-    views_of,
-)
-from crosscheck.diagnosis.words import OTHERS_WITHIN, WITHIN, removed
-from crosscheck.fit.effects.candidates import Candidate
-from crosscheck.fit.least_squares.imitation import imitated
+from crosscheck.diagnosis.path import ModelPath, Stage, drawn, magnification, views_of
+from crosscheck.diagnosis.result import Diagnosis, NotListed, Rival
+from crosscheck.diagnosis.words import removed, within_words
+from crosscheck.fit.least_squares.imitation import basis, imitated
 from crosscheck.fit.least_squares.problem import KINDS
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
+from crosscheck.inference.held_out import rms_by_block
+from crosscheck.inference.noise import Noise
+from crosscheck.preparation.prepare import noise_floor
 from crosscheck.report import where, write_page
 from crosscheck.report.cables import Wall, draw_wall, length_changes, walls_of
 from crosscheck.report.confusion import confusion_of
@@ -45,7 +40,7 @@ from crosscheck.report.waterfall import waterfall
 from crosscheck.report.where import failure_map
 from crosscheck.report.write import render
 from crosscheck.units import short, with_error
-from seecr.effects import Terms
+from seecr.effects import Terms, layout_of
 from seecr.errors import InputFileError
 
 pytestmark = pytest.mark.slow
@@ -57,6 +52,22 @@ EVIL = '<script>alert("1")</script>&$x$'
 def diagnosis(name: str) -> Diagnosis:
     found: Diagnosis = getattr(made, name)()
     return found
+
+
+def path_of(found: Diagnosis) -> ModelPath:
+    assert found.path is not None
+    return found.path
+
+
+def ends_of(found: Diagnosis) -> tuple[Stage, Stage]:
+    """The model as it stood, and the last one of listed effects."""
+    return path_of(found).first, path_of(found).last
+
+
+def with_last(found: Diagnosis, **changes: Any) -> Diagnosis:
+    """A diagnosis whose last model is changed."""
+    *stages, last = path_of(found).stages
+    return replace(found, path=replace(path_of(found), stages=(*stages, replace(last, **changes))))
 
 
 @pytest.fixture
@@ -161,50 +172,32 @@ def test_unknown_shows_where_structure_is_left() -> None:
         assert row.bins[0].label in seen or len(row.bins) == 1
     assert "not explained" in seen
     # what was tried may be a part of the catalogue; inks are other ones on dark pages
-    assert found.sentence.endswith("tried explains: an unknown effect is missing.")
+    assert "tried explains: an unknown effect is missing." in found.sentence
     assert "Black:" not in seen and "Bracket: the range over these runs" in seen
     assert "not explained" not in text_of(page("pulleys"))
 
 
-def test_what_was_found_but_is_not_sure_is_hatched() -> None:
-    found = diagnosis("pulleys")
-    unsure = replace(found, missing=(), verdict=DiagnosisVerdict.UNKNOWN_EFFECT)
-    assert "(not certain)" in text_of(waterfall(unsure))
-    assert "(not certain)" not in text_of(page("pulleys"))
-    assert shown_stages(unsure)[1].added == ""
-    assert shown_stages(found)[1].added == "pulley_radius"
-
-
 @pytest.mark.usefixtures("words_alone")
-def test_beside_something_unknown_probabilities_are_within_the_catalogue() -> None:
+def test_beside_something_unknown_probabilities_say_so() -> None:
     found = diagnosis("pulleys")
-    assert "within the catalogue" not in text_of(page("pulleys")).lower()
-    seen = text_of(render(replace(found, verdict=DiagnosisVerdict.UNKNOWN_EFFECT)))
-    assert "Probability within the catalogue that it is missing: > 99 %" in seen
-    assert WITHIN in seen and "probability within the catalogue" in seen
-    # where something imitated was weighed, they are probabilities
-    assert found.chances is not None
-    weighed = replace(found.chances, imitated=Imitated(9.0, frozenset({"length_scale"})))
-    unknown = replace(found, verdict=DiagnosisVerdict.UNKNOWN_EFFECT, chances=weighed)
-    shown = text_of(render(unknown))
-    assert "within the catalogue" not in shown.lower()
-    # those of the others are not: an effect that was there had "< 1 %", beside what imitated it
-    assert OTHERS_WITHIN in shown
+    assert "beside something unknown" not in text_of(page("pulleys")).lower()
+    unknown = replace(found, verdict=DiagnosisVerdict.UNKNOWN_EFFECT)
+    seen = text_of(render(unknown))
+    assert "Probability beside something unknown that it is missing: > 99 %" in seen
+    assert within_words(unknown) in seen and "probability beside something unknown" in seen
 
 
 def test_text_from_users_stays_text() -> None:
     found = diagnosis("pulleys")
-    assert found.search is not None
-    old = found.search.problem
+    old = path_of(found).problem
     robot = replace(old.robot, name=EVIL, cable_names=tuple(f"{EVIL}{k}" for k in range(4)))
     data = replace(old.data, path=Path(EVIL.replace("/", "")))
     problem = replace(old, robot=robot, data=data)
-    search = replace(found.search, trials=replace(found.search.trials, problem=problem))
     bad = NotListed(EVIL, EVIL, 0.0, Reason(Why.ALIKE, by=(EVIL,)))
     text = render(
         replace(
             found,
-            search=search,
+            path=replace(path_of(found), problem=problem),
             sentence=EVIL,
             notes=(EVIL,),
             measure_next=(EVIL,),
@@ -222,8 +215,15 @@ def test_text_from_users_stays_text() -> None:
 @pytest.mark.usefixtures("words_alone")
 def test_noise_that_was_assumed_and_noise_that_was_found_are_told_apart() -> None:
     found = diagnosis("pulleys")
-    larger = {key: value and 18.0 * value for key, value in found.floor.items()}
-    seen = text_of(render(replace(found, floor=larger)))
+    assumed = noise_floor(path_of(found).problem)
+    larger = {key: value and 18.0 * value for key, value in assumed.items()}
+    search = copy(path_of(found).search)
+    search.cache = {
+        key: replace(one, fit=replace(one.fit, noise=Noise(np.full(3, 18.0), np.zeros(3))))
+        for key, one in search.fitted.items()
+    }
+    path = replace(path_of(found), search=search)
+    seen = text_of(render(replace(found, floor=larger, path=path)))
     assert "assumed noise position 0.030 mm" in seen
     assert "estimated noise 0.540 mm" in seen
     assert "the error that the estimated noise alone would give" in seen
@@ -250,11 +250,10 @@ def test_the_scale_of_a_map_goes_on_where_errors_do(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(Figure, "colorbar", told)
     found = diagnosis("pulleys")
-    assert found.search is not None
-    before, after = shown_stages(found)
-    failure_map(found.search.problem, before, after)
+    before, after = ends_of(found)
+    failure_map(path_of(found).problem, before, after)
     monkeypatch.setattr(where, "_LARGEST", 100.0)
-    failure_map(found.search.problem, before, after)
+    failure_map(path_of(found).problem, before, after)
     assert extends == ["max", "neither"]
 
 
@@ -266,14 +265,13 @@ def test_the_title_above_a_narrow_map_is_whole(
     kept: list[Figure] = []
     monkeypatch.setattr(where, "image", lambda figure, _words: kept.append(figure))
     found = diagnosis("pulleys")
-    assert found.search is not None
-    before, after = shown_stages(found)
+    before, after = ends_of(found)
     for stage in (before, after):
         pose = stage.state.prediction.pose.copy()
         pose[:, :3] = np.random.default_rng(1).uniform(size=(len(pose), 3)) * spread
         monkeypatch.setitem(stage.state.prediction.kept, "pose", pose)
-    failure_map(found.search.problem, before, after)
-    failure_map(found.search.problem, before, before)
+    failure_map(path_of(found).problem, before, after)
+    failure_map(path_of(found).problem, before, before)
     for figure in kept:
         figure.draw_without_rendering()
         figure.draw_without_rendering()  # as a page and its picture do
@@ -293,13 +291,12 @@ def test_the_colours_of_a_map_stand_beside_it_and_nothing_is_empty(
     kept: list[Figure] = []
     monkeypatch.setattr(where, "image", lambda figure, _words: kept.append(figure))
     found = diagnosis("pulleys")
-    assert found.search is not None
-    before, after = shown_stages(found)
+    before, after = ends_of(found)
     for stage in (before, after):
         pose = stage.state.prediction.pose.copy()
         pose[:, :3] = np.random.default_rng(1).uniform(size=(len(pose), 3)) * spread
         monkeypatch.setitem(stage.state.prediction.kept, "pose", pose)
-    failure_map(found.search.problem, before, before if alone else after)
+    failure_map(path_of(found).problem, before, before if alone else after)
     (figure,) = kept
     figure.draw_without_rendering()
     *panels, bar = figure.axes
@@ -326,25 +323,22 @@ def test_partial_data_show_what_they_have() -> None:
 
 def test_the_wall_overlays_what_the_effect_accounts_for() -> None:
     found = diagnosis("pulleys")
-    assert found.search is not None
-    before, after = shown_stages(found)
-    wall, tension = walls_of(found.search.problem, before, after)
+    before, after = ends_of(found)
+    wall, tension = walls_of(path_of(found).problem, before, after)
     left = wall.measured - wall.predicted
     rms = np.sqrt(np.nanmean(left**2, axis=0))
     assert np.all(rms < 2.0 * wall.noise)
     assert np.all(np.sqrt(np.nanmean(wall.measured**2, axis=0)) > 20.0 * wall.noise)
     assert np.nanstd(tension.measured - tension.predicted) < 1.1 * 0.03
     nothing = diagnosis("nothing")
-    assert nothing.search is not None
-    first, last = shown_stages(nothing)
-    assert np.all(walls_of(nothing.search.problem, first, last)[0].predicted == 0.0)
+    first, last = ends_of(nothing)
+    assert np.all(walls_of(path_of(nothing).problem, first, last)[0].predicted == 0.0)
 
 
 def test_cables_whose_tension_was_not_read_have_no_panels() -> None:
     """Three of six rows were empty where three of six cables had load cells."""
     found = diagnosis("pulleys")
-    assert found.search is not None
-    problem, stages = found.search.problem, shown_stages(found)
+    problem, stages = path_of(found).problem, ends_of(found)
     tensions = problem.data.tensions.copy()
     tensions[:, 1::2] = np.nan
     some = replace(problem, data=replace(problem.data, tensions=tensions))
@@ -357,9 +351,8 @@ def test_cables_whose_tension_was_not_read_have_no_panels() -> None:
 
 def test_paid_out_is_the_commanded_change_within_a_run() -> None:
     found = diagnosis("pulleys")
-    assert found.search is not None
-    problem = found.search.problem
-    change = length_changes(problem, found.search.last.fit.state.prediction)
+    problem = path_of(found).problem
+    change = length_changes(problem, path_of(found).last.fit.state.prediction)
     lengths = problem.robot.nominal_lengths(problem.data.command_pose)
     assert np.isnan(change[0]).all()
     assert change[1] == pytest.approx(lengths[1] - lengths[0])
@@ -369,7 +362,6 @@ def test_paid_out_is_the_commanded_change_within_a_run() -> None:
 
 def test_the_confusion_map_holds_containments() -> None:
     found = diagnosis("pulleys")
-    assert found.search is not None
     confusion = confusion_of(found)
     assert confusion is not None
     assert confusion.names[: confusion.listed] == ("pulley_radius",)
@@ -377,17 +369,14 @@ def test_the_confusion_map_holds_containments() -> None:
     a, b = (confusion.names.index(n) for n in ("pulley_radius", "exit_point_error"))
     assert confusion.part[a, b] > 0.9  # 12 points move cables as a sheave does
     assert confusion.part[b, a] < 0.9
-    columns = found.search.last.fit.jacobian
-    assert confusion.part[a, a] == pytest.approx(imitated(columns, found.search.last.fit.span))
-    assert len(found.search.last.fit.terms) == 1
+    last = path_of(found).last.fit
+    assert confusion.part[a, a] == pytest.approx(imitated(last.jacobian, basis(last.jacobian)))
+    assert len(last.terms) == 1
 
 
 def test_rivals_are_named_and_framed() -> None:
     found = diagnosis("pulleys")
-    assert found.search is not None
-    from crosscheck.diagnosis.rivals import Rival
-
-    rival = Rival("exit_point_error", found.search.last.fit, 0.3)
+    rival = Rival("exit_point_error", layout_of("exit_point_error", made.robot()))
     finding = replace(found.missing[0], rivals=(rival,))
     assert finding.indistinguishable == (rival.name,)
     assert {row["indistinguishable"] for row in finding.records()} == {rival.name}
@@ -410,25 +399,22 @@ def test_a_bound_and_a_blind_parameter_are_flagged() -> None:
 
 def test_correlated_parameters_go_by_the_names_that_tables_have() -> None:
     found = diagnosis("pulleys")
-    assert found.search is not None
-    robot, last = made.robot(), found.search.last
+    robot, last = made.robot(), path_of(found).last
     terms = Terms([*last.fit.terms, term(robot, "platform_mass", added_kg=0.1)])
-    together = np.array([[1.0, 0.95], [0.95, 1.0]])
-    alike = replace(
-        last.fit, state=replace(last.fit.state, terms=terms), spread=lambda _columns: together
-    )
-    steps = (*found.search.steps[:-1], replace(last, fit=alike))
-    card = finding_card(replace(found, search=replace(found.search, steps=steps)), found.missing[0])
+    alike = replace(last.fit, state=replace(last.fit.state, terms=terms))
+    vars(alike)["covariance"] = np.array([[1.0, 0.95], [0.95, 1.0]])
+    card = finding_card(with_last(found, fit=alike), found.missing[0])
     assert card.correlations == ["radius with added of platform_mass (0.950)"]
 
 
 def test_checks_tell_noise_from_structure() -> None:
     good = {check.name: check.good for check in checks(diagnosis("pulleys"))}
-    assert good["size of the residuals"] is True
+    assert good["size of the noise"] is True
+    assert good["something unknown"] is True
     assert good["neighbouring rows"] is True
     assert good["held-out runs"] is True
     bad = {check.name: check.good for check in checks(diagnosis("unknown"))}
-    assert bad["size of the residuals"] is False
+    assert bad["something unknown"] is False
     assert checks(diagnosis("none")) == []
 
 
@@ -442,16 +428,13 @@ def test_candidates_say_what_they_would_need() -> None:
     assert "alone it explains" not in text_of(page("nothing"))
 
 
-def test_friction_would_need_a_friction_and_not_the_length_that_it_is_looked_for_with() -> None:
-    found = diagnosis("pulleys")
-    assert found.search is not None
+def test_friction_would_need_a_friction_and_not_the_length_that_it_is_looked_for_with(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     friction = term(made.robot(), "exit_friction", friction=0.2, length_m=100.0)
-    first = found.search.steps[0]
-    candidates = (Candidate(friction.layout, alone=friction),)
-    first = replace(first, candidates=candidates)
-    tried = NotListed("exit_friction", "rubs", 1.0, Reason(Why.NOT_NEEDED))
-    search = replace(found.search, steps=(first, *found.search.steps[1:]))
-    (row,) = candidate_rows(replace(found, search=search, candidates=(tried,)))
+    monkeypatch.setattr(ModelPath, "alone", lambda _path, _name: (0.5, friction))
+    tried = NotListed("exit_friction", "rubs", 1.0, Reason(Why.IMPROBABLE))
+    (row,) = candidate_rows(replace(diagnosis("pulleys"), candidates=(tried,)))
     assert row.needs == "friction = 0.200"
 
 
@@ -459,31 +442,27 @@ def test_sizes_that_are_not_plausible_are_named_with_their_effect() -> None:
     found = diagnosis("pulleys")
     (sizes,) = (check for check in checks(found) if check.name == "sizes")
     assert sizes.words.endswith("plausible sizes (pulley_radius)")
-    assert found.search is not None
-    last = found.search.steps[-1]
-    at_bound = replace(last.fit, at_bound=np.array([True]))
-    stuck = replace(last, fit=at_bound)
-    search = replace(found.search, steps=(*found.search.steps[:-1], stuck))
-    (sizes,) = (c for c in checks(replace(found, search=search)) if c.name == "sizes")
+    fit = path_of(found).last.fit
+    at_bound = replace(fit.state, terms=fit.terms.with_vector(fit.terms.lower))
+    stuck = with_last(found, fit=replace(fit, state=at_bound))
+    (sizes,) = (c for c in checks(stuck) if c.name == "sizes")
     assert sizes.words.endswith("(pulley_radius); at its bound: pulley_radius")
     assert sizes.good is False
 
 
 def test_blocks_are_the_runs_left_out() -> None:
     found = diagnosis("pulleys")
-    assert found.search is not None
-    problem, last = found.search.problem, stages_of(found)[-1]
-    runs = by_block(problem, last, KINDS[0])
+    problem, last = path_of(found).problem, path_of(found).last
+    runs = rms_by_block(problem, last.held_out, KINDS[0].key)
     assert len(runs) == len(problem.data.runs)
     count = np.array([(problem.data.run == name).sum() for name in problem.data.runs])
     whole = np.sqrt((count * runs**2).sum() / count.sum())
-    assert whole == pytest.approx(last.step.held_out.rms["position_rms_m"])
+    assert whole == pytest.approx(last.held_out.rms["position_rms_m"])
 
 
 def test_arrows_fit_the_region() -> None:
     found = diagnosis("pulleys")
-    assert found.search is not None
-    problem, before = found.search.problem, stages_of(found)[0]
+    problem, before = path_of(found).problem, path_of(found).first
     factor = magnification(problem, before.state)
     longest = factor * np.percentile(np.linalg.norm(before.state.raw[:, :3], axis=1), 98)
     span = np.ptp(before.state.prediction.pose[:, :3], axis=0).max()

@@ -9,7 +9,7 @@ import pytest
 from made_data import measured, term
 from made_diagnoses import POINTS, SIGMA
 
-from crosscheck.calibration.result import calibrate
+from crosscheck.calibration import calibrate
 from crosscheck.comparison.residuals import compare
 from crosscheck.fit.effects.contradictions import contradictions
 from seecr.description.mjcf import load_robot

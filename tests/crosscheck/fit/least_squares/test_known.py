@@ -8,13 +8,13 @@ from made_data import case, measured, run
 from made_diagnoses import POINTS, SIGMA, SLOW, readings, robot
 
 from crosscheck.add import add_effect
-from crosscheck.calibration.result import calibrate
-from crosscheck.diagnosis.verdict import diagnose
-from crosscheck.fit.effects.candidates import null_fit
-from crosscheck.fit.effects.evidence import evidence
-from crosscheck.fit.effects.gauss_newton import fit
-from crosscheck.fit.preparation.prepare import prepare
+from crosscheck.calibration import calibrate
+from crosscheck.diagnosis.diagnose import diagnose
+from crosscheck.inference.catalogue import Catalogue
+from crosscheck.inference.fit import Data, fit
+from crosscheck.inference.hypothesis import scored
 from crosscheck.measurements.data import Measurements
+from crosscheck.preparation.prepare import prepare
 from seecr.effects import Term, Terms
 
 pytestmark = pytest.mark.slow
@@ -82,8 +82,8 @@ def test_a_known_value_that_the_data_contradict_is_warned_of(data: Measurements)
 def test_some_components_may_be_fixed(data: Measurements) -> None:
     held = Term.of(robot(), "cable_length_offset", offset_2_m=1e-3).fixed("offset_2_m")
     ready = prepare(robot(), data, Terms())
-    factor = ready.problem.noise(ready.problem.experiment.predict())
-    found = fit(ready.problem, Terms([held, pulleys(0.0)]), factor)
+    every = Data.of(ready.problem, Terms())
+    found = fit(every, every.state(Terms([held, pulleys(0.0)])))
     offsets = found.terms["cable_length_offset"]
     assert offsets.vector[1] == 1e-3 and np.all(offsets.vector[[0, 2, 3]] != 0.0)
     assert offsets.knowledge.fixed.tolist() == [False, True, False, False]
@@ -91,10 +91,12 @@ def test_some_components_may_be_fixed(data: Measurements) -> None:
 
 def test_evidence_counts_what_is_known_against_a_model(data: Measurements) -> None:
     ready = prepare(robot(), data, Terms())
-    factor = ready.problem.noise(ready.problem.experiment.predict())
+    every = Data.of(ready.problem, Terms())
 
     def log(term: Term) -> float:
-        return evidence(null_fit(ready.problem, Terms([term]), factor, refit=True)).log
+        stood = Terms([term])
+        found = fit(every, every.state(stood))
+        return scored(Catalogue.of(every, stood), frozenset(stood.names), found, {}).score
 
     near = log(pulleys(TRUE).measured(radius_m=(TRUE, 1e-4)))
     far = log(pulleys(TRUE).measured(radius_m=(TRUE + 1e-3, 1e-4)))

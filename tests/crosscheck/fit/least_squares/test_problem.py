@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
-from crosscheck.fit.effects.gauss_newton import fit
 from crosscheck.fit.least_squares.problem import Problem, angle_rates, noise_factors, rms_by_kind
 from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.fit.noise.whiteness import whiteness
+from crosscheck.inference.fit import Data, fit
+from crosscheck.inference.noise import Noise
 from crosscheck.measurements.data import Sigma
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
@@ -121,13 +122,12 @@ def test_errors_of_values_grow_where_residuals_go_together() -> None:
             wander[k] = 0.85 * wander[k - 1] + 1e-4 * rng.standard_normal(3)
         data.position[:] += wander
         problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
-        factor = problem.noise(problem.experiment.predict())
-        found = fit(problem, Terms([term(robot, "tracker_frame")]), factor)
-        white = whiteness(problem, found.state.white, 6)
-        assert white.structured
-        far = found.terms.vector[:3] / found.stderr[:3]
-        plain.append(far / max(1.0, white.scale))
-        grown.append(far / white.inflation)
+        every = Data.of(problem, Terms())
+        found = fit(every, every.state(Terms([term(robot, "tracker_frame")])))
+        assert whiteness(problem, found.state.white, 6).structured
+        white = replace(found, noise=Noise(found.noise.scale, np.zeros(3)))
+        plain.append(found.terms.vector[:3] / white.stderr[:3])
+        grown.append(found.terms.vector[:3] / found.stderr[:3])
     # in standard errors these should scatter by one
     assert np.sqrt(np.mean(np.square(plain))) > 2.0
     assert 0.5 < np.sqrt(np.mean(np.square(grown))) < 1.6

@@ -9,12 +9,12 @@ import pytest
 from made_diagnoses import SIGMA, readings, robot
 from scipy.signal import lfilter
 
-from crosscheck.diagnosis.verdict import diagnose
+from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.noise.tolerance import HALF_THE_NOISE, Tolerance, doubt_of, remainder_of
-from crosscheck.fit.preparation.prepare import prepare
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.measurements.data import Sigma
+from crosscheck.preparation.prepare import prepare
 from seecr.effects import Terms
 
 NOISE = {"position_rms_m": 1e-4, "orientation_rms_rad": 1e-3, "tension_rms_N": None}
@@ -93,7 +93,7 @@ def test_structure_is_a_verdict_only_where_it_matters() -> None:
     white = rng.standard_normal((data.n_rows, 3))
     smooth = lfilter([np.sqrt(1.0 - 0.9**2)], [1.0, -0.9], white, axis=0)
     assert data.command_pose is not None and SIGMA.position_m is not None
-    wave = np.sin(60.0 * data.command_pose[:, :1]) * [0.0, 0.0, 1.0]
+    wave = np.sin(15.0 * data.command_pose[:, :1]) * [0.0, 0.0, 1.0]
     few = ["stiffness", "pulley_radius"]
     verdicts = {}
     for size in (0.0, 10.0):

@@ -11,10 +11,10 @@ import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
 import crosscheck
-from crosscheck.calibration.noise.colour import chain_of
 from crosscheck.fit.noise.unstated import overestimated
-from crosscheck.fit.preparation.prepare import prepare
+from crosscheck.inference.noise import chain_of
 from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.preparation.prepare import prepare
 from seecr.commands.data import Commands
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from linear_toy import toy_problem
+from box_of_poses import box_of_poses
 from scipy import stats
 
 from crosscheck.fit.least_squares.problem import Problem
@@ -18,7 +18,7 @@ SEEDS = 600
 
 @pytest.fixture(scope="module")
 def problem() -> Problem:
-    return toy_problem()
+    return box_of_poses()
 
 
 def noise(problem: Problem, seed: int) -> Array:

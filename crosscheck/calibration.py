@@ -1,0 +1,255 @@
+"""The command ``calibrate``: a model with every effect that the data see, with errors and noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from crosscheck.errors import CrosscheckError, UnsolvedError
+from crosscheck.fit.effects.contradictions import contradictions
+from crosscheck.fit.least_squares.problem import Rms, rms_by_kind
+from crosscheck.fit.reasons import Reason, Why, by_reason
+from crosscheck.fit.words import fitted_records, rms_words
+from crosscheck.given import GivenModel, GivenRobot, basis_of, considered, model_of, robot_of
+from crosscheck.inference.catalogue import Catalogue
+from crosscheck.inference.fit import Data, Fit
+from crosscheck.inference.held_out import hold_out
+from crosscheck.inference.noise import outliers
+from crosscheck.inference.search import Search
+from crosscheck.measurements.read import GivenData, measurements_of
+from crosscheck.model.fitted import Fitted
+from crosscheck.model.write import calibrated, provenance_of, renewed
+from crosscheck.preparation.prepare import Progress, prepare
+from crosscheck.preparation.thinned import thinned
+from seecr.arguments import silent
+from seecr.counted import counted, plural, some
+from seecr.effects import Terms, catalogue
+from seecr.pose import Array
+from seecr.prediction.model import Model
+from seecr.result import Record, Result
+
+# An effect that the data determine no better than its prior is left out if it changes all readings
+# by less than this chi2.
+_NOTHING = 1e-2
+_MOST_NAMED = 8
+
+
+@dataclass(frozen=True, eq=False)
+class JointErrors:
+    """Errors and noise of a fit of all effects.
+
+    Attributes:
+        before, after, held_out: rms errors by kind: of the model as it stood, of the fit, and of
+            held-out runs, each predicted by a fit without it.
+        scale, rho: by kind of reading, the estimated noise over the stated one, and its correlation
+            between successive rows of a run.
+    """
+
+    before: Rms
+    after: Rms
+    held_out: Rms
+    scale: dict[str, float]
+    rho: dict[str, float]
+
+    @classmethod
+    def of(cls, before: Rms, whole: Fit) -> JointErrors:
+        """Those of a fit, with what was before it."""
+        problem = whole.data.problem
+        after, noise = rms_by_kind(problem, whole.state.raw), whole.noise.by_kind(problem)
+        return cls(before, after, hold_out(whole).rms, *noise)
+
+    def as_json(self) -> dict[str, Any]:
+        """The item ``calibrated`` of ``diagnosis.json``."""
+        return {
+            "before": self.before,
+            "after": self.after,
+            "held_out": self.held_out,
+            "noise": {"scale": self.scale, "correlation": self.rho},
+        }
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibrated(Result, JointErrors):
+    """The result of fitting every effect that the data see at once.
+
+    Attributes:
+        fitted: the effects with standard errors, without those that the data do not see.
+        covariance: (p, p) of all their parameters, in their order; SI.
+        before, after, held_out: rms errors by kind: of the model as it stood, of this one, and of
+            held-out runs, each predicted by a fit without it.
+        scale, rho: by kind of reading, the estimated noise over the stated one, and its correlation
+            between successive rows of a run.
+        outliers: lines of the file that hardly count.
+        outlier_places: the same as they are told, after the name of the file if there are several.
+        settled: whether the fit converged; if not, its values are not to be used.
+        notes: notes about the data.
+        absent: effects of the catalogue that are not in the model, and why.
+        model: the robot's model with all of this; :func:`crosscheck.save_model` keeps it.
+    """
+
+    fitted: tuple[Fitted, ...]
+    covariance: Array
+    outliers: tuple[int, ...]
+    outlier_places: tuple[str, ...]
+    settled: bool
+    notes: tuple[str, ...]
+    absent: Mapping[str, Reason]
+    model: Model
+
+    @property
+    def terms(self) -> Terms:
+        """All effects with their values, as a model for the next call."""
+        return Terms(one.term for one in self.fitted)
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the parameters, in the order of the covariance."""
+        return [f"{effect}.{key}" for effect, key in self.terms.labels]
+
+    @property
+    def pays(self) -> bool:
+        """Whether the fit converged and predicts held-out runs better than the model before."""
+        pairs = [(was, self.held_out[key]) for key, was in self.before.items()]
+        gains = [np.log(was / held) for was, held in pairs if was and held]
+        return self.settled and float(np.sum(gains)) > 0.0
+
+    def noise_lines(self) -> list[str]:
+        """Lines about the estimated noise of each kind of reading, and about outliers."""
+        out = [
+            f"noise of the {name}: {self.scale[name]:.2f} times the assumed noise, with a "
+            f"correlation of {self.rho[name]:.2f} from row to row of a run"
+            for name in self.scale
+        ]
+        if self.outliers:
+            noun = plural(len(self.outliers), "line")
+            lines = f"{noun} {some(self.outlier_places, _MOST_NAMED)}"
+            out.append(f"outliers, given little weight and not included in these errors: {lines}")
+        return out
+
+    def absent_lines(self) -> list[str]:
+        """Lines about effects that are not in the model, those that the user excluded left out."""
+        return [f"not fitted: {line}" for line in by_reason(self.absent)]
+
+    def lines(self) -> list[str]:
+        """Errors before and after, the noise, and how many values there are."""
+        out = [
+            f"{counted(len(self.labels), 'parameter')} of {counted(len(self.fitted), 'effect')}: "
+            f"{rms_words(self.before)} before, {rms_words(self.after)} after, "
+            f"{rms_words(self.held_out)} on held-out runs",
+            *self.noise_lines(),
+            *self.absent_lines(),
+        ]
+        return [*out, *(f"note: {note}" for note in self.notes)]
+
+    def records(self) -> Sequence[Record]:
+        """A record for each parameter: value and standard error, SI."""
+        return fitted_records(self.fitted)
+
+    def as_json(self) -> dict[str, Any]:
+        """The content of ``calibration.json``, in SI."""
+        return {
+            **JointErrors.as_json(self),
+            "outliers": list(self.outliers),
+            "outlier_places": list(self.outlier_places),
+            "settled": self.settled,
+            "improves_held_out": self.pays,
+            "effects": {one.term.name: one.as_json() for one in self.fitted},
+            "parameters": self.labels,
+            "covariance": self.covariance.tolist(),
+            "notes": list(self.notes),
+            "not_fitted": {name: why.words for name, why in self.absent.items()},
+        }
+
+
+def calibrate(
+    robot: GivenRobot,
+    data: GivenData,
+    model: GivenModel = (),
+    progress: Progress = silent,
+    *,
+    only: Iterable[str] = (),
+    exclude: Iterable[str] = (),
+) -> Calibrated:
+    """Fit every effect that the data can see, with plausible sizes as priors.
+
+    Args:
+        robot: a robot, or its MJCF file.
+        data: measurements, or their file.
+        model: effects to start from, or their file; by default the plain model.
+        progress: called with what is being done and the fraction that is done.
+        only: names of the effects to fit beside the model's own; by default all.
+        exclude: names of effects that are not fitted, unless the model has them.
+
+    Raises:
+        InputError: there is no effect of a name.
+        CrosscheckError: the data allow no calibration.
+        UnsolvedError: rows have no equilibrium.
+    """
+    robot = robot_of(robot)
+    thin = thinned(robot, measurements_of(data, robot))
+    terms, said = model_of(model, robot)
+    ready = prepare(robot, thin.data, terms, considered(only, exclude))
+    if ready.refusal is not None:
+        kind = UnsolvedError if ready.refusal.unsolved else CrosscheckError
+        why = f"{ready.refusal}; nothing was fitted: {ready.refusal.remedy}"
+        raise kind(f"{thin.data.path}: {why}")
+    # BLAS on several threads takes longer for matrices as narrow as these
+    with threadpool_limits(limits=1, user_api="blas"):
+        data_ = Data.of(ready.problem, ready.terms)
+        search = Search(data_, Catalogue.of(data_, ready.terms), lambda text: progress(text, 0.4))
+        search.begin()
+        whole = search.calibrated.fit
+        far = outliers(data_.chain, whole.weight, thin.data.n_rows)
+        whole = whole.with_far_off(far)
+        progress("predicting held-out runs", 0.95)
+        before = rms_by_kind(whole.data.problem, search.plain.raw)
+        errors = JointErrors.of(before, whole)
+        others = thin.note_on_others(whole.terms, ready.problem.sigma)
+    notes = (*said, *contradictions(whole.terms), *ready.all_notes, *others)
+    fitted = _fitted(whole, terms)
+    kept = {one.term.name for one in fitted}
+    own = np.flatnonzero([name in kept for name, _key in whole.terms.labels])
+    rows = np.flatnonzero(far).tolist()
+    source = provenance_of(thin.data.name, "crosscheck calibrate")
+    covariance = (whole.spread * np.outer(whole.terms.scale, whole.terms.scale))[np.ix_(own, own)]
+    kinds = {"before": errors.before, "after": errors.after, "held_out": errors.held_out}
+    new = calibrated(basis_of(model, robot), fitted, covariance, source, kinds)
+    return Calibrated(
+        fitted=fitted,
+        covariance=covariance,
+        **vars(errors),
+        outliers=tuple(int(thin.data.line[row]) for row in rows),
+        outlier_places=tuple(thin.data.place(row) for row in rows),
+        settled=whole.settled,
+        notes=notes,
+        absent=_absent(search.every, kept),
+        model=renewed(new, robot, thin.data),
+    )
+
+
+def _fitted(whole: Fit, before: Terms) -> tuple[Fitted, ...]:
+    """The effects of which the data see something, and those that the model had before.
+
+    An effect that others can replace may be known no better than its prior, and still do much.
+    """
+    error = np.sqrt(np.diag(whole.spread)) * whole.terms.scale
+    fixed, free = whole.terms.knowledge.fixed, whole.free
+    out = []
+    for term in whole.terms:
+        part = whole.terms.part(term.name)
+        does = np.sum((whole.jacobian[:, part] @ whole.z[part]) ** 2) > _NOTHING
+        if np.any(whole.seen[part]) or does or term.name in before:
+            stderr = np.where(free[part] | fixed[part], error[part], np.inf)
+            out.append(Fitted(term, stderr, ~free[part] & ~fixed[part]))
+    return tuple(out)
+
+
+def _absent(every: Catalogue, kept: set[str]) -> dict[str, Reason]:
+    """The effects of the catalogue that a model of all effects does not have, with the reasons."""
+    nothing = dict.fromkeys((n for n in every.effects if n not in kept), Reason(Why.GAINS_NOTHING))
+    absent = {**every.reasons, **nothing}
+    return {name: absent[name] for name in catalogue() if name in absent}

@@ -1,1 +1,0 @@
-"""Fits all effects that the data can see at once."""

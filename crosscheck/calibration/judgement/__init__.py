@@ -1,1 +1,0 @@
-"""How probable each effect is, and what may be said of it."""

@@ -1,1 +1,0 @@
-"""Searches the sets of effects for those that explain the data best."""

@@ -1,1 +1,0 @@
-"""What may be at work that is not in the catalogue."""

@@ -1,0 +1,174 @@
+"""A hypothesis that was fitted, and its score: Laplace evidence about its own fit, plus ln prior.
+
+H = (S, f): a set S of members of the catalogue and at most one field f, with noise of its own.
+
+    ln p(H, y) = ln N(y; 0, X L X^T + mu^2 F F^T + Sigma)    averaged over the widths L and mu
+               + what the mixture for outliers adds           (variational bound)
+               + ln p(noise scale) + ln p(S) + ln p(f)
+               + ln of the share of its prior to which each shape is determined
+               + ln of what parameters stopped at zero might have been
+               - 1/2 (what the linear model would still gain where the fit ended)
+
+(MacKay, Neural Computation 4, 1992, for evidence at an optimum.) All hypotheses of one search
+differ from these by the same constant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import special
+
+from crosscheck.fit.effects.possible import can_be
+from crosscheck.fit.least_squares.definite import inverse_of, solved
+from crosscheck.fit.least_squares.known import known_left, known_readings
+from crosscheck.inference.catalogue import Catalogue, Key, is_field, log_shares, widths_for
+from crosscheck.inference.evidence import Linear, MemberColumns, averaged, best_widths, log_evidence
+from crosscheck.inference.fit import Fit
+from crosscheck.inference.noise import NoisePrior, log_det
+from crosscheck.inference.priors import FIELD_WIDTHS, WIDTHS
+from seecr.pose import Array
+
+# The widths that maximise the evidence count only if the optimum with them loses less ln posterior
+# at the fit than this: the linear model holds about the fit alone.
+_NEAR = 8.0
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A fitted hypothesis.
+
+    Attributes:
+        key: its members. fit: its fit.
+        widths: prior width of each member. score: ln evidence plus ln prior.
+        possible: whether a robot can have its values.
+    """
+
+    key: Key
+    fit: Fit
+    widths: dict[str, float]
+    score: float
+    possible: bool
+
+    @property
+    def field(self) -> str | None:
+        """The key of its field."""
+        return next((k for k in self.key if is_field(k)), None)
+
+
+def scored(every: Catalogue, key: Key, fit: Fit, widths: Mapping[str, float]) -> Hypothesis:
+    """A fit as a hypothesis, linearised about its own optimum.
+
+    Args:
+        every: the catalogue. key: members. fit: their fit. widths: the prior widths of that fit.
+    """
+    linear, z = _own_linear(every, key, fit)
+    held = {k: widths.get(k, group.middle) for k, group in linear.groups.items()}
+    best = best_widths(linear, held)
+    field = next((k for k in key if is_field(k)), None)
+    if field is not None and field in best.chosen:
+        z[linear.groups[field].columns] = best.values[best.place(field)]
+    if best.left_to_gain(z) > _NEAR:
+        best = linear.solved(held)
+    stood = every.stood_keys
+    score = (
+        log_evidence(best) + sum(log_shares(fit).values()) + _log_absent(every, fit, best.chosen)
+    )
+    score -= 0.5 * (fit.state.log_det + log_det(fit.data.chain, fit.noise) + _left_to_gain(fit))
+    score += fit.log_outliers + NoisePrior.of(fit.data.problem).log(fit.noise)
+    robot = fit.data.problem.robot
+    possible = key == stood or can_be(robot, fit.terms, every.stood)
+    return Hypothesis(key, fit, {**widths, **best.chosen}, score + every.log_prior(key), possible)
+
+
+def _own_linear(every: Catalogue, key: Key, fit: Fit) -> tuple[Linear, Array]:
+    """Normal equations of a fit's own amplitudes and field, and their values in it."""
+    terms, free, keys = fit.terms, fit.free, every.keys_of(fit.terms)
+    groups, columns, first = dict[str, MemberColumns](), [], 0
+    for term in terms:
+        own = np.flatnonzero(terms.own(term.name))
+        own = own[free[own] & ~term.layout.shape]
+        if len(own):
+            one_sided = (terms.lower == terms.null)[own]
+            at, first = first + np.arange(len(own)), first + len(own)
+            groups[keys[term.name]] = MemberColumns(
+                at, widths_for(term.layout, fit.data.free), one_sided
+            )
+            columns.append(own)
+    own = np.concatenate([np.zeros(0, np.intp), *columns])
+    x, z = fit.jacobian[:, own], fit.z[own]
+    y = fit.state.white + x @ z
+    field = next((k for k in key if is_field(k)), None)
+    if field is not None:
+        more = every.fields[field]
+        groups[field] = MemberColumns(first + np.arange(more.shape[1]), np.array(FIELD_WIDTHS))
+        x, z = np.hstack([x, more]), np.append(z, np.zeros(more.shape[1]))
+    white = fit.metric.white(np.column_stack([x, y]))
+    known, readings = known_readings(terms)
+    known = np.hstack([known[:, own], np.zeros((len(known), x.shape[1] - len(own)))])
+    whole = np.concatenate([white[:, :-1], known])
+    return Linear.of(whole, np.concatenate([white[:, -1], readings]), groups), z
+
+
+def _left_to_gain(fit: Fit) -> float:
+    """How much further the objective would fall if the model were linear.
+
+    It is next to nothing where a fit converged, unless its derivatives point the wrong way: the sag
+    of a cable grows with the square of its weight.
+    """
+    free = np.flatnonzero(fit.free)
+    if not len(free):
+        return 0.0
+    known = known_readings(fit.terms)[0][:, free]
+    normal, gradient = fit.metric.normal(fit.jacobian[:, free], fit.state.white)
+    inverse2 = fit.width[free] ** -2.0
+    slope = gradient + known.T @ known_left(fit.terms) - fit.z[free] * inverse2
+    return float(slope @ solved(normal + known.T @ known + np.diag(inverse2), slope))
+
+
+# --- parameters that are stopped at zero ----------------------------------------------------------
+
+
+def _log_absent(every: Catalogue, fit: Fit, widths: Mapping[str, float]) -> float:
+    """ln evidence that parameters stopped at zero cost beside the others; never above 0.
+
+    Friction on a cable behind the exit point, with zero friction, is that cable alone. If both had
+    the same evidence, then data that would show friction, and show none, could not tell them apart.
+    """
+    terms, keys = fit.terms, every.keys_of(fit.terms)
+    shape = np.concatenate([np.zeros(0, bool), *(t.layout.shape for t in terms)])
+    held = (terms.vector <= terms.lower) & (terms.lower == terms.null) & ~shape
+    held = np.flatnonzero(held & ~terms.knowledge.fixed & (fit.width > 0.0))
+    if not len(held):
+        return 0.0
+    free = np.flatnonzero(fit.free)
+    owners = np.array([keys[name] for name, _key in terms.labels])
+    wide = np.array(
+        [widths.get(owners[k], fit.width[k]) if not shape[k] else fit.width[k] for k in free]
+    )
+    both = np.concatenate([free, held])
+    known = known_readings(terms)[0][:, both]
+    y = fit.state.white + fit.jacobian[:, free] @ fit.z[free]
+    normal, gradient = fit.metric.normal(fit.jacobian[:, both], y)
+    normal, n = normal + known.T @ known, len(free)
+    gradient = gradient + known.T @ (known_left(terms) + known[:, :n] @ fit.z[free])
+    inverse = inverse_of(normal[:n, :n] + np.diag(wide**-2.0)) if n else np.zeros((0, 0))
+    cross = normal[:n, n:]
+    power = np.diag(normal)[n:] - np.sum(cross * (inverse @ cross), axis=0)
+    # an optimum is pressed against the bound: what pulls away from it, the fit did not find
+    along = np.minimum(gradient[n:] - cross.T @ (inverse @ gradient[:n]), 0.0)
+    total = 0.0
+    for k, p, a in zip(held, np.maximum(power, 0.0), along, strict=True):
+        own = widths.get(owners[k])
+        total += averaged(_half_gaussian(p, a, np.array(WIDTHS if own is None else [own])))
+    return total
+
+
+def _half_gaussian(power: float, along: float, width: Array) -> Array:
+    """ln evidence gained by a parameter that cannot be negative, with half a Gaussian as prior."""
+    square = width**2
+    grown = 1.0 + square * power
+    gain = 0.5 * (square * along**2 / grown - np.log(grown))
+    return np.asarray(gain + np.log(2.0) + special.log_ndtr(along * np.sqrt(square / grown)))

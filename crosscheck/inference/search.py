@@ -1,0 +1,605 @@
+"""Searches hypotheses: linear evidence about a fit proposes, exact fits decide.
+
+All fits go into one cache. About a fit, the linear model of the whole catalogue
+(:class:`crosscheck.inference.catalogue.About`) gives the evidence of any hypothesis by linear
+algebra; adding, dropping and exchanging members climbs from the model as it stands and from the
+fit itself. What the climb meets with a score within WITHIN of its best is fitted exactly, and the
+search goes on about the best fit of all until it stays the best.
+
+Single effects are fitted first, from the model as it stands: where cables go slack or the noise of
+the plain model is a hundred times the stated, its linear model ranks sets wrongly, and one effect
+that removes most of the error makes it right. So does the fit of all effects together, which is
+made where no few effects leave noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from crosscheck.fit.effects.possible import can_be
+from crosscheck.fit.effects.registration import registered, registered_each
+from crosscheck.fit.least_squares.problem import KINDS
+from crosscheck.fit.least_squares.state import State
+from crosscheck.inference.catalogue import (
+    About,
+    Catalogue,
+    Key,
+    bare,
+    inside,
+    is_field,
+    name_of,
+    part_of,
+)
+from crosscheck.inference.evidence import Solved, best_widths, log_evidence
+from crosscheck.inference.fit import TRACKER, Data, Fit, fit, unfitted
+from crosscheck.inference.hypothesis import Hypothesis, scored
+from crosscheck.inference.noise import Noise, NoisePrior, outliers
+from crosscheck.inference.priors import EQUAL, FEW, FITS, MAY_BE_UNKNOWN, ROUNDS, WITHIN
+from seecr.effects import Knowledge, Term
+from seecr.pose import Array
+
+# Single effects that are fitted beside a model, and how many of these are searched about.
+_SINGLES, _BEAM = 4, 2
+# Fields that are tried beside a set.
+_FIELDS = 2
+# Most moves of a climb. Larger sets are thinned member by member first; nothing is exchanged there.
+_MOVES, _LARGE, _KEPT = 60, 8, 3.0
+# Parts of the way to the linear values at which fits may begin: one that explains less than the
+# model as it stands leads nowhere.
+_PARTS = (1.0, 0.3, 0.1)
+# A fit that is worse than promised by this much may be in a local minimum.
+_MINIMUM = 8.0
+# An effect that waits joins the fit of all effects if it promises this much ln evidence.
+_PAYS = 2.0
+# Fits of more effects than are a diagnosis take longer, and only what all of them do together is
+# asked of them: one counts as so many.
+_LONG = 4
+
+
+class Scores:
+    """Scores of hypotheses in the linear model about a fit: ln evidence plus ln prior."""
+
+    def __init__(self, about: About, centre: Hypothesis) -> None:
+        self.about, self.every, self.centre = about, about.every, centre
+        self.stood = about.every.stood_keys
+        self.solved: dict[Key, tuple[float, Solved]] = {}
+        self.near: dict[Key, float] = {}
+
+    def score(self, key: Key, start: Mapping[str, float] | None = None) -> float:
+        """The score of a hypothesis with its best widths."""
+        if key not in self.solved:
+            groups = self.about.linear.groups
+            widths = {k: (start or {}).get(k, groups[k].middle) for k in sorted(key & set(groups))}
+            best = best_widths(self.about.linear, widths)
+            self.solved[key] = (log_evidence(best) + self.prior(key), best)
+        return self.solved[key][0]
+
+    def promised(self, key: Key) -> float:
+        """What the linear model promises of a hypothesis, on the scale of exact scores."""
+        return self.score(key) - self.score(self.centre.key) + self.centre.score
+
+    def prior(self, key: Key) -> float:
+        """ln prior, less what the choice of shapes gains too much."""
+        return self.every.log_prior(key) - sum(self.about.prices.get(k, 0.0) for k in key)
+
+    def widths(self, key: Key) -> dict[str, float]:
+        """The best prior widths of its members."""
+        self.score(key)
+        return self.solved[key][1].chosen
+
+    def gain(self, key: Key, more: str) -> float:
+        """Approximate ln evidence that a member gains beside a hypothesis."""
+        self.score(key)
+        return self.solved[key][1].gain(more)
+
+    @property
+    def seen(self) -> dict[Key, float]:
+        """Scores of all hypotheses met so far; those that were not solved are approximate."""
+        return self.near | {key: score for key, (score, _solved) in self.solved.items()}
+
+    def neighbours(self, key: Key) -> dict[Key, float]:
+        """Approximate scores with one effect more, one less or, of small sets, one exchanged."""
+        base, out = self.score(key), self.larger(key)
+        for member in sorted(bare(key) - self.stood):
+            rest = key - {member}
+            out[rest] = base - self.gain(key, member) - self.prior(key) + self.prior(rest)
+            if len(bare(key) - self.stood) <= _LARGE:
+                widths = {k: w for k, w in self.widths(key).items() if k != member}
+                solved = self.about.linear.solved(widths)
+                out |= self._with_one(rest, solved, out[rest], but=member)
+        return out
+
+    def larger(self, key: Key) -> dict[Key, float]:
+        """Approximate scores with one effect more."""
+        base = self.score(key)
+        return self._with_one(key, self.solved[key][1], base)
+
+    def _with_one(self, key: Key, solved: Solved, base: float, but: str = "") -> dict[Key, float]:
+        had, prior = {name_of(k) for k in key}, self.prior(key)
+        others = [
+            k for k in self.about.linear.groups
+            if not is_field(k) and not part_of(k) and k not in had and k != but
+        ]  # fmt: skip
+        return {key | {k}: base + solved.gain(k) + self.prior(key | {k}) - prior for k in others}
+
+    def with_fields(self, key: Key) -> dict[Key, float]:
+        """Approximate scores of a set, without its field, with each of the fields."""
+        key = bare(key)
+        base = self.score(key)
+        return {
+            key | {k}: base + self.gain(key, k) + self.every.log_shares[k]
+            for k in self.about.linear.groups if is_field(k)
+        }  # fmt: skip
+
+    def with_forms(self, key: Key) -> dict[Key, float]:
+        """Scores with an effect's form of other values in each file or run, added or exchanged."""
+        out = {}
+        for k in self.about.linear.groups:
+            if part_of(k) and k not in key:
+                rest = frozenset(other for other in key if name_of(other) != name_of(k))
+                out[rest | {k}] = (
+                    self.score(rest)
+                    + self.gain(rest, k)
+                    - self.prior(rest)
+                    + self.prior(rest | {k})
+                )
+        return out
+
+    def climb(self, start: Key, moves: int = _MOVES, without: Key = frozenset()) -> Key:
+        """The best set reached by moves to better neighbours, none of which has some members."""
+        at = self._thinned(start)
+        for _ in range(moves):
+            around = {k: s for k, s in self.neighbours(at).items() if without.isdisjoint(k)}
+            self.near |= {k: s for k, s in around.items() if k not in self.solved}
+            for key in sorted(around, key=lambda k: (-around[k], sorted(k)))[:2]:
+                if self.score(key, self.widths(at)) > self.score(at) + 1e-6:
+                    at = key
+                    break
+            else:
+                return at
+        return at
+
+    def _thinned(self, start: Key) -> Key:
+        """A set without its least valuable members, while it is large and they are worth little."""
+        linear = self.about.linear
+        widths = {k: linear.groups[k].middle for k in sorted(start & set(linear.groups))}
+        fixed = {k for k in widths if k in self.stood or is_field(k)}
+        while len(widths) > _LARGE + len(fixed):
+            solved = linear.solved(widths)
+            gains = {k: solved.gains(k) for k in widths}
+            least = min(sorted(widths.keys() - fixed), key=lambda k: float(np.max(gains[k])))
+            if float(np.max(gains[least])) > _KEPT:
+                break
+            widths = {k: float(linear.groups[k].widths[np.argmax(g)]) for k, g in gains.items()}
+            del widths[least]
+        return frozenset(widths) | (start & self.stood)
+
+    def best(self, count: int) -> list[Key]:
+        """The best hypotheses met so far, at most WITHIN worse than the best of all."""
+        scores = self.seen
+        order = sorted(scores, key=lambda k: (-scores[k], sorted(k)))
+        return [k for k in order if scores[k] >= scores[order[0]] - WITHIN][:count]
+
+
+@dataclass(eq=False)
+class Search:
+    """The search of one diagnosis, with its cache of fitted hypotheses.
+
+    Attributes:
+        data: what is fitted. every: the catalogue.
+        report: called with what is being fitted.
+        cache: fitted hypotheses; None for one that has no solution.
+    """
+
+    data: Data
+    every: Catalogue
+    report: Callable[[str], None] = lambda _text: None
+    cache: dict[Key, Hypothesis | None] = field(default_factory=dict)
+    fits: int = 0
+    _centres: list[Key] = field(default_factory=list)
+    _again: set[tuple[Key, Key]] = field(default_factory=set)
+    _challenged: dict[Key, tuple[Key, float]] = field(default_factory=dict)
+
+    @property
+    def stood(self) -> Key:
+        """The hypothesis that nothing is missing."""
+        return self.every.stood_keys
+
+    @property
+    def fitted(self) -> dict[Key, Hypothesis]:
+        """The hypotheses that a robot can have."""
+        return {k: h for k, h in self.cache.items() if h is not None and h.possible}
+
+    @property
+    def best(self) -> Hypothesis:
+        """The best hypothesis."""
+        return max(self.fitted.values(), key=lambda h: (h.score, sorted(h.key)))
+
+    @cached_property
+    def plain(self) -> State:
+        """The model as it stands."""
+        return self.data.state(self.every.stood)
+
+    @cached_property
+    def unfitted(self) -> Fit:
+        """The model as it stands, in the form of a fit."""
+        return unfitted(self.data, self.every.stood, self.plain)
+
+    @cached_property
+    def none_about(self) -> About:
+        """What every member does about the model as it stands."""
+        return self.every.about(self._at(self.stood).fit)
+
+    def _at(self, key: Key) -> Hypothesis:
+        found = self.cache[key]
+        assert found is not None
+        return found
+
+    def reached(self, start: Key, key: Key) -> Hypothesis | None:
+        """A hypothesis, fitted from another one if it was not met; None if it has no solution."""
+        if key not in self.cache:
+            self.fit(self.scores_about(self._at(start)), key)
+        return self.cache[key]
+
+    def at_plausible_sizes(self, found: Hypothesis) -> Hypothesis:
+        """A hypothesis fitted anew with prior widths of one plausible size at least.
+
+        Narrow priors hold values near null that the readings hardly determine, and their errors
+        are small only because of that: no reason to tell somebody with a caliper.
+        """
+        widths = {k: max(w, 1.0) for k, w in found.widths.items() if not is_field(k)}
+        by_name = {name_of(k): w for k, w in widths.items()}
+        exact = replace(self.data, frozen=False)
+        again = fit(exact, found.fit.state, by_name, noise=found.fit.noise)
+        return scored(self.every, found.key, again, widths)
+
+    @property
+    def wants_refit(self) -> bool:
+        """Whether the model as it stands explains the data only with other values than it has.
+
+        The given values are a hypothesis of their own, without a parameter that the data chose
+        (Akaike's criterion).
+        """
+        none = self.cache[self.stood]
+        assert none is not None
+        return bool(self.unfitted.cost > none.fit.cost + 2.0 * len(none.fit.terms))
+
+    def contradicted(self, term: Term) -> Term | None:
+        """A known effect of the model as it would be fitted if nothing were known of it.
+
+        None unless that explains far more than the best hypothesis: then it contradicts the data.
+        """
+        free = replace(term, knowledge=Knowledge.nothing(len(term.layout)))
+        terms = self.every.stood.with_term(free)
+        every = replace(self.every, stood=terms)
+        state = self.data.state(terms, self.plain)
+        if not state.valid:
+            return None
+        found = scored(every, self.stood, fit(self.data, state), {})
+        own, known = term.knowledge.measured, term.knowledge
+        # the density that independent readings have by themselves, which evidence leaves out
+        readings = float(np.sum(np.log(term.layout.scale[own] / known.stderr[own])))
+        possible = can_be(self.data.problem.robot, found.fit.terms, self.every.stood)
+        better = found.score > self.best.score + readings + EQUAL
+        return found.fit.terms[term.name] if possible and better else None
+
+    def begin(self) -> Hypothesis:
+        """Fit the model as it stands, which is returned, and single effects beside it."""
+        none = self._take(self.stood, fit(self.data, self.plain), {})
+        assert none is not None
+        self._register()
+        self._singles(self.best)
+        self._ask_rows_far_off(none)
+        return none
+
+    def _ask_rows_far_off(self, found: Hypothesis) -> None:
+        """Try what outliers ask for: they may be no outliers, but what is missing in some rows."""
+        if np.any(outliers(self.data.chain, found.fit.weight, self.data.problem.data.n_rows)):
+            self._singles(_with_rows_alike(found), forms=True)
+
+    def run(self) -> Hypothesis:
+        """Search until the best hypothesis stays the best."""
+        none = self.begin()
+        self.every = self.every.with_fields(none.fit)
+        self._general_fields(none)
+        alone = sorted(self.fitted.values(), key=lambda h: (-h.score, sorted(h.key)))
+        for one in [h for h in alone if h is not none and h.score > none.score + WITHIN][:_BEAM]:
+            self.look_about(one)
+        self._settle()
+        if self.is_open:
+            self.look_about(self.everything)
+            self._settle()
+        self._close()
+        return self.best
+
+    @property
+    def is_open(self) -> bool:
+        """Whether no few effects leave noise as stated: then all are fitted together as well."""
+        best = self.best
+        return (
+            best.field is not None
+            or len(best.key - self.stood) > FEW
+            or NoisePrior.of(self.data.problem).is_unknown(best.fit.noise) > MAY_BE_UNKNOWN
+        )
+
+    def _settle(self) -> None:
+        for k in range(ROUNDS):
+            if self.best.field is None:
+                self._ask_rows_far_off(self.best)
+            many = len(bare(self.best.key) - self.stood) > FEW
+            if self.best.key in self._centres or (many and k >= ROUNDS // 2):
+                break
+            self.look_about(self.best)
+
+    # --- one hypothesis ---
+
+    def fit(self, scores: Scores, key: Key, width: float | None = None) -> Hypothesis | None:
+        """Fit a hypothesis exactly from its values in a linear model; the best fit is kept.
+
+        Args:
+            scores: the linear model. key: the hypothesis.
+            width: prior width of all its effects; by default those of greatest linear evidence.
+        """
+        widths = {k: w if width is None else width for k, w in scores.widths(key).items()}
+        starts = []
+        for part in _PARTS:
+            values = scores.about.values(scores.solved[key][1], part)
+            starts.append(self._state(key, values))
+            if starts[-1].valid and starts[-1].chi2 <= self.plain.chi2:
+                break
+        solved = [s for s in starts if s.valid]
+        if solved:
+            self._fit_from(key, min(solved, key=lambda s: s.chi2), widths)
+        promised = scores.promised(key)
+        found, few = self.cache.get(key), 0 < len(bare(key) - self.stood) < FEW
+        if few and (found is None or found.score < promised - _MINIMUM):
+            null = {k: inside(scores.about.starts[k]) for k in bare(key) - self.stood}
+            at = {k: t.with_vector(_null(t)) for k, t in null.items()}
+            other = self._state(key, {k: inside(t) for k, t in at.items()})
+            if other.valid:
+                self._fit_from(key, other, widths)
+        return self.cache.setdefault(key, None)
+
+    def _state(self, key: Key, values: Mapping[str, Term]) -> State:
+        return self.data.state(self.every.terms(key, values), self.plain, trial=True)
+
+    def _fit_from(self, key: Key, start: State, widths: Mapping[str, float]) -> Hypothesis | None:
+        held = {k: max(w, 1.0) if self._waits(k) else w for k, w in widths.items()}
+        by_name = {name_of(k): w for k, w in held.items() if not is_field(k)}
+        kind = next((k for k in key if is_field(k)), None)
+        columns = None if kind is None else self.every.fields[kind] * held.get(kind, 3.0)
+        return self._take(key, fit(self.data, start, by_name, columns), held)
+
+    def _waits(self, key: str) -> bool:
+        return key in self.every.members and self.every.members[key].waits
+
+    def _take(self, key: Key, found: Fit, widths: Mapping[str, float]) -> Hypothesis | None:
+        self.fits += 1
+        self.report(" + ".join(sorted(key)) or "the model as it is")
+        new, old = scored(self.every, key, found, widths), self.cache.get(key)
+        some = [h for h in (old, new) if h is not None]
+        self.cache[key] = max(some, key=lambda h: (h.possible, h.score))
+        return self.cache[key]
+
+    # --- where the search starts ---
+
+    def _register(self) -> None:
+        """The tracker's frame by rigid registration: a fit would need many steps to one far off."""
+        for key in (TRACKER, f"{TRACKER}@file"):
+            member = self.every.members.get(key)
+            if member is None:
+                continue
+            if part_of(key):
+                every = np.ones(len(member.layout), dtype=bool)
+                term = registered_each(self.data.problem, self.plain.prediction, member.term, every)
+            else:
+                found = registered(self.data.problem, self.plain.prediction)
+                if found is None:
+                    continue
+                term = found
+            state = self._state(self.stood | {key}, {key: term})
+            if state.valid and state.chi2 < self.plain.chi2:
+                self._fit_from(self.stood | {key}, state, {key: 10.0})
+
+    def _singles(self, beside: Hypothesis, forms: bool = False) -> None:
+        """The most promising effects beside a hypothesis, each fitted from one or two sizes."""
+        about = self.every.about(beside.fit)
+        promises = {k: p for k, p in about.promises.items() if forms or not part_of(k)}
+        for name in sorted(promises, key=lambda k: (-promises[k], k))[:_SINGLES]:
+            key, term = beside.key | {name}, about.starts[name]
+            if promises[name] < 0.0 or key in self.cache:
+                continue
+            sized = term.layout.shape.any() or (term.layout.lower == term.layout.null).any()
+            for by in (0.1, 1.0) if sized else (0.1,):
+                values = {t.name: t for t in beside.fit.terms} | {name: inside(term, by)}
+                state = self._state(key, self._by_key(values, key))
+                if state.valid:
+                    self._fit_from(key, state, {**beside.widths, name: 1.0})
+
+    def _by_key(self, values: Mapping[str, Term], key: Key) -> dict[str, Term]:
+        names = {name_of(k): k for k in key if not is_field(k)}
+        return {names[n]: t for n, t in values.items() if n in names}
+
+    def _general_fields(self, none: Hypothesis) -> None:
+        """Fields beside nothing: what is known may only show once what is unknown is there."""
+        scores = self.scores_about(none)
+        near = scores.with_fields(self.stood)
+        general = [k for k, kind in self.every.kinds.items() if kind.name == "READINGS"]
+        likely = sorted(near, key=lambda k: (-near[k], sorted(k)))[:_FIELDS]
+        for key in dict.fromkeys([*(self.stood | {k} for k in general), *likely]):
+            self.fit(scores, key)
+        if self.best.field is not None:
+            self._singles(self.best)
+
+    @cached_property
+    def everything(self) -> Hypothesis:
+        """All effects that act from the start, fitted together with plausible sizes as priors."""
+        members = self.every.members.values()
+        names = [m.key for m in members if not m.waits and not part_of(m.key)]
+        key = self.stood | frozenset(names)
+        state = self._state(key, {})
+        frame = registered(self.data.problem, self.plain.prediction) if TRACKER in key else None
+        if frame is not None and TRACKER not in self.every.stood:
+            turned = self._state(key, {TRACKER: frame})
+            state = turned if turned.valid and turned.chi2 < state.chi2 else state
+        found = fit(self.data, state)
+        return scored(self.every, key, found, dict.fromkeys(key, 1.0))
+
+    @cached_property
+    def calibrated(self) -> Hypothesis:
+        """Every effect that the data see, fitted together: a model that predicts, and names none.
+
+        It begins where nothing is known, or where the search ended; of both the better fit. Effects
+        that wait join if they promise something beside it.
+        """
+        best = self._whole(self.everything)
+        if self.best.field is None and not self.best.key <= self.stood:
+            key = best.key | self.best.key
+            names = {name_of(k) for k in self.best.key}
+            key = frozenset(k for k in key if k in self.best.key or name_of(k) not in names)
+            values = self._by_key({t.name: t for t in self.best.fit.terms}, key)
+            state = self._state(key, values)
+            if state.valid:
+                found = fit(self.data, state, noise=self.best.fit.noise)
+                other = scored(self.every, key, found, dict.fromkeys(key, 1.0))
+                best = max(best, self._whole(other), key=lambda h: h.score)
+        return best
+
+    def _whole(self, whole: Hypothesis) -> Hypothesis:
+        """A fit of all effects with those that wait and pay, at the widths of greatest evidence."""
+        about = self.every.about(whole.fit)
+        pays = {k: p for k, p in about.promises.items() if self._waits(k) and p > _PAYS}
+        order = sorted(pays, key=lambda k: (-pays[k], k))
+        for some in [order, *([k] for k in order)] if len(order) > 1 else [order]:
+            some = [k for k in some if k not in whole.key]
+            if some:
+                key = whole.key | set(some)
+                values = {t.name: t for t in whole.fit.terms}
+                values |= {k: inside(about.starts[k]) for k in some}
+                state = self._state(key, self._by_key(values, key))
+                if state.valid:
+                    other = fit(self.data, state, noise=whole.fit.noise)
+                    more = scored(self.every, key, other, dict.fromkeys(key, 1.0))
+                    whole = max(whole, more, key=lambda h: h.score)
+        return whole
+
+    # --- looking about a fit ---
+
+    def scores_about(self, centre: Hypothesis) -> Scores:
+        """Linear scores about a hypothesis' fit."""
+        return Scores(self.every.about(centre.fit), centre)
+
+    def look_about(self, centre: Hypothesis) -> None:
+        """Search linear evidence about a fit, and fit exactly what looks best."""
+        self._centres.append(centre.key)
+        scores = self.scores_about(centre)
+        known = frozenset(scores.about.linear.groups) | self.stood
+        ends = [scores.climb(self.stood), scores.climb(centre.key & known)]
+        end = bare(max(ends, key=scores.score))
+        fields, forms = dict[Key, float](), scores.with_forms(end)
+        for key in {end, self.stood, *(end - {k} for k in end - self.stood)}:
+            fields |= scores.with_fields(key)
+        scores.near |= {k: s for k, s in {**fields, **forms}.items() if k not in scores.solved}
+        for key in sorted(forms, key=lambda k: (-forms[k], sorted(k)))[:1]:
+            if forms[key] > scores.score(end) - WITHIN:
+                scores.climb(key, _LARGE)
+        kinds = list[str]()
+        for key in sorted(fields, key=lambda k: (-fields[k], sorted(k))):
+            kind = next(k for k in key if is_field(k))
+            if kind not in kinds:
+                kinds.append(kind)
+                scores.climb(key, _LARGE)
+                scores.climb(end | {kind}, _LARGE)
+            if len(kinds) >= _FIELDS:
+                break
+        own = [k for k in centre.key if is_field(k)]
+        for kind in [*kinds[:1], *own]:  # with noise of its own a field may be worth more
+            self._fit_new(scores, end | {kind})
+        self._fit_best(scores, centre)
+
+    def _fit_best(self, scores: Scores, centre: Hypothesis) -> None:
+        """Fit what a linear model considers best, within the budget."""
+        seen, done = scores.seen, 0
+        top = max(seen.values())
+        for key in scores.best(4 * FITS):
+            adds = key > centre.key and seen[key] < top - EQUAL
+            if not adds and done < FITS:
+                done += self._fit_new(scores, key)
+
+    def _fit_new(self, scores: Scores, key: Key) -> int:
+        """Fit a hypothesis unless that was done; what it counts.
+
+        One that was fitted is fitted again if the linear model about a better fit promises far
+        more: then it had ended in a local minimum.
+        """
+        if key in self.cache:
+            found = self.cache[key]
+            poor = found is not None and found.score < scores.promised(key) - _MINIMUM
+            if not poor or (key, scores.centre.key) in self._again:
+                return 0
+            self._again.add((key, scores.centre.key))
+        self.fit(scores, key)
+        return 1 if len(bare(key) - self.stood) <= FEW else _LONG
+
+    def _close(self) -> None:
+        """Fit the neighbours of the best that are near, until none is better."""
+        for _ in range(ROUNDS - 1):
+            best = self.best
+            scores = self.scores_about(best)
+            base, near = scores.score(best.key), scores.neighbours(best.key)
+            core = bare(best.key)
+            for key in (core, *(core - {k} for k in sorted(core - self.stood))):
+                near |= scores.with_fields(key)
+            near |= scores.with_forms(best.key)
+            if core != best.key:
+                near[core] = base - 1.0
+            done = 0
+            for key in sorted(near, key=lambda k: (-near[k], sorted(k))):
+                least = EQUAL if key > best.key else WITHIN
+                if near[key] > base - least and done < FITS:
+                    done += self._fit_new(scores, key)
+            self.last, self.near = scores, near
+            if self.best is best:
+                break
+            if self.best.key not in self._centres:
+                self.look_about(self.best)
+
+    def challenge(self, some: Iterable[str]) -> float:
+        """ln evidence that the best hypothesis without some members is worse by; fitted if near.
+
+        Two effects together may do what two others do, and no exchange of single ones leads there.
+        """
+        some, best, scores = frozenset(some), self.best, self.last
+        if some not in self._challenged:
+            at = scores.climb(best.key - some, without=some)
+            self._challenged[some] = at, scores.score(best.key) - scores.score(at)
+        at, loss = self._challenged[some]
+        if loss < WITHIN:
+            self._fit_new(scores, at)
+            fitted = self.cache.get(at)
+            loss = loss if fitted is None else self.best.score - fitted.score
+        return loss
+
+
+def _with_rows_alike(found: Hypothesis) -> Hypothesis:
+    """A hypothesis in which no row is an outlier, with noise as large as that takes.
+
+    What a model lacks may be far off in some rows only, as when a tracker is bumped between two
+    runs; once these count as outliers nothing asks for it.
+    """
+    fit, chain = found.fit, found.fit.data.chain
+    scale = np.ones(len(KINDS))
+    for k in np.unique(chain.kind):
+        scale[k] = float(np.sqrt(np.mean(fit.left[chain.kind == k] ** 2)))
+    noise = Noise(np.maximum(scale, 1e-3), np.zeros(len(KINDS)))
+    return replace(found, fit=replace(fit, noise=noise, weight=np.ones(len(fit.weight))))
+
+
+def _null(term: Term) -> Array:
+    """(p,) a term's values with its amplitudes at null."""
+    held = term.layout.shape | term.knowledge.fixed
+    return np.where(held, term.vector, term.layout.null)

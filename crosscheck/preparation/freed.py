@@ -1,0 +1,145 @@
+"""Fits the effects whose values belong to the data, before anything else is fitted.
+
+A tracker frame that was aligned to the commands has absorbed a part of every error. Its values
+therefore belong to these data: they are fitted together with everything else, and mean nothing for
+other data. The same holds for an effect with separate values for each file or run, if the model has
+not seen that file or run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.fit.effects.registration import NAME as TRACKER
+from crosscheck.fit.effects.registration import registered_each
+from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.least_squares.state import State, evaluate
+from crosscheck.fit.words import measured
+from crosscheck.inference.fit import FLAT, Data, Fit, fit, without_rows
+from crosscheck.inference.noise import outliers
+from crosscheck.preparation.parts import LaidOut
+from crosscheck.units import parameter_name
+from seecr.effects import ApartLayout, Term, Terms, apart, layout_of
+from seecr.pose import Array
+
+__all__ = ["Freed", "freed"]
+
+
+@dataclass(frozen=True, eq=False)
+class Freed:
+    """A model after the parameters that its data leave free were fitted.
+
+    Attributes:
+        terms: the model with the fitted values. free: (p,) which parameters were fitted.
+        notes: a sentence for each effect that was fitted or that the TOML names.
+    """
+
+    terms: Terms
+    free: NDArray[np.bool_]
+    notes: tuple[str, ...] = ()
+
+
+def freed(problem: Problem, laid: LaidOut) -> Freed:
+    """Fit the parameters that the data leave free; all other values stay.
+
+    Args:
+        problem: the data; :attr:`Measurements.free` names the effects.
+        laid: the model as it stands, and the files or runs for which it has no values.
+    """
+    names, terms = problem.data.free, laid.terms
+    if not (names or laid.fresh) or not problem.n_readings:
+        return Freed(terms, np.zeros(len(terms), dtype=bool))
+    own = [_new(problem, name) for name in names if name not in terms]
+    every = Terms([*terms, *own])
+    free = _free(every, names, laid.fresh)
+    data = Data.of(problem, every)
+    state = _registered(problem, every, data.factor, free)
+    best = _fitted(data, state, free)
+    found = every.with_vector(best.terms.vector)
+    moved, error = free & ~found.knowledge.fixed, best.stderr
+    told = [_told(found, name, moved, error, problem, name in names) for name in found.names]
+    return Freed(found, moved, tuple(filter(None, told)))
+
+
+def _fitted(data: Data, state: State, free: NDArray[np.bool_]) -> Fit:
+    """The fit of the free parameters, of which nothing is known; all others stay.
+
+    Rows that are far off hardly count. But a row may stick out because it alone shows what is free,
+    such as where the target is. So if there are any, a second fit begins where all count alike.
+    """
+    parts = np.split(free, np.cumsum([len(term.layout) for term in state.terms])[:-1])
+    held = [
+        replace(term, knowledge=replace(term.knowledge, fixed=term.knowledge.fixed | ~mine))
+        for term, mine in zip(state.terms, parts, strict=True)
+    ]
+    start, widths = state.of(Terms(held)), dict.fromkeys(state.terms.names, FLAT)
+    best = fit(data, start, widths)
+    if not outliers(data.chain, best.weight, data.problem.data.n_rows).any():
+        return best
+    every = np.ones(len(best.weight))
+    alike = without_rows(replace(best, weight=every), every < 1.0)
+    fits = [best, *([fit(data, alike, widths, noise=best.noise)] if alike.valid else [])]
+    return min(fits, key=lambda one: one.cost)
+
+
+def _new(problem: Problem, name: str) -> Term:
+    """An effect that the model lacks, at its null values; separate for each of several files."""
+    layout, data = layout_of(name, problem.robot), problem.data
+    if data.files:
+        files = data.free_in.get(name, range(len(data.files)))
+        layout = apart(layout, "file", tuple(data.origins[k] for k in files), layout.null)
+    return Term(layout, layout.null)
+
+
+def _free(
+    terms: Terms, names: Sequence[str], fresh: Sequence[tuple[str, str]]
+) -> NDArray[np.bool_]:
+    """(p,) the free parameters: all those of named effects, others only for new files or runs."""
+    free = np.array([effect in names for effect, _key in terms.labels], dtype=bool)
+    for effect, part in fresh:
+        layout = terms[effect].layout
+        assert isinstance(layout, ApartLayout)
+        own = np.arange(len(layout))[layout.part(part)]
+        free[terms.part(effect).start + own] = True
+    return free
+
+
+def _registered(problem: Problem, terms: Terms, factor: Array, free: NDArray[np.bool_]) -> State:
+    """The model as it stands, or with the tracker frame registered to it, whichever fits better.
+
+    Gauss-Newton would need many steps from a frame that is far away.
+    """
+    stood = evaluate(problem, terms, factor)
+    if TRACKER not in terms or not free[terms.part(TRACKER)].any():
+        return stood
+    term = terms[TRACKER]
+    if term.knowledge.any:
+        return stood
+    mine = free[terms.part(TRACKER)]
+    at_null = np.where(mine, term.layout.null, term.vector)
+    plain = evaluate(problem, terms.with_term(term.with_vector(at_null)), factor, stood)
+    frames = registered_each(problem, plain.prediction, term.with_vector(at_null), mine)
+    turned = evaluate(problem, terms.with_term(frames), factor, plain)
+    return min(stood, turned, key=lambda state: state.chi2)
+
+
+def _told(
+    terms: Terms, name: str, moved: NDArray[np.bool_], error: Array, problem: Problem, by_toml: bool
+) -> str:
+    """A sentence with the values that an effect was fitted to; "" if it was not fitted."""
+    term, mine = terms[name], moved[terms.part(name)]
+    if not (mine.any() or by_toml):
+        return ""
+    layout = term.layout
+    errors = np.where(mine, error[terms.part(name)], 0.0)
+    values = zip(layout.names, layout.units, term.vector, errors, mine, strict=True)
+    words = ", ".join(
+        f"{parameter_name(key, unit)} {measured(v, e, unit)}" for key, unit, v, e, own in values
+        if own or by_toml
+    )  # fmt: skip
+    why = f" is free, as stated in the TOML beside {problem.data.name}, and" if by_toml else ""
+    return f"{name}{why} was fitted to these data first: {words}"

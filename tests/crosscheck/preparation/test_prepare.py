@@ -1,0 +1,166 @@
+"""Measurements made ready: what is left out is named, what is not fit is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_data import measured, term
+
+from crosscheck.fit.least_squares.imitation import basis, beside, imitated, left_over
+from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.least_squares.state import evaluate
+from crosscheck.fit.noise.outliers import outlying_rows
+from crosscheck.fit.reasons import Reason, Refusal, Unfit, Why
+from crosscheck.inference.catalogue import candidates
+from crosscheck.inference.fit import Data, unfitted
+from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.preparation.prepare import prepare
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.description.shipped import model_path
+from seecr.effects import Terms
+from seecr.pose import quat_from_rxyz, rxyz_from_quat
+
+
+def loose(robot: Robot) -> Robot:
+    """Every cable slack and nothing that pulls: the platform rests nowhere."""
+    return replace(robot, gravity=np.zeros(3), rest_lengths=robot.rest_lengths + 1.0)
+
+
+def test_fit_data_are_not_refused(robot: Robot, data: Measurements) -> None:
+    ready = prepare(robot, data, Terms())
+    assert ready.refusal is None and ready.all_notes == ()
+    assert ready.problem.use.all()
+
+
+def test_what_is_not_fit_is_refused_with_the_reason(robot: Robot, data: Measurements) -> None:
+    nowhere = prepare(loose(robot), data, Terms())
+    assert nowhere.refusal is not None and nowhere.refusal.unfit is Unfit.NO_EQUILIBRIUM
+    n = data.n_rows
+    assert str(nowhere.refusal) == (
+        f"the model has no equilibrium at {n} of {n} rows; see the notes"
+    )
+    assert nowhere.notes[0].startswith("lines 2, 3, 4, 5, 6, 7, 8, 9 and ")
+    assert nowhere.notes[0].endswith("more left out: the platform is free to move there")
+    still = prepare(robot, data.rows(np.zeros(12, dtype=int)), Terms())
+    assert still.refusal is not None and still.refusal.unfit is Unfit.CONSTANT_COMMANDS
+    blank = replace(data, position=np.full_like(data.position, np.nan), quat_wxyz=None)
+    none = prepare(robot, blank, Terms())
+    assert none.refusal is not None and none.refusal.unfit is Unfit.NO_READINGS
+    few = prepare(robot, replace(data, quat_wxyz=None).rows(slice(0, 1)), Terms())
+    assert few.refusal == Refusal(Unfit.FEW_READINGS, rows=1, lost=0, readings=3)
+    assert str(few.refusal) == "only 3 readings can be used"
+
+
+def test_the_exit_status_hangs_on_what_happened_and_on_no_word() -> None:
+    """Solutions are wanting in these alone; what people read of the others may say anything."""
+    wanting = {unfit for unfit in Unfit if Refusal(unfit, readings=3).unsolved}
+    assert wanting == {Unfit.NO_EQUILIBRIUM, Unfit.UNSOLVED_MODEL}
+    assert Refusal(Unfit.FEW_READINGS, rows=1, lost=1, readings=0).unsolved
+
+
+def test_every_reason_is_a_sentence_with_its_numbers() -> None:
+    for why in Why:
+        text = str(Reason(why, parameters=24, rows=10, p=0.25, by=("creep",)))
+        assert text and "{" not in text
+        assert text.startswith("not a candidate: ") == Reason(why).lacking
+    # "probable (1) but not certain" was said of what is all but certain
+    assert str(Reason(Why.NOT_SURE, p=0.9999)) == "probable (> 99 %) but not certain"
+    assert str(Reason(Why.NOT_SURE, p=0.986)) == "probable (99 %) but not certain"
+    two = Reason(Why.NOT_NEEDED_BESIDE, p=0.1, by=("creep", "stiffness"))
+    assert str(two) == "not needed once creep, stiffness are in the model (probability 10 %)"
+    for unfit in Unfit:
+        assert "{" not in str(Refusal(unfit, 10, 3, 5))
+
+
+def test_what_the_data_lack_is_said_of_each_effect(robot: Robot, data: Measurements) -> None:
+    def lacks(some: Measurements) -> dict[str, Reason | None]:
+        problem = Problem(robot, some, some.sigma, np.ones(some.n_rows, dtype=bool))
+        return {layout.name: why for layout, why in candidates(problem)}
+
+    full = lacks(data)
+    assert full["stiffness"] is None and full["creep"] is None
+    assert full["thermal_expansion"] == Reason(Why.NEEDS_TEMPERATURE)
+    assert full["tension_scale"] == Reason(Why.NEEDS_TENSIONS)
+    constant = lacks(replace(data, temperature_C=np.full(data.n_rows, 20.0)))
+    assert constant["thermal_expansion"] == Reason(Why.CONSTANT_TEMPERATURE)
+    assert lacks(replace(data, t_s=None))["creep"] == Reason(Why.NEEDS_TIME)
+    few = lacks(data.rows(slice(0, 10)))["exit_point_error"]
+    assert few == Reason(Why.TOO_MANY_PARAMETERS, parameters=24, rows=10)
+    lengths = robot.commanded_lengths(data.command_pose)
+    told = lacks(replace(data, command_pose=None, command_lengths=lengths))
+    assert told["initial_pose_error"] == Reason(Why.NEEDS_POSES)
+
+
+def test_a_model_at_values_that_cannot_be_solved_is_not_valid(
+    robot: Robot, data: Measurements
+) -> None:
+    problem = Problem(loose(robot), data, data.sigma, np.ones(data.n_rows, dtype=bool))
+    every = Data.of(problem, Terms())
+    for terms in (Terms(), Terms([term(robot, "stiffness")])):
+        found = unfitted(every, terms)
+        assert not found.valid and not found.settled
+        assert found.jacobian.shape == (problem.n_readings, len(terms))
+
+
+def test_a_row_that_sticks_out_alone_is_an_outlier_and_two_together_are_not(
+    robot: Robot, data: Measurements
+) -> None:
+    def outlying(rows: list[int]) -> list[int]:
+        position = data.position.copy()
+        position[rows, 0] += 0.01
+        problem = Problem(
+            robot, replace(data, position=position), data.sigma, np.ones(data.n_rows, dtype=bool)
+        )
+        state = evaluate(problem, Terms(), problem.noise(problem.experiment.predict()))
+        return np.flatnonzero(outlying_rows(problem, state)).tolist()
+
+    assert outlying([7]) == [7]
+    assert outlying([7, 8]) == []
+    assert outlying([]) == []
+
+
+def test_what_can_be_imitated_is_a_part_from_nothing_to_all() -> None:
+    rng = np.random.default_rng(0)
+    columns = rng.standard_normal((50, 4))
+    span = basis(columns)
+    assert span.shape == (50, 4)
+    assert span.T @ span == pytest.approx(np.eye(4), abs=1e-12)
+    inside = columns @ np.array([1.0, -2.0, 0.0, 3.0])
+    assert imitated(inside, span) == pytest.approx(1.0)
+    assert left_over(inside, span) == pytest.approx(0.0, abs=1e-20)
+    outside = beside(rng.standard_normal(50), span)
+    assert imitated(outside, span) == pytest.approx(0.0, abs=1e-12)
+    mixed = inside / np.linalg.norm(inside) + outside / np.linalg.norm(outside)
+    assert imitated(mixed, span) == pytest.approx(0.5)
+    assert left_over(3.0 * mixed, span) == pytest.approx(9.0)
+    # columns that depend on each other, and none
+    assert basis(np.column_stack([columns, columns[:, 0] * 1e-7, np.zeros(50)])).shape == (50, 4)
+    assert imitated(inside, basis(np.zeros((50, 0)))) == 0.0
+    assert imitated(np.zeros(50), span) == 0.0
+
+
+def test_what_no_joint_changes_and_the_file_says_of_every_row_is_no_reading() -> None:
+    """Rows of x, z and a tilt, filled up to whole poses, say as much as without the filling."""
+    planar = load_robot(model_path("planar_vertical"))
+    read = replace(measured(planar, points=12), sigma=Sigma())
+    tilt = rxyz_from_quat(read.quat_wxyz)[:, 1]
+    about = np.zeros((read.n_rows, 3))
+    about[:, 1] = tilt
+    place = read.position.copy()
+    place[:, 1] = planar.reference_pose[1]
+    filled = replace(read, position=place, quat_wxyz=quat_from_rxyz(about))
+    bare = replace(read, position=place * [1, np.nan, 1], quat_wxyz=None,
+                   angles_rad=about * [np.nan, 1, np.nan])  # fmt: skip
+    ready, alike = (prepare(planar, one, Terms()) for one in (filled, bare))
+    sigma = ready.problem.sigma
+    assert sigma.orientation_rad == pytest.approx(3.5e-4, rel=0.4)
+    assert sigma.orientation_rad == pytest.approx(alike.problem.sigma.orientation_rad, rel=1e-3)
+    assert sigma.position_m == pytest.approx(alike.problem.sigma.position_m)
+    assert ready.problem.n_readings == alike.problem.n_readings
+    assert ready.notes[0].startswith("y, rotation about x, rotation about z: not counted as ")
+    # what an instrument read there differs from row to row; a free platform may turn anywhere
+    assert not prepare(planar, read, Terms()).problem.filled_in.any()
+    assert not Problem(replace(planar, joints=()), filled, sigma, filled.read).filled_in.any()

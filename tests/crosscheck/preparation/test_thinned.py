@@ -1,0 +1,145 @@
+"""Of long logs a search takes some rows, the way to them as it was, and tells of the others."""
+
+import functools
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import crosscheck
+import seecr
+from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.preparation.thinned import thinned
+from seecr.effects import Term, Terms
+from seecr.prediction.experiment import Experiment
+
+ROBOT = seecr.load_robot(seecr.model_path("demobot_cogiro"))
+NOISE = Sigma(position_m=1e-4, orientation_rad=1e-3)
+ROWS, RUNS = 1200, 3
+PLAIN = Terms()
+
+
+def stream(terms: Terms = PLAIN) -> Measurements:
+    """Three runs of a robot that moves slowly to and fro, read all the way."""
+    run = np.repeat(np.arange(RUNS), ROWS // RUNS)
+    t = np.tile(np.linspace(0.0, 1.0, ROWS // RUNS), RUNS)
+    pose = np.tile(ROBOT.reference_pose, (ROWS, 1))
+    pose[:, 0] += 0.1 * np.sin(9.0 * t + run)
+    pose[:, 1] += 0.06 * np.sin(5.0 * t + 2.0 * run)
+    pose[:, 2] -= 0.03 * np.sin(4.0 * t)
+    data = Measurements(
+        Path("stream.csv"), ROBOT.n_cables, np.char.add("run ", run.astype(str)),
+        command_pose=pose, t_s=np.arange(ROWS, dtype=float), sigma=NOISE,
+    )  # fmt: skip
+    read = Experiment(ROBOT, data.as_commands(ROBOT)).predict(terms.effects).readings
+    random = np.random.default_rng(1)
+    off = NOISE.position_m * random.standard_normal((ROWS, 3))
+    return replace(data, position=read.position + off, position_mask=np.ones(3, dtype=bool))
+
+
+def test_few_rows_are_all_taken() -> None:
+    data = stream()
+    found = thinned(ROBOT, data, ROWS)
+    assert found.data is data
+    assert not found.others.any() and found.note_on_others(PLAIN, NOISE) == ()
+
+
+def test_rows_are_taken_evenly_in_each_run_and_the_others_are_those_left() -> None:
+    data = stream()
+    found = thinned(ROBOT, data, 120)
+    taken = ~found.others
+    assert taken[::10].all() and taken[np.flatnonzero(np.diff(data.run_index))].all() and taken[-1]
+    assert 120 <= found.data.n_rows < 200  # and where a cable turns round
+    assert found.data.line.tolist() == data.line[taken].tolist()
+    assert "one in 10" in found.data.notes[-1] and " rows of 1200: " in found.data.notes[-1]
+
+
+def test_lengths_turn_round_at_rows_that_are_taken() -> None:
+    """Play in the winches is the same at the rows that are left, but for the smallest turns."""
+    backlash = Terms([Term.of(ROBOT, "backlash", gap_m=2e-3)])
+    data = stream(backlash)
+    found = thinned(ROBOT, data, 60)
+    whole, some = (
+        Experiment(ROBOT, one.as_commands(ROBOT)).predict(backlash.effects).pose[:, :3]
+        for one in (data, found.data)
+    )
+    plain = Experiment(ROBOT, data.as_commands(ROBOT)).predict().pose[:, :3]
+    taken = ~found.others
+    off = np.abs(some - whole[taken]).max(axis=1)
+    assert np.median(np.abs(whole - plain).max(axis=1)) > 5e-4
+    assert off.max() < 1e-4 and np.mean(off > 1e-6) < 0.02
+
+
+def test_of_poses_in_no_order_the_first_of_each_run_are_taken() -> None:
+    data = stream()
+    mixed = np.random.default_rng(2).permutation(ROWS)
+    data = replace(data, command_pose=data.command_pose[mixed], position=data.position[mixed])
+    found = thinned(ROBOT, data, 120)
+    place = np.arange(ROWS) % (ROWS // RUNS)
+    assert found.others.tolist() == (place >= ROWS // RUNS // 10).tolist()
+    assert "in no order" in found.data.notes[-1]
+
+
+def test_of_many_short_runs_some_are_left_out_whole() -> None:
+    data = stream()
+    short = replace(data, run=np.char.add("run ", (np.arange(ROWS) // 2).astype(str)))
+    found = thinned(ROBOT, short, 100)
+    assert 50 <= found.data.n_rows <= 100
+    assert "of one run in 12" in found.data.notes[-1]
+    assert found.others.sum() + found.data.n_rows == ROWS
+
+
+@pytest.mark.parametrize("most", [100, 150, 300])
+def test_of_runs_that_alternate_some_of_each_kind_are_taken(most: int) -> None:
+    """Each place was gone to from two sides; every second run came from one of them."""
+    data = stream()
+    to_and_fro = replace(data, run=np.char.add("run ", (np.arange(ROWS) // 2).astype(str)))
+    found = thinned(ROBOT, to_and_fro, most)
+    taken = np.char.replace(np.unique(found.data.run), "run ", "").astype(int)
+    assert most / 2 < len(found.data.run) < 1.1 * most
+    for period in (2, 3, 4, 6):
+        counts = np.bincount(taken % period, minlength=period)
+        assert counts.min() > 0.7 * counts.mean(), period
+
+
+def test_of_fewer_runs_all_are_kept_though_more_rows_are_left() -> None:
+    """Half of 760 runs tell as much as all, in half of the time; of forty each may be a place."""
+    data = stream()
+    fewer = replace(data, run=np.char.add("run ", (np.arange(ROWS) // 30).astype(str)))
+    found = thinned(ROBOT, fewer, 120)
+    assert 120 < found.data.n_rows <= 240
+    assert len(np.unique(found.data.run)) == 40
+
+
+def test_the_others_are_predicted_to_the_noise_by_the_model_that_is_there_alone() -> None:
+    terms = Terms([Term.of(ROBOT, "pulley_radius", radius_m=0.02)])
+    found = thinned(ROBOT, stream(terms), 120)
+    (well,) = found.note_on_others(terms, NOISE)
+    (badly,) = found.note_on_others(PLAIN, NOISE)
+    assert "not used in any fit, predicted to 0.1" in well and "outlier" not in well
+    assert well != badly
+
+
+def test_rows_far_off_are_no_part_of_what_is_told_of_the_others() -> None:
+    data = stream()
+    data.position[1::100] += 0.05
+    found = thinned(ROBOT, data, 120)
+    (said,) = found.note_on_others(PLAIN, NOISE)
+    far = found.others[1::100].sum()
+    assert far > 8 and "predicted to 0.1" in said
+    assert said.endswith(f", except for {far} outliers")
+
+
+@pytest.mark.slow
+def test_a_diagnosis_of_some_rows_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    few = functools.partial(thinned, most=80)
+    monkeypatch.setattr("crosscheck.diagnosis.diagnose.thinned", few)
+    monkeypatch.setattr("crosscheck.calibration.thinned", few)
+    twin = crosscheck.make_twin(ROBOT, seed=4, effects=["pulley_radius"])
+    found = crosscheck.diagnose(ROBOT, twin.measured, only="pulley_radius")
+    assert [one.effect for one in found.missing] == ["pulley_radius"]
+    assert any(note.startswith("the search uses ") and ": one in 2" in note for note in found.notes)
+    assert "not used in any fit" in found.notes[-1]
+    made = crosscheck.calibrate(ROBOT, twin.measured, only="pulley_radius")
+    assert "not used in any fit" in made.notes[-1]
