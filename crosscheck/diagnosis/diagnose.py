@@ -26,7 +26,7 @@ from crosscheck.given import (
 )
 from crosscheck.inference.catalogue import Catalogue, candidates
 from crosscheck.inference.fit import Data
-from crosscheck.inference.priors import BLIND, LIMITED, MOST_OF_IT
+from crosscheck.inference.priors import LIMITED, MOST_OF_IT, WIDTHS
 from crosscheck.inference.search import Search
 from crosscheck.inference.verdict import judged
 from crosscheck.measurements.read import GivenData, measurements_of
@@ -164,7 +164,7 @@ def _is_blind(problem: Problem, stood: State, sight: Sight) -> bool:
         return False
     factors = [one.factor for one in sight.effects if np.isfinite(one.factor)]
     is_quiet = stood.chi2 <= problem.n_readings
-    return is_quiet and len(factors) > 0 and min(factors) > BLIND
+    return is_quiet and len(factors) > 0 and min(factors) > WIDTHS[-1]
 
 
 def no_verdict(problem: Problem, stood: State, notes: Sequence[str], refusal: Refusal) -> Diagnosis:

@@ -16,7 +16,7 @@ differ from these by the same constant.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import special
@@ -28,7 +28,7 @@ from crosscheck.inference.catalogue import Catalogue, Key, is_field, log_shares,
 from crosscheck.inference.evidence import Linear, MemberColumns, averaged, best_widths, log_evidence
 from crosscheck.inference.fit import Fit
 from crosscheck.inference.noise import NoisePrior, log_det
-from crosscheck.inference.priors import FIELD_WIDTHS, WIDTHS
+from crosscheck.inference.priors import EQUAL, FIELD_WIDTHS, WIDTHS
 from seecr.pose import Array
 
 # The widths that maximise the evidence count only if the optimum with them loses less ln posterior
@@ -81,6 +81,22 @@ def scored(every: Catalogue, key: Key, fit: Fit, widths: Mapping[str, float]) ->
     robot = fit.data.problem.robot
     possible = key == stood or can_be(robot, fit.terms, every.stood)
     return Hypothesis(key, fit, {**widths, **best.chosen}, score + every.log_prior(key), possible)
+
+
+def wider(every: Catalogue, one: Hypothesis) -> dict[str, float]:
+    """The widths of greatest evidence about a fit, none below a plausible size.
+
+    A plausible size may be ten times too small; odds of twenty to one say so. Of many effects that
+    can stand for each other the evidence would also narrow those that it has no use for, and call
+    their values certain.
+    """
+    linear, _z = _own_linear(every, one.key, one.fit)
+    groups = {
+        k: replace(group, widths=group.widths[group.widths >= min(1.0, group.widths.max())])
+        for k, group in linear.groups.items()
+    }
+    held = {k: max(one.widths.get(k, 1.0), group.middle) for k, group in groups.items()}
+    return best_widths(replace(linear, groups=groups), held, EQUAL).chosen
 
 
 def _own_linear(every: Catalogue, key: Key, fit: Fit) -> tuple[Linear, Array]:

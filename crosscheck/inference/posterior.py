@@ -216,7 +216,8 @@ def _credible(
     """The classes, those of the best set's members grown to credible sets where that takes few.
 
     An effect may be 0.7 probable and another in its place 0.28. Then it is sure that one of the two
-    is missing: the likeliest that exchange for a member join its class until that is sure.
+    is missing: the likeliest that exchange for a member join its class until that is sure. Those
+    that are equal anyway count as one.
     """
     out = {members: set(members) for members in classes}
     for members in classes:
@@ -225,14 +226,14 @@ def _credible(
                 next(iter(key - best)): score for key, score in scores.items()
                 if best - key == {own} and len(key - best) == 1
             }  # fmt: skip
-            grown = set(members)
+            grown, joined = set(members), 1
             for other in sorted(others, key=lambda k: (-others[k], k)):
-                if chance(grown) >= SURE or len(grown) >= FEW:
+                if chance(grown) >= SURE or joined >= FEW:
                     break
                 alone = next((m for m in classes if other in m), (other,))
-                if not set(alone) & best:
-                    grown |= set(alone)
-            if chance(grown) >= SURE and len(grown) <= FEW:
+                if other not in grown and not set(alone) & best:
+                    grown, joined = grown | set(alone), joined + 1
+            if chance(grown) >= SURE:
                 out[members] = grown
     taken = [grown for members, grown in out.items() if len(grown) > len(members)]
     done = list[tuple[str, ...]]()

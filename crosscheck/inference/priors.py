@@ -1,7 +1,7 @@
 """The numbers that steer a diagnosis, each with its meaning and where it comes from.
 
 Nothing else decides what a user is told. ``scripts/score.py --move`` says what moving one by a
-factor of two does. What stands elsewhere are tolerances of the arithmetic.
+factor of two does. What stands elsewhere are tolerances of the arithmetic and limits of effort.
 """
 
 from __future__ import annotations
@@ -30,13 +30,14 @@ are. One reading in twenty is disturbed on real trackers (reflections, lost line
 
 WIDTHS = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 """Prior standard deviations of an effect's values in plausible sizes, all equally probable. A good
-tracker resolves a hundredth of a plausible size; plausible sizes may be wrong by ten."""
+tracker resolves a hundredth of a plausible size; plausible sizes may be wrong by ten. Data that
+would show no effect even at the widest allow no verdict."""
 
 FIELD_WIDTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 """The same for fields, in units of the noise: below 0.3 they do not show, above 100 they are seen
 whatever the prior."""
 
-LARGEST = 50.0
+LARGEST = 5.0 * WIDTHS[-1]
 """No effect of more plausible sizes is listed as found: five standard deviations of the widest
 prior. The lines of one real robot were truly 20 plausible sizes longer than stated."""
 
@@ -81,9 +82,6 @@ LEFTOVER = 0.1
 """Part of what an unknown effect does that the field leaves which follows it best, three times the
 median of the lenses and flexing platforms that were looked at. Known effects may imitate it."""
 
-BLIND = 10.0
-"""Data that would not show any effect even at this many plausible sizes allow no verdict."""
-
 NUMBERS = 6
 """Beside something unknown no effect of more numbers than a pose has is named: sixteen numbers of
 drums follow a bent cable as well as a field does."""
@@ -100,9 +98,3 @@ MOST_OF_IT = 3.0
 WITHIN = 12.0
 """Hypotheses that the linear model considers worse by more ln evidence are not fitted: after a fit
 they were never off by more where cables stay taut, and odds of e^-12 change no word."""
-
-FITS = 8
-"""Most hypotheses that are fitted about one linear model."""
-
-ROUNDS = 4
-"""Most linear models about better and better hypotheses."""

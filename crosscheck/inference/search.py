@@ -36,9 +36,9 @@ from crosscheck.inference.catalogue import (
 )
 from crosscheck.inference.evidence import Solved, best_widths, log_evidence
 from crosscheck.inference.fit import TRACKER, Data, Fit, fit, unfitted
-from crosscheck.inference.hypothesis import Hypothesis, scored
+from crosscheck.inference.hypothesis import Hypothesis, scored, wider
 from crosscheck.inference.noise import Noise, NoisePrior, outliers
-from crosscheck.inference.priors import EQUAL, FEW, FITS, MAY_BE_UNKNOWN, ROUNDS, WITHIN
+from crosscheck.inference.priors import EQUAL, FEW, MAY_BE_UNKNOWN, WITHIN
 from seecr.effects import Knowledge, Term
 from seecr.pose import Array
 
@@ -58,6 +58,9 @@ _PAYS = 2.0
 # Fits of more effects than are a diagnosis take longer, and only what all of them do together is
 # asked of them: one counts as so many.
 _LONG = 4
+# Effort: most hypotheses that are fitted about one linear model, and most linear models about
+# better and better hypotheses.
+_FITS, _ROUNDS = 8, 4
 
 
 class Scores:
@@ -327,11 +330,11 @@ class Search:
         )
 
     def _settle(self) -> None:
-        for k in range(ROUNDS):
+        for k in range(_ROUNDS):
             if self.best.field is None:
                 self._ask_rows_far_off(self.best)
             many = len(bare(self.best.key) - self.stood) > FEW
-            if self.best.key in self._centres or (many and k >= ROUNDS // 2):
+            if self.best.key in self._centres or (many and k >= _ROUNDS // 2):
                 break
             self.look_about(self.best)
 
@@ -470,7 +473,7 @@ class Search:
         return best
 
     def _whole(self, whole: Hypothesis) -> Hypothesis:
-        """A fit of all effects with those that wait and pay, at the widths of greatest evidence."""
+        """A fit of all effects with those that wait and pay, wider where that explains more."""
         about = self.every.about(whole.fit)
         pays = {k: p for k, p in about.promises.items() if self._waits(k) and p > _PAYS}
         order = sorted(pays, key=lambda k: (-pays[k], k))
@@ -485,7 +488,10 @@ class Search:
                     other = fit(self.data, state, noise=whole.fit.noise)
                     more = scored(self.every, key, other, dict.fromkeys(key, 1.0))
                     whole = max(whole, more, key=lambda h: h.score)
-        return whole
+        widths = wider(self.every, whole)
+        named = {name_of(k): w for k, w in widths.items()}
+        found = fit(self.data, whole.fit.state, named, noise=whole.fit.noise)
+        return max(whole, scored(self.every, whole.key, found, widths), key=lambda h: h.score)
 
     # --- looking about a fit ---
 
@@ -525,9 +531,9 @@ class Search:
         """Fit what a linear model considers best, within the budget."""
         seen, done = scores.seen, 0
         top = max(seen.values())
-        for key in scores.best(4 * FITS):
+        for key in scores.best(4 * _FITS):
             adds = key > centre.key and seen[key] < top - EQUAL
-            if not adds and done < FITS:
+            if not adds and done < _FITS:
                 done += self._fit_new(scores, key)
 
     def _fit_new(self, scores: Scores, key: Key) -> int:
@@ -547,7 +553,7 @@ class Search:
 
     def _close(self) -> None:
         """Fit the neighbours of the best that are near, until none is better."""
-        for _ in range(ROUNDS - 1):
+        for _ in range(_ROUNDS - 1):
             best = self.best
             scores = self.scores_about(best)
             base, near = scores.score(best.key), scores.neighbours(best.key)
@@ -560,7 +566,7 @@ class Search:
             done = 0
             for key in sorted(near, key=lambda k: (-near[k], sorted(k))):
                 least = EQUAL if key > best.key else WITHIN
-                if near[key] > base - least and done < FITS:
+                if near[key] > base - least and done < _FITS:
                     done += self._fit_new(scores, key)
             self.last, self.near = scores, near
             if self.best is best:

@@ -30,7 +30,7 @@ LEVEL, POWER = 0.05, 0.8
 
 NAMED = 2.0
 """From this multiple of the smallest visible size on, diagnoses name nine in ten effects, or their
-equivalents: measured by ``scripts/score_success.py``, see docs/diagnosis.md."""
+equivalents: measured by ``scripts/score.py``, see docs/diagnosis.md."""
 
 # A direction does not count if it is this much weaker than the strongest.
 _RANK = 1e-5

