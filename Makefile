@@ -1,7 +1,7 @@
 # The tasks of this repository; `make` lists them. They use .venv, which `make setup` makes.
 BIN := .venv/bin
 
-.PHONY: help setup quick test sweep bench docs paper pictures suite ci
+.PHONY: help setup quick test sweep score bench docs paper pictures suite ci
 
 help: ## list the tasks
 	@sed -n 's/^\([a-z]*\): .*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 8
@@ -20,8 +20,12 @@ quick: ## while working: lint, format, types, and the tests that take less than 
 test: ## all tests
 	$(BIN)/python -m pytest
 
-sweep: ## more cases of what the tests hold
+sweep: ## more cases of what the tests hold, and how good the diagnosis is on a tenth of its cases
 	$(BIN)/python -m pytest -m sweep
+	$(BIN)/python scripts/score.py --short
+
+score: ## how good the diagnosis is, on five hundred new cases: docs/figures.json; half an hour
+	$(BIN)/python scripts/score.py --out docs/figures.json --page docs/diagnosis.md
 
 bench: ## how fast it is, one process at a time
 	$(BIN)/python -m pytest -m benchmark -n 0 -s

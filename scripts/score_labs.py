@@ -49,7 +49,7 @@ class Lab:
         ratio: rms errors on validation.csv over those of the true model, by kind of reading;
             empty where something is hidden that no catalogue holds.
         plain: the same without any effect.
-        rows: of measured.csv.
+        rows: of the measurements.
         seconds: of processor for the diagnosis, with its page.
     """
 
@@ -78,18 +78,19 @@ class Lab:
 def asked(folder: Path, out: Path, name: str) -> Lab:
     """One case by its commands, which write into ``out``."""
     case = folder / name
-    robot, data = case / "robot.xml", case / "measured.csv"
+    robot = case / "robot.xml"
+    data = [case / name for name in ("measured.csv", "second.csv") if (case / name).exists()]
     answer = json.loads((folder / "answers.json").read_text(encoding="utf-8"))[name]
     model = out / "model.toml"
     start = time.process_time()
     found = command(
-        "diagnose", robot, data, "--out", out / "diagnosis", "--no-recording", "--model-out", model
+        "diagnose", robot, *data, "--out", out / "diagnosis", "--no-recording", "--model-out", model
     )
     spent = time.process_time() - start
     if found["verdict"] == "many_effects":
         model.unlink(missing_ok=True)
-        command("calibrate", robot, data, "--model", model)
-    rows = len(data.read_text(encoding="utf-8").splitlines()) - 1
+        command("calibrate", robot, *data, "--model", model)
+    rows = sum(len(one.read_text(encoding="utf-8").splitlines()) - 1 for one in data)
     lab = Lab(name, answer, found, rows, spent)
     if not is_known(answer["values"]):
         return lab
@@ -124,7 +125,7 @@ def row(lab: Lab) -> str:
 
 def _cells(lab: Lab) -> tuple[str, ...]:
     hidden = lab.answer["hidden"]
-    options = [_OPTIONS[key].get(value, "") for key, value in lab.answer["options"].items()]
+    options = [_OPTIONS.get(k, {}).get(value, "") for k, value in lab.answer["options"].items()]
     return (
         _HIDDEN.get(hidden[0]) or ", ".join(f"`{name}`" for name in hidden),
         ", ".join(filter(None, options)),
