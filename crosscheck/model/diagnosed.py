@@ -115,6 +115,8 @@ def _term(path: Path, item: Any, robot: Robot) -> Term:
 
 def _apart(robot: Robot, name: str, per: str, values: Mapping[str, float | None]) -> Term:
     """An effect with other values in each file or run: keys are "part: parameter"."""
+    if per not in ("file", "run"):
+        raise InputError(f'effect {name}: per must be "file" or "run", got {per!r:.60}')
     base = layout_of(effect_named(name), robot)
     parts = tuple(dict.fromkeys(key.rpartition(": ")[0] for key in values))
     layout = apart(base, per, parts, base.null)

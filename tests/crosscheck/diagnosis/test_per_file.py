@@ -19,6 +19,7 @@ from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.together import together
 from crosscheck.model.diagnosed import load_diagnosed
 from crosscheck.model.write import save_model
+from seecr.errors import InputFileError
 from seecr.prediction.model import load_model
 
 SOME = ["tracker_frame", "pulley_radius", "stiffness"]
@@ -70,3 +71,13 @@ def test_a_diagnosis_that_was_kept_is_fitted_again(tmp_path: Path) -> None:
         assert type(one.layout) is type(listed[one.name].layout)
     added = add_effects(robot(), days(), terms)
     assert compare(robot(), days(), added.model).is_noise
+
+
+def test_other_parts_than_files_and_runs_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "diagnosis.json"
+    document = json.loads(json.dumps(found().as_json(), default=str))
+    frame = next(one for one in document["missing"] if "per" in one)
+    frame["per"] = "week"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    with pytest.raises(InputFileError, match='per must be "file" or "run", got \'week\''):
+        load_diagnosed(path, robot())

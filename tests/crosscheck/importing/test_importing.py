@@ -59,6 +59,7 @@ def swallowed_nothing(found):
 def has_the_noise_of_means(found, made, samples=60):
     sigma = found.measured.sigma
     assert sigma.position_m == pytest.approx(made_of.NOISE_M / np.sqrt(samples), rel=0.3)
+    assert found.measured.sigma_source == "dwell_scatter"
     assert found.measured.n_rows == made.truth.n_rows == int(found.measured.read.sum())
 
 

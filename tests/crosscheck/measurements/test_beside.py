@@ -54,6 +54,10 @@ def test_sigma_beside_the_data_or_named(csv_file, robot, tmp_path):
         ),
         ("[Sigmas]\nposition_m = 3e-5\n", r"line 1: unknown table \[Sigmas\]; expected \[sigma\]"),
         ("sigma = 3\n", r"line 1: sigma must be a table, \[sigma\]"),
+        (
+            "[sigma]\nsource = 'guessed'\n",
+            "line 2: source must be .stated. or .dwell_scatter. or .revisited., got 'guessed'",
+        ),
     ],
 )
 def test_mistakes_in_sigma(csv_file, robot, tmp_path, text, expected):

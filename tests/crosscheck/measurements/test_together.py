@@ -42,12 +42,14 @@ def test_two_days_are_one_with_their_own_noise_clock_and_start(tmp_path: Path, r
     )  # fmt: skip
     tuesday = case(
         tmp_path, "tuesday.csv", f"{CMD},meas_x_m,tension_2_N", "a,0,0,0,0,.3,7", "b,1,.1,0,.1,.3,",
-        toml='start = "first_row"\n[sigma]\nposition_m = 3e-4\ntension_N = 2.0',
+        toml='start = "first_row"\n[sigma]\nposition_m = 3e-4\ntension_N = 2.0\n'
+        'source = "dwell_scatter"',
     )  # fmt: skip
     data = load_measurements([monday, tuesday], robot)
     assert data.runs == ("monday.csv: a", "tuesday.csv: a", "tuesday.csv: b")
     assert data.path.name == "monday.csv + tuesday.csv"
     assert data.sigma == Sigma(1e-4, None, 2.0, 1e-3)
+    assert data.sigma_source == "dwell_scatter", "a lower bound in one file is one for both"
     problem = Problem(robot, data, data.sigma, np.ones(4, dtype=bool))
     assert problem.reading_sigma[:, 0] == pytest.approx([1e-4, 1e-4, 3e-4, 3e-4])
     assert problem.reading_sigma[:, 7] == pytest.approx([2.0] * 4)
@@ -61,6 +63,7 @@ def test_two_days_are_one_with_their_own_noise_clock_and_start(tmp_path: Path, r
     assert "tuesday.csv without length_m: these lengths are taken as exact." in data.notes
     assert "monday.csv without tension_N: that of tuesday.csv is used." in data.notes
     quieter = load_measurements([monday, tuesday], robot, sigma=Sigma(2e-3))
+    assert quieter.sigma_source == "stated"
     assert quieter.sigma.position_m == 2e-3 and np.all(quieter.sigma_ratio[:, 0] == 1.0)
     assert np.any(quieter.sigma_ratio[:, 3] != 1.0)
 

@@ -35,6 +35,7 @@ def everything(path: Path) -> Measurements:
         tensions=tensions,
         temperature_C=np.linspace(-5, 25, 6),
         sigma=Sigma(position_m=3e-5, length_m=0.1 + 0.2),
+        sigma_source="dwell_scatter",
     )
 
 
@@ -46,7 +47,7 @@ def test_round_trip_through_a_file(tmp_path, robot):
     for name in (*compared, "temperature_C"):
         np.testing.assert_allclose(getattr(back, name), getattr(made, name), rtol=1e-8, atol=1e-9)
     assert back.run.tolist() == made.run.tolist()
-    assert back.sigma == made.sigma
+    assert back.sigma == made.sigma and back.sigma_source == "dwell_scatter"
     assert back.tension_mask.tolist() == [False, True, False, False]
     assert back.command_pose is None and back.line.tolist() == [2, 3, 4, 5, 6, 7]
     assert sorted(p.name for p in tmp_path.iterdir()) == ["measured.csv", "measured.toml"]
