@@ -304,6 +304,15 @@ class Search:
         if np.any(outliers(self.data.chain, found.fit.weight, self.data.problem.data.n_rows)):
             self._singles(_with_rows_alike(found), forms=True)
 
+    def _ask_fields_of_rows_far_off(self) -> None:
+        """Try beside the best what something unknown would do in rows that now hardly count."""
+        best, rows = self.best, self.data.problem.data.n_rows
+        if best.field is None and np.any(outliers(self.data.chain, best.fit.weight, rows)):
+            scores = self.scores_about(_with_rows_alike(best))
+            near = scores.with_fields(best.key)
+            for key in sorted(near, key=lambda k: (-near[k], sorted(k)))[:_FIELDS]:
+                self.fit(scores, key)
+
     def run(self) -> Hypothesis:
         """Search until the best hypothesis stays the best."""
         none = self.begin()
@@ -553,6 +562,7 @@ class Search:
 
     def _close(self) -> None:
         """Fit the neighbours of the best that are near, until none is better."""
+        self._ask_fields_of_rows_far_off()
         for _ in range(_ROUNDS - 1):
             best = self.best
             scores = self.scores_about(best)
