@@ -25,9 +25,7 @@ from seecr.description.mjcf import load_robot
 # what no catalogue holds, in B12 (of twins in test_unknown_effects.py), take three times as long.
 IN_CI = ("B03", "B05", "B06", "B10", "B17", "B18")
 NAMES = tuple(f"B{k:02d}" for k in range(1, 19))
-NEAR_A_FOLD = pytest.mark.xfail(
-    reason="a row of its validation is near a fold: see docs"
-)
+NEAR_A_FOLD = pytest.mark.xfail(reason="a row of its validation is near a fold: see docs")
 CASES = [
     pytest.param(
         name,
