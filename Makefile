@@ -24,7 +24,7 @@ sweep: ## more cases of what the tests hold, and how good the diagnosis is on a 
 	$(BIN)/python -m pytest -m sweep
 	$(BIN)/python scripts/score.py --short
 
-score: ## how good the diagnosis is, on five hundred new cases: docs/figures.json; half an hour
+score: ## how good the diagnosis is, on three hundred new cases: docs/figures.json; half an hour
 	$(BIN)/python scripts/score.py --out docs/figures.json --page docs/diagnosis.md
 
 bench: ## how fast it is, one process at a time

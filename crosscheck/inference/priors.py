@@ -1,7 +1,9 @@
 """The numbers that steer a diagnosis, each with its meaning and where it comes from.
 
-Nothing else decides what a user is told. ``scripts/score.py --move`` says what moving one by a
-factor of two does. What stands elsewhere are tolerances of the arithmetic and limits of effort.
+Nothing else decides what a diagnosis names. What makes data unfit, what remainder matters and what
+``add`` refuses have thresholds of their own, beside their code. ``scripts/score.py --move`` says
+what moving one by a factor of two does. What stands elsewhere are tolerances of the arithmetic and
+limits of effort.
 """
 
 from __future__ import annotations
