@@ -17,6 +17,7 @@ MuJoCo is the truth, on the shipped robots. The kinds:
 - ``tolerances``: twelve effects at once of 0.7 plausible sizes, and another trajectory.
 
 An effect is owed a name from 5 sigma on beside the others, which no values of these could imitate.
+Something unknown is counted by what it does that no effect that acts at once could imitate.
 A name is false where neither it nor what cannot be told from it is hidden.
 """
 
@@ -69,6 +70,8 @@ EFFECTS = (
     "frame_compliance", "platform_mass", "centre_of_mass", "external_wrench", "gravity_tilt",
     "tracker_frame", "tracker_target", "tracker_scale",
 )  # fmt: skip
+# Effects with history or shapes.
+LATE = ("backlash", "hysteresis", "exit_friction", "nonlinear_elasticity", "winch_side_length")
 TOLERANCES = (
     "pulley_radius", "exit_point_error", "anchor_point_error", "cable_length_offset", "drum_gain",
     "tracker_frame", "tracker_target", "platform_mass", "centre_of_mass", "gravity_tilt",
@@ -165,7 +168,7 @@ def edge(robot: Robot, told: Commands, size: float) -> Commands:
 def hose(robot: Robot, told: Commands, size: float) -> Commands:
     """A soft spring between the platform and a point of the room pulls it."""
     away = (told.pose[:, :3] - told.pose[0, :3]) / robot.length - np.array([0.3, 0.0, 0.0])
-    force = -robot.mass * 9.81 * size / robot.length * away
+    force = -200.0 * robot.mass * 9.81 * size / robot.length * away
     return replace(told, loads=Loads.of(len(told), wrench=np.hstack([force, 0.0 * force])))
 
 
@@ -230,13 +233,17 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A case that was made: who, what is hidden, what was read, and on another trajectory."""
+    """A case that was made: who, what is hidden, what was read, and on another trajectory.
+
+    ``beyond`` is sqrt(chi2) of what something unknown does beyond all effects.
+    """
 
     robot: Robot
     hidden: list[Term]
     data: Measurements
     unknown: str = ""
     other: Measurements | None = None
+    beyond: float = 0.0
 
 
 def tasks(part: float, seed: int, kinds: list[str]) -> list[Task]:
@@ -260,7 +267,8 @@ def tasks(part: float, seed: int, kinds: list[str]) -> list[Task]:
 
 def made(task: Task) -> Case:
     """A case, on commands that MuJoCo finds rest at."""
-    robot = load_robot(model_path(ROBOTS[task.seed % len(ROBOTS)]))
+    draw = random_of(task.seed, 9)
+    robot = load_robot(model_path(ROBOTS[draw.integers(len(ROBOTS))]))
     sigma, random = sigma_of(robot), random_of(task.seed, 5)
     for extent in (0.75, 0.5, 0.35):
         rows = sweeps(robot, POINTS, extent, task.seed)
@@ -277,19 +285,9 @@ def _made(
     told, n = rows.as_commands(robot), rows.n_rows
     noise: Callable[..., Array] = NOISES.get(task.what, white)
     if task.kind not in ("nulls", "sized"):
-        noise = list(NOISES.values())[(task.seed // len(ROBOTS)) % len(NOISES)]
+        noise = list(NOISES.values())[random_of(task.seed, 11).integers(len(NOISES))]
     if task.kind == "unknown":
-        assert sigma.position_m is not None
-        size = float(np.exp(random.uniform(np.log(3.0), np.log(30.0)))) * sigma.position_m
-        hidden = choose(robot, random_of(task.seed, 3), None, 1) if task.seed % 2 else []
-        moved = MOVING[task.what](robot, told, size) if task.what in MOVING else told
-        truth = measure(robot, moved, list(Terms(hidden).effects))
-        data = read(rows, truth, sigma, noise(random, n, rows.run))
-        if task.what in SEEN:
-            off = data.position - np.nanmean(data.position, axis=0)
-            off = off / np.nanmax(np.linalg.norm(off, axis=1))
-            data = SEEN[task.what](robot, data, off, size)
-        return Case(robot, hidden, data, task.what)
+        return _with_unknown(task, robot, rows, sigma, noise(random, n, rows.run))
     hidden = _hidden(task, robot, rows, sigma, random)
     acting = list(Terms(hidden).effects)
     data = read(rows, measure(robot, told, acting), sigma, noise(random, n, rows.run))
@@ -301,6 +299,57 @@ def _made(
     if task.what in STATED:
         data = stated_as(data, STATED[task.what])
     return Case(robot, hidden, data, other=other)
+
+
+def _with_unknown(
+    task: Task, robot: Robot, rows: Measurements, sigma: Sigma, noise: Array
+) -> Case:  # fmt: skip
+    """A case with something unknown, half of them beside a known effect."""
+    assert sigma.position_m is not None
+    draw, told = random_of(task.seed, 7), rows.as_commands(robot)
+    size = float(np.exp(draw.uniform(np.log(3.0), np.log(30.0)))) * sigma.position_m
+    hidden = choose(robot, random_of(task.seed, 3), None, 1) if draw.integers(2) else []
+    acting = list(Terms(hidden).effects)
+    moved = MOVING[task.what](robot, told, size) if task.what in MOVING else told
+    usual, truth = measure(robot, told, acting), measure(robot, moved, acting)
+    rest = usual.at_rest & truth.at_rest
+    usual, truth = replace(usual, at_rest=rest), replace(truth, at_rest=rest)
+
+    def seen(truth: Truth, noise: Array) -> Measurements:
+        data = read(rows, truth, sigma, noise)
+        if task.what not in SEEN or truth is usual:
+            return data
+        off = data.position - np.nanmean(data.position, axis=0)
+        off = off / np.nanmax(np.linalg.norm(off, axis=1))
+        return SEEN[task.what](robot, data, off, size)
+
+    if task.what in SEEN:
+        truth = replace(truth)
+    far = beyond(robot, seen(usual, 0.0 * noise), seen(truth, 0.0 * noise), hidden)
+    return Case(robot, hidden, seen(truth, noise), task.what, beyond=far)
+
+
+def beyond(
+    robot: Robot, usual: Measurements, other: Measurements, hidden: list[Term]
+) -> float:  # fmt: skip
+    """sqrt(chi2) of a change of readings that effects of plausible sizes cannot imitate."""
+    problem, changed = (
+        Problem(robot, data, data.sigma, np.ones(data.n_rows, dtype=bool))
+        for data in (usual, other)
+    )
+    plain = problem.experiment.predict(list(Terms(hidden).effects))
+    factor = problem.noise(plain)
+    before, after = (
+        one.whiten(factor, one.residuals(plain.readings)[..., None])[:, 0]
+        for one in (problem, changed)
+    )
+    at_once = [n for n in EFFECTS if n not in LATE]
+    terms = Terms([Term(layout, layout.null) for layout in (layout_of(n, robot) for n in at_once)])
+    rates = derivatives(problem, evaluate(problem, terms, factor)) * terms.scale
+    left = after - before
+    inner = rates.T @ rates + np.eye(rates.shape[1])
+    left = left - rates @ np.linalg.solve(inner, rates.T @ left)
+    return float(np.linalg.norm(left))
 
 
 def _hidden(
@@ -399,7 +448,7 @@ def judged(task: Task) -> dict[str, Any]:
         "named": [[m.effect, *(r.name for r in m.rivals)] for m in found.missing],
         "classes": [] if chances is None else [[list(m), p] for m, p in chances.classes],
         "p_unknown": None if chances is None else chances.unknown,
-        "fitted": fitted, "seconds": round(spent, 2),
+        "fitted": fitted, "seconds": round(spent, 2), "beyond": case.beyond,
     }  # fmt: skip
     if case.other is not None:
         row["elsewhere"] = _elsewhere(case, found.verdict, found.terms)
@@ -493,6 +542,7 @@ def figures(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "intervals": _intervals(rows),
         "nulls": _counts(rows, "nulls", "what"),
         "unknown": _counts(rows, "unknown", "unknown"),
+        "unknown_by_size": _unknown_by_size(rows),
         "tolerances": _tolerances(rows),
         "seconds": {"median": float(np.median(seconds)), "largest": float(np.max(seconds))},
     }  # fmt: skip
@@ -574,6 +624,16 @@ def _counts(rows: list[dict[str, Any]], kind: str, by: str) -> dict[str, dict[st
     return out
 
 
+def _unknown_by_size(rows: list[dict[str, Any]]) -> dict[str, list[int]]:
+    """[unknown_effect, all] by sqrt(chi2) of what no known effect could imitate."""
+    out = dict[str, list[int]]()
+    for low, high in pairwise((0.0, 5.0, 10.0, 20.0, np.inf)):
+        some = [r for r in rows if r["kind"] == "unknown" and low <= r["beyond"] < high]
+        said = sum(r["verdict"] == "unknown_effect" for r in some)
+        out[f"{low:g} to {high:g}" if high < np.inf else f"from {low:g}"] = [said, len(some)]
+    return out
+
+
 def _tolerances(rows: list[dict[str, Any]]) -> dict[str, Any]:
     some = [row for row in rows if row["kind"] == "tolerances"]
     worst = [max(row["elsewhere"].values()) for row in some if row.get("elsewhere")]
@@ -596,6 +656,9 @@ def page_of(found: dict[str, Any]) -> str:
         _sentences(found),
         _words_table("nothing is missing; the noise is", found["nulls"]),
         _words_table("something unknown is there", found["unknown"]),
+        "Called unknown, by what it does that no effect that acts at once could imitate: "
+        + ", ".join(f"{n} of {m} {size} σ" for size, (n, m) in found["unknown_by_size"].items())
+        + ".",
     ]
     return "\n\n".join(parts)
 

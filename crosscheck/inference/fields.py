@@ -19,7 +19,7 @@ import numpy as np
 
 from crosscheck.fit.least_squares.problem import KINDS, POSITION, Rms, rms_by_kind
 from crosscheck.fit.least_squares.state import derivatives
-from crosscheck.fit.noise.smooth import monomials
+from crosscheck.fit.noise.smooth import monomials, waves
 from crosscheck.inference.fit import Data, Fit
 from crosscheck.inference.priors import FIELD_WIDTHS, UNKNOWN
 from seecr.effects import Term, Terms, catalogue, layout_of
@@ -27,6 +27,9 @@ from seecr.pose import Array
 
 # Prior width of each degree of a smooth field over that of the degree before.
 _SMOOTH = 0.3
+# A wave over the room is forgotten after this part of half its range: a cubic follows longer ones,
+# and shorter ones pass between readings that stand as far apart as a dozen on a line do.
+_SHORT = 0.3
 # Of more cables than these, pairs have no numbers of their own: they would be hundreds.
 _MOST_CABLES = 12
 # Number of fields drawn, the part that has to be seen, and the sizes tried, in units of the noise.
@@ -137,7 +140,8 @@ class _About:
         """A cubic in the position for each channel: by kind of reading, and for all together.
 
         Cubics of one kind, if there are others, are there twice: with degrees that are all as
-        large, and with smaller ones the higher they are, as of a lens.
+        large, and with smaller ones the higher they are, as of a lens. What is shorter than a cubic
+        can follow, as a ripple of rails or of a picture, is there for each kind by itself.
         """
         for smooth in (1.0, _SMOOTH):
             shapes = monomials(self.place, 3, smooth)[self.row]
@@ -149,6 +153,10 @@ class _About:
                     yield Varying[KINDS[kind].name.upper()], columns[:, kind_of == kind]
             if len(kinds) > 1 and smooth == 1.0:
                 yield Varying.READINGS, columns
+        short = per_channel(self.data, waves(self.place, _SHORT)[self.row])
+        kind_of = self.data.chain.kind[np.argmax(short != 0.0, axis=0)]
+        for kind in np.unique(kind_of):
+            yield Varying[KINDS[kind].name.upper()], short[:, kind_of == kind]
 
     def image(self) -> Iterator[tuple[Varying, Array]]:
         """A picture that widens with the square of the distance from some point."""

@@ -44,6 +44,8 @@ class Hypothesis:
         key: its members. fit: its fit.
         widths: prior width of each member. score: ln evidence plus ln prior.
         possible: whether a robot can have its values.
+        wanted: prior widths of greatest evidence, if these would move the fit: then it is worth
+            more when it is fitted again with them.
     """
 
     key: Key
@@ -51,6 +53,7 @@ class Hypothesis:
     widths: dict[str, float]
     score: float
     possible: bool
+    wanted: dict[str, float] | None = None
 
     @property
     def field(self) -> str | None:
@@ -70,8 +73,9 @@ def scored(every: Catalogue, key: Key, fit: Fit, widths: Mapping[str, float]) ->
     field = next((k for k in key if is_field(k)), None)
     if field is not None and field in best.chosen:
         z[linear.groups[field].columns] = best.values[best.place(field)]
+    wanted = None
     if best.left_to_gain(z) > _NEAR:
-        best = linear.solved(held)
+        wanted, best = {**widths, **best.chosen}, linear.solved(held)
     stood = every.stood_keys
     score = (
         log_evidence(best) + sum(log_shares(fit).values()) + _log_absent(every, fit, best.chosen)
@@ -80,7 +84,8 @@ def scored(every: Catalogue, key: Key, fit: Fit, widths: Mapping[str, float]) ->
     score += fit.log_outliers + NoisePrior.of(fit.data.problem).log(fit.noise)
     robot = fit.data.problem.robot
     possible = key == stood or can_be(robot, fit.terms, every.stood)
-    return Hypothesis(key, fit, {**widths, **best.chosen}, score + every.log_prior(key), possible)
+    chosen, score = {**widths, **best.chosen}, score + every.log_prior(key)
+    return Hypothesis(key, fit, chosen, score, possible, wanted)
 
 
 def wider(every: Catalogue, one: Hypothesis) -> dict[str, float]:

@@ -90,7 +90,7 @@ class Posterior:
         """The posterior over a search's cache."""
         prior = NoisePrior.of(search.data.problem)
         scores = {k: h.score for k, h in search.fitted.items()}
-        scores |= _larger(search, scores)
+        scores |= _unfitted(search)
         total = float(np.logaddexp.reduce(list(scores.values())))
         share = {k: float(np.exp(s - total)) for k, s in scores.items()}
         fitted = search.fitted
@@ -117,16 +117,15 @@ class Posterior:
         )
 
 
-def _larger(search: Search, fitted: Scored) -> dict[Key, float]:
-    """Linear scores of larger sets that were not fitted; none is better than the best fitted."""
+def _unfitted(search: Search) -> dict[Key, float]:
+    """Linear scores about the best of sets that were not fitted; none is better than the best."""
     best = search.best
     if best.key != search.last.centre.key:
         return {}
     base = search.last.score(best.key)
     return {
-        k: best.score + min(s - base, 0.0)
-        for k, s in search.near.items() if k not in search.cache and k > best.key
-    }  # fmt: skip
+        k: best.score + min(s - base, 0.0) for k, s in search.near.items() if k not in search.cache
+    }
 
 
 def _merged(scores: Scored) -> dict[Key, float]:

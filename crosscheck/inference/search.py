@@ -61,6 +61,10 @@ _LONG = 4
 # Effort: most hypotheses that are fitted about one linear model, and most linear models about
 # better and better hypotheses.
 _FITS, _ROUNDS = 8, 4
+# Most fits of one hypothesis: the second with the prior widths that the first asks for.
+_REFITS = 2
+# Sets whose neighbours are looked at where a search ends.
+_WIDENED = 30
 
 
 class Scores:
@@ -165,6 +169,21 @@ class Scores:
             else:
                 return at
         return at
+
+    def widen(self, start: Key) -> None:
+        """Meet the neighbours of neighbours that are near, the best first.
+
+        Two effects may do what two others do, and each exchange alone explains a little less.
+        """
+        done = set[Key]()
+        for _ in range(_WIDENED):
+            seen = {k: s for k, s in self.seen.items() if k == bare(k) and k not in done}
+            key = max(seen, key=lambda k: (seen[k], sorted(k)))
+            if seen[key] < self.score(start) - WITHIN:
+                return
+            done.add(key)
+            around = self.neighbours(key)
+            self.near |= {k: s for k, s in around.items() if k not in self.solved}
 
     def _thinned(self, start: Key) -> Key:
         """A set without its least valuable members, while it is large and they are worth little."""
@@ -292,8 +311,9 @@ class Search:
 
     def begin(self) -> Hypothesis:
         """Fit the model as it stands, which is returned, and single effects beside it."""
-        none = self._take(self.stood, fit(self.data, self.plain), {})
-        assert none is not None
+        none = self._take(
+            scored(self.every, self.stood, self._fitted(self.stood, self.plain, {}), {})
+        )
         self._register()
         self._singles(self.best)
         self._ask_rows_far_off(none)
@@ -380,22 +400,39 @@ class Search:
         return self.data.state(self.every.terms(key, values), self.plain, trial=True)
 
     def _fit_from(self, key: Key, start: State, widths: Mapping[str, float]) -> Hypothesis | None:
+        """Fit from a start; again where the evidence wants other prior widths than it began with.
+
+        What waits begins wide: about null a narrow prior would hold it where it does nothing.
+        """
         held = {k: max(w, 1.0) if self._waits(k) else w for k, w in widths.items()}
-        by_name = {name_of(k): w for k, w in held.items() if not is_field(k)}
+        found = self._fitted(key, start, held)
+        for _ in range(_REFITS):
+            best = self._take(new := scored(self.every, key, found, held))
+            if new.wanted is None or best is not new:
+                break
+            held = new.wanted
+            found = self._fitted(key, found.state, held, found.noise)
+        return self._take(scored(self.every, key, found, held))
+
+    def _fitted(
+        self, key: Key, start: State, widths: Mapping[str, float], noise: Noise | None = None
+    ) -> Fit:
+        self.fits += 1
+        self.report(" + ".join(sorted(key)) or "the model as it is")
+        by_name = {name_of(k): w for k, w in widths.items() if not is_field(k)}
         kind = next((k for k in key if is_field(k)), None)
-        columns = None if kind is None else self.every.fields[kind] * held.get(kind, 3.0)
-        return self._take(key, fit(self.data, start, by_name, columns), held)
+        columns = None if kind is None else self.every.fields[kind] * widths.get(kind, 3.0)
+        return fit(self.data, start, by_name, columns, noise=noise)
 
     def _waits(self, key: str) -> bool:
         return key in self.every.members and self.every.members[key].waits
 
-    def _take(self, key: Key, found: Fit, widths: Mapping[str, float]) -> Hypothesis | None:
-        self.fits += 1
-        self.report(" + ".join(sorted(key)) or "the model as it is")
-        new, old = scored(self.every, key, found, widths), self.cache.get(key)
+    def _take(self, new: Hypothesis) -> Hypothesis:
+        """Keep a fit in the cache unless a better one of the same hypothesis is there."""
+        old = self.cache.get(new.key)
         some = [h for h in (old, new) if h is not None]
-        self.cache[key] = max(some, key=lambda h: (h.possible, h.score))
-        return self.cache[key]
+        self.cache[new.key] = best = max(some, key=lambda h: (h.possible, h.score))
+        return best
 
     # --- where the search starts ---
 
@@ -579,6 +616,12 @@ class Search:
                 if near[key] > base - least and done < _FITS:
                     done += self._fit_new(scores, key)
             self.last, self.near = scores, near
+            if self.best is best and best.field is None and len(core - self.stood) <= FEW:
+                scores.widen(best.key)
+                near |= scores.near
+                for key in scores.best(2 * _FITS):
+                    if done < _FITS and scores.seen[key] > base - EQUAL:
+                        done += self._fit_new(scores, key)
             if self.best is best:
                 break
             if self.best.key not in self._centres:
@@ -599,6 +642,17 @@ class Search:
             fitted = self.cache.get(at)
             loss = loss if fitted is None else self.best.score - fitted.score
         return loss
+
+    def needed(self, some: Iterable[str]) -> float:
+        """ln evidence that members add beside all others, about the fit of all effects together."""
+        scores = self._about_everything
+        groups = scores.about.linear.groups
+        every = self.stood | {k for k in groups if not is_field(k) and not part_of(k)}
+        return scores.score(every) - scores.score(every - frozenset(some))
+
+    @cached_property
+    def _about_everything(self) -> Scores:
+        return self.scores_about(self.everything)
 
 
 def _with_rows_alike(found: Hypothesis) -> Hypothesis:

@@ -79,8 +79,9 @@ def _judged(search: Search, posterior: Posterior) -> Judgement:
     sure = [k for k in classes.sure(search.stood) if k not in large]
 
     def is_unrivalled(key: str) -> bool:
-        """Whether the best set without a member and its like is far worse."""
-        return search.challenge(classes.alike(key)) > WITHIN
+        """Whether any set without a member and its like is far worse, and that of all others."""
+        some = classes.alike(key)
+        return search.challenge(some) > WITHIN and search.needed(some) > WITHIN
 
     def said(word: DiagnosisVerdict, names: list[str]) -> Judgement:
         return Judgement(word, posterior, classes, tuple(names), tuple(sorted(large)))
