@@ -9,8 +9,6 @@ from pathlib import Path
 
 # BLAS on several threads, in several workers, takes longer; set before NumPy is imported
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# and so do jobs in several processes; tests of these ask for some
-os.environ.setdefault("SEECR_PROCESSES", "1")
 
 import pytest
 from stale import forget_stale

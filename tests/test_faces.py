@@ -120,8 +120,6 @@ TRADE = {
     "crosscheck.suite.write": {"RESULTS"},
     "crosscheck.twin": {"FILES"},
     "seecr.exported.export": {"wrote"},
-    # a page that is drawn while a recording is written
-    "seecr.processes": {"Job", "Shared"},
     # what results were made of
     "seecr.made": {"Made"},
     "seecr.description.fingerprint": {"fingerprint"},
@@ -143,7 +141,7 @@ TRADE = {
     "seecr.equilibrium.multiple": {"elsewhere", "on_their_way"},
     # processes
     "seecr.compiled.telling": {"tell_compiling"},
-    "seecr.threads": {"processors"},
+    "seecr.parallel": {"processors"},
 }
 
 

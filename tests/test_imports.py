@@ -18,8 +18,9 @@ from sources import ROOT, imports, imports_of, modules, name_of, tree_of
 
 # A folder or file on its floor. crosscheck stands on seecr: a lower floor of the two is seecr's.
 FLOORS = {
-    "seecr.errors": 0, "seecr.compiled": 0, "seecr.threads": 0, "seecr.lazy": 0, "seecr.counted": 0,
-    "seecr.files": 1, "seecr.made": 1, "seecr.pose": 1, "seecr.processes": 1,
+    "seecr.errors": 0, "seecr.compiled": 0, "seecr.parallel": 0, "seecr.lazy": 0,
+    "seecr.counted": 0,
+    "seecr.files": 1, "seecr.made": 1, "seecr.pose": 1,
     "seecr.curves": 2, "seecr.units": 2, "seecr.arguments": 2, "seecr.result": 2,
     "seecr.pose_rows": 2,
     "seecr.planar": 3, "seecr.description": 3,

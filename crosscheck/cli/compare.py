@@ -6,8 +6,7 @@ from pathlib import Path
 
 import click
 
-from crosscheck.cli.choices import figures_option, sigma_option
-from crosscheck.cli.drawn import page_beside
+from crosscheck.cli.choices import figures_in, figures_option, sigma_option
 from crosscheck.cli.following import Given, after_comparison
 from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
 
@@ -68,6 +67,7 @@ def command(
     Exit status: 0 all well, 1 a limit exceeded, 2 bad input, 3 rows without an equilibrium.
     """
     from crosscheck import Limits, Sigma, compare, exceeded, load_limits, load_measurements
+    from crosscheck.report import write_page
     from seecr import load_model, load_robot, with_history
     from seecr.files import json_text, staged, write_text
 
@@ -94,7 +94,8 @@ def command(
         text = json_text(document)
         write_text(folder / "comparison.json", text + "\n")
         progress("drawing the page" if no_recording else "drawing the page, recording", 0.5)
-        with page_beside(found, folder / "comparison.html", made, figures):
+        with figures_in(figures):
+            write_page(found, folder / "comparison.html", made)
             if not no_recording:
                 from crosscheck.recording import write_comparison_recording
 

@@ -10,13 +10,13 @@ import click
 from crosscheck.cli.choices import (
     check_effects,
     exclude_option,
+    figures_in,
     figures_option,
     listed,
     only_option,
     sigma_option,
     tolerance_option,
 )
-from crosscheck.cli.drawn import page_beside
 from crosscheck.cli.following import Given, after_diagnosis
 from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
 
@@ -77,6 +77,7 @@ def command(
     """
     from crosscheck import DiagnosisVerdict, Sigma, Tolerance, diagnose, load_measurements
     from crosscheck.model.place import check_place
+    from crosscheck.report import write_page
     from seecr import load_model, load_robot, new_model, with_history
     from seecr.description.fingerprint import fingerprint
     from seecr.files import json_text, staged, write_text
@@ -98,7 +99,8 @@ def command(
         made = made_by(machine.source, *data, model)
         text = json_text({"made": made, "robot": fingerprint(machine), **found.as_json()})
         write_text(folder / "diagnosis.json", text + "\n")
-        with page_beside(found, folder / "diagnosis.html", made, figures):
+        with figures_in(figures):
+            write_page(found, folder / "diagnosis.html", made)
             if not no_recording and found.path is not None:
                 from crosscheck.recording import write_diagnosis_recording
 

@@ -17,7 +17,7 @@ from seecr.cli.options import (
     progress_bar,
     seed_option,
 )
-from seecr.threads import processors
+from seecr.parallel import processors
 
 if TYPE_CHECKING:
     from crosscheck import Case, CaseResult, Run, Thresholds

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cache
@@ -19,7 +20,6 @@ from numpy.typing import NDArray
 
 from crosscheck.suite.gap import gap
 from crosscheck.suite.outcome import Outcome
-from crosscheck.suite.pool import Pool
 from crosscheck.twin.hidden import CONTAINED, choose
 from crosscheck.twin.measure import measure
 from crosscheck.twin.robot import TRUE_EFFECTS
@@ -30,6 +30,7 @@ from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
 from seecr.effects import Effect, Term
+from seecr.parallel import run_tasks
 from seecr.pose import Array
 from seecr.prediction.experiment import Experiment
 
@@ -260,20 +261,20 @@ def run_effect(case: EffectCase) -> EffectResult:
 
 
 def run_effects(
-    cases: Sequence[EffectCase], pool: Pool, tell: Callable[[EffectResult], None]
+    cases: Sequence[EffectCase], executor: Executor | None, tell: Callable[[EffectResult], None]
 ) -> list[EffectResult]:
     """Run effects, several at a time.
 
     Args:
         cases: what to run.
-        pool: the processes.
+        executor: runs them; this process if None.
         tell: called with each result as it comes.
 
     Returns:
         the results in the order of the cases.
     """
     order = sorted(range(len(cases)), key=lambda i: cases[i].effect not in _LONG)
-    return pool.run(run_effect, cases, order, tell)
+    return run_tasks(run_effect, cases, executor, order, tell)
 
 
 def _seen(readings: Any) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 import time
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.errors import CrosscheckError
 from crosscheck.settle.model import ignored_note
 from crosscheck.suite.agreement import allowances, differences_of
 from crosscheck.suite.cases import Case
@@ -20,7 +22,6 @@ from crosscheck.suite.chosen import GivenCase, chosen_cases
 from crosscheck.suite.effects import EffectCase, EffectResult, run_effects
 from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.outcome import Outcome
-from crosscheck.suite.pool import Pool
 from crosscheck.suite.results import CaseResult, Worst, counts, worst_of
 from crosscheck.suite.thresholds import Thresholds, load_thresholds
 from crosscheck.suite.verdicts import Answers, Verdict, held_to, judge_poses
@@ -31,6 +32,7 @@ from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve as seecr_solve
 from seecr.errors import InputFileError
 from seecr.files import json_text
+from seecr.parallel import processes, run_tasks
 from seecr.result import Record, Result
 from seecr.statics.solution import Solution
 
@@ -190,7 +192,7 @@ def run_suite(
 
     Raises:
         InputError: no case, something that is not one, or ``jobs`` not a whole number from 1 on.
-        CrosscheckError: a name that no shipped case has.
+        CrosscheckError: a name that no shipped case has, or a process that was killed.
     """
     began, jobs = time.perf_counter(), whole(jobs, "jobs", least=1)
     chosen = chosen_cases(cases, seed)
@@ -199,13 +201,19 @@ def run_suite(
     poses = [case for case in chosen if isinstance(case, Case)]
     effects = [case for case in chosen if isinstance(case, EffectCase)]
     tell = progress or (lambda result: None)
-    with Pool(max(min(jobs, len(chosen)), 1)) as pool:
-        if pool.jobs > 1:
-            _warm_up(chosen[0])
-        one = partial(run_case, thresholds=thresholds, record=record)
-        order = sorted(range(len(poses)), key=lambda i: -len(poses[i]))
-        results = pool.run(one, poses, order, tell)
-        found = run_effects(effects, pool, tell)
+    one = partial(run_case, thresholds=thresholds, record=record)
+    order = sorted(range(len(poses)), key=lambda i: -len(poses[i]))
+    count = min(jobs, len(chosen))
+    if count > 1:
+        _warm_up(chosen[0])
+    try:
+        with processes(count) as executor:
+            results = run_tasks(one, poses, executor, order, tell)
+            found = run_effects(effects, executor, tell)
+    except BrokenExecutor:
+        raise CrosscheckError(
+            f"one of {count} processes was killed, perhaps for lack of memory; try --jobs 1"
+        ) from None
     return Run(results, thresholds, seed, jobs, time.perf_counter() - began, found)
 
 

@@ -104,7 +104,7 @@ jobs_option = click.option(
     metavar="N",
     help="Number of parallel processes.  [default: one per processor]",
 )
-"""``--jobs N``, given to the command as ``jobs``; None means :func:`seecr.threads.processors`."""
+"""``--jobs N``, given to the command as ``jobs``; None means :func:`seecr.parallel.processors`."""
 
 seed_option = click.option(
     "--seed",

@@ -23,10 +23,10 @@ from seecr.compiled.columns import (
     WEIGHT,
 )
 from seecr.holding.hanging import bridged_lengths, rest_for
+from seecr.parallel import in_parts
 from seecr.pose import Array
 from seecr.statics import batch
 from seecr.statics.tables import Tables, take
-from seecr.threads import in_parts
 
 # Newton steps to the tightness of a cable.
 _TIGHTNESS = 60

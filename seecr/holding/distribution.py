@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from seecr.arguments import numbers
 from seecr.description.robot import Robot
 from seecr.errors import InputError
+from seecr.parallel import in_parts
 from seecr.pose import LARGEST, Array, all_finite
-from seecr.threads import in_parts
 
 # Part of the load that may stay unbalanced, by rounding of the tensions.
 _BALANCED = 1e-9

@@ -32,10 +32,10 @@ from seecr.holding.balance import (
 )
 from seecr.holding.distribution import balanced, distribute
 from seecr.holding.hanging import bridged_lengths, least_of_heavy, rest_for
+from seecr.parallel import in_parts
 from seecr.pose import Array
 from seecr.statics import batch
 from seecr.statics.tables import Tables, take
-from seecr.threads import in_parts
 
 # Most rounds, the round from which steps are halved, and the change that ends them [load].
 _ROUNDS, _HALVED, _ENOUGH = 14, 7, 1e-10

@@ -20,6 +20,7 @@ from seecr.description.joints import motion_columns
 from seecr.effects.base import Effect, Readings
 from seecr.effects.checked import is_built_in
 from seecr.effects.terms import Terms
+from seecr.parallel import run_parts
 from seecr.pose import Array
 from seecr.pose_rows import changes_between, moved_by
 from seecr.prediction.ends import are_by_point, wrench_by_ends, wrench_by_rest
@@ -27,7 +28,6 @@ from seecr.prediction.experiment import Experiment, Prediction, read, senses
 from seecr.prediction.shifts import OF_SHAPE, Shift, Sides, blocks_of_cables, positions, shifted
 from seecr.statics import batch
 from seecr.statics.tables import Tables, assemble
-from seecr.threads import run_parts
 
 # Step of finite differences along a path, in plausible sizes of a parameter. It is small because a
 # cable that is barely taut at the equilibrium is slack close to it.

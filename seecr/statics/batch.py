@@ -37,10 +37,10 @@ from seecr.compiled.outcomes import (
 )
 from seecr.compiled.platform import add_skew, evaluate_batch
 from seecr.compiled.walk import change_on_the_way, walk_in_order
+from seecr.parallel import in_parts, run_parts
 from seecr.pose import Array, quat_conjugate
 from seecr.pose_rows import deviated, products
 from seecr.statics.tables import Tables, take
-from seecr.threads import in_parts, run_parts
 
 
 @dataclass(eq=False)

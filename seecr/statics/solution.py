@@ -25,6 +25,7 @@ from seecr.compiled.outcomes import (
 from seecr.counted import between, counted, rows_words
 from seecr.description.robot import Robot
 from seecr.errors import InputError
+from seecr.parallel import in_parts
 from seecr.pose import Array
 from seecr.pose_rows import rotation_vectors
 from seecr.result import COORDINATES, Record, Result, named
@@ -33,7 +34,6 @@ from seecr.statics.inertia import mass_matrices
 from seecr.statics.spans import spanless
 from seecr.statics.starts import start_of
 from seecr.statics.tables import Tables, take
-from seecr.threads import in_parts
 from seecr.units import millimetres
 
 if TYPE_CHECKING:

@@ -18,11 +18,11 @@ from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
+from seecr.parallel import run_parts
 from seecr.pose import NORM_TOLERANCE, Array
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.prediction.model import GivenEffects
 from seecr.statics.starts import commanded_poses
-from seecr.threads import run_parts
 from seecr.workspace.chances import asked_chance, check_chance
 from seecr.workspace.extent import (
     grid_ends,

@@ -27,13 +27,13 @@ from seecr.errors import InputError
 from seecr.holding.balance import balance_of, bends
 from seecr.holding.distribution import tension_limits
 from seecr.holding.inside import margins_inside
+from seecr.parallel import in_parts
 from seecr.pose import Array, all_finite, quat_rotate, transform_points
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.result import Record, Result
 from seecr.statics.solution import Solution, check_solution
 from seecr.statics.starts import commanded_poses
 from seecr.statics.tables import Tables, assemble
-from seecr.threads import in_parts
 
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import seecr
-from seecr.threads import processors
+from seecr.parallel import processors
 from seecr.workspace.maps import default_axes, workspace_map
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.slow]

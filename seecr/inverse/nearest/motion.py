@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from seecr.description.joints import freedoms
 from seecr.description.robot import Robot
+from seecr.parallel import in_parts
 from seecr.pose import Array
-from seecr.threads import in_parts
 
 Rows = NDArray[np.intp]
 

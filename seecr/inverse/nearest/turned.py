@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from seecr.description.joints import freedoms
 from seecr.description.robot import Robot
+from seecr.parallel import in_parts
 from seecr.pose import Array, quat_conjugate, quat_from_rotvec, quat_multiply
 from seecr.statics import batch
 from seecr.statics.tables import Tables
-from seecr.threads import in_parts
 
 Rows = NDArray[np.intp]
 

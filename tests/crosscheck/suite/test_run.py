@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from concurrent.futures import BrokenExecutor
 from dataclasses import replace
 from pathlib import Path
 from shutil import copyfile
@@ -615,6 +616,16 @@ def test_errors_cross_processes(tmp_path):
     broken = [case_of(tmp_path / f"no{i}.xml", CORNER) for i in range(2)]
     with pytest.raises(seecr.RobotError, match=r"no0\.xml: no such file"):
         run_suite(broken, load_thresholds(), jobs=2)
+
+
+def test_a_process_that_was_killed_is_told_with_what_to_do(monkeypatch):
+    def broken(*_args):
+        raise BrokenExecutor
+
+    monkeypatch.setattr(suite, "run_tasks", broken)
+    words = r"one of 2 processes was killed, perhaps for lack of memory; try --jobs 1"
+    with pytest.raises(CrosscheckError, match=words):
+        run_suite(["planar-two-cable", "camera-sweep"], jobs=2)
 
 
 def test_worst_is_the_largest_share_of_what_is_allowed(ends):

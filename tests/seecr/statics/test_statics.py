@@ -15,10 +15,10 @@ from seecr.compiled.columns import COMPLIANCE, EA, N_COLUMNS, OF_THE_PAST, REST,
 from seecr.compiled.descent import solve_batch
 from seecr.compiled.outcomes import CONVERGED, TOLERANCE
 from seecr.compiled.pulley import lengths_at
+from seecr.parallel import undivided
 from seecr.prediction.experiment import Experiment
 from seecr.statics import batch
 from seecr.statics.tables import Tables, assemble, take
-from seecr.threads import undivided
 
 KINDS = ("demobot_cogiro", "demobot_parallel", "planar_vertical")
 

@@ -17,7 +17,7 @@ from PIL import Image
 from random_robots import random_poses, random_robot
 from unbalanced import unbalanced
 
-from seecr import threads
+from seecr import parallel
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
@@ -339,7 +339,7 @@ def test_a_map_is_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(maps, "_PART", 3)
     for processors in (1, 2):
         done.clear()
-        monkeypatch.setattr(threads, "processors", lambda n=processors: n)
+        monkeypatch.setattr(parallel, "processors", lambda n=processors: n)
         parts = workspace_map(robot, *axes, progress=tell)
         assert sum(done) == 20 and min(done) > 0
         assert processors > 1 or done == [3, 3, 3, 3, 3, 3, 2]
@@ -360,7 +360,7 @@ def test_a_part_that_takes_long_holds_up_no_other(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(maps, "_PART", 1)
     monkeypatch.setattr(maps, "margins_at", slow_at_first)
-    monkeypatch.setattr(threads, "processors", lambda: 2)
+    monkeypatch.setattr(parallel, "processors", lambda: 2)
     found = workspace_map(robot, np.linspace(0.2, 0.6, 5), 0.25, 0.1, elastic=False)
     assert found.feasible.any()
 
