@@ -1,6 +1,7 @@
 """Units: as files spell them, as people type and read them, and their SI equivalents.
 
-People read numbers in the units of this table, with no more digits than are known.
+Inside the packages all numbers are in SI. People read them in the units of this table, with no more
+digits than are known.
 """
 
 from __future__ import annotations
@@ -17,9 +18,12 @@ from seecr.pose import Array
 __all__ = [
     "UNITS",
     "Unit",
+    "chance",
+    "in_unit",
     "joules",
     "millimetres",
     "of_columns",
+    "parameter_name",
     "short",
     "significant",
     "with_error",
@@ -87,6 +91,22 @@ UNITS = (
 """Every unit that files, people and results use."""
 
 
+_SHOWN = {unit.si: unit for unit in UNITS if unit.shown}
+
+
+def in_unit(si: str) -> tuple[float, str]:
+    """Factor from SI and the name of the unit that people read; of a parameter's unit."""
+    unit = _SHOWN.get(si)
+    if unit is None:
+        return 1.0, si.replace("_per_", "/")
+    return unit.over / unit.times, unit.symbol or unit.suffix
+
+
+def parameter_name(name: str, unit: str) -> str:
+    """A parameter's name without its unit."""
+    return name.removesuffix(f"_{unit}") if unit else name
+
+
 def of_columns(si: str) -> dict[str, Unit]:
     """Units, by suffix, that columns of measurements may use for a quantity of this SI unit."""
     return {unit.suffix: unit for unit in UNITS if unit.si == si and unit.column}
@@ -117,6 +137,11 @@ def significant(value: float | None, digits: int = 3) -> str:
         return f"{mantissa}e{int(power)}"
     decimals = max(digits - size, 0)
     return f"{value:.{decimals}f}"
+
+
+def chance(p: float) -> str:
+    """A probability."""
+    return "< 1e-12" if p < 1e-12 else significant(p, 2)
 
 
 def millimetres(length: float | np.floating[Any], digits: int = 4) -> str:

@@ -33,7 +33,7 @@ FLOORS = {
     "seecr.recording": 10, "seecr.report": 10,
     "seecr.cli": 11,
     "crosscheck.errors": 20,
-    "crosscheck.units": 21, "crosscheck.given": 21,
+    "crosscheck.given": 21,
     "crosscheck.settle": 22, "crosscheck.measurements": 22, "crosscheck.model": 22,
     "crosscheck.twin": 23, "crosscheck.fit": 23,
     "crosscheck.inference": 24, "crosscheck.suite": 24, "crosscheck.importing": 24,

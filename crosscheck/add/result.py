@@ -13,11 +13,11 @@ from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
 from crosscheck.inference.priors import FALSE_ALARM
 from crosscheck.model.fitted import Fitted
-from crosscheck.units import with_error
 from seecr.counted import counted
 from seecr.effects import Terms
 from seecr.prediction.model import Model
 from seecr.result import Record, Result
+from seecr.units import with_error
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -35,12 +35,12 @@ from crosscheck.fit.least_squares.state import State
 from crosscheck.fit.noise.unstated import errors_are_noise
 from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.fit.reasons import Refusal
-from crosscheck.units import short
 from seecr.counted import counted
 from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.result import Record, Result
 from seecr.statics.solution import Status
+from seecr.units import short
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ import numpy as np
 from crosscheck.fit.least_squares.problem import BY_NAME, Kind, Problem
 from crosscheck.fit.least_squares.state import State
 from crosscheck.measurements.data import Measurements
-from crosscheck.units import in_unit, short
 from seecr.description.joints import locked
 from seecr.pose import Array
+from seecr.units import in_unit, short
 
 # The kinds of readings that have a wanted value, with the columns of a wanted pose.
 _PARTS = (("position", slice(0, 3)), ("orientation", slice(3, 7)))

@@ -18,11 +18,10 @@ from crosscheck.planning.extensions import extensions
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.proposer import Gain, Suggestion, telling_apart
 from crosscheck.planning.words import signal_words
-from crosscheck.units import in_unit, parameter_name
 from seecr.description.robot import Robot
 from seecr.effects import Term, catalogue
 from seecr.pose import Array, rotvec_from_quat
-from seecr.units import with_error
+from seecr.units import in_unit, parameter_name, with_error
 
 # [m] No length is measured more finely by hand.
 _LEAST_BY_HAND = 1e-5

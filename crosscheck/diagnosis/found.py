@@ -39,10 +39,10 @@ from crosscheck.inference.search import Search
 from crosscheck.inference.verdict import Judgement
 from crosscheck.planning.sight import Sight
 from crosscheck.preparation.prepare import noise_floor
-from crosscheck.units import parameter_name
 from seecr.effects import effect_named
 from seecr.pose import Array
 from seecr.prediction.model import Model
+from seecr.units import parameter_name
 
 # Most quantities that the unexplained part is said to be associated with, and fields named.
 _MOST_WHERE, _MOST_FIELDS = 5, 3

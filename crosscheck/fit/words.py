@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from crosscheck.fit.least_squares.problem import KINDS, Rms
 from crosscheck.model.fitted import Fitted
-from crosscheck.units import in_unit, parameter_name, short, with_error
 from seecr.effects.base import Layout
 from seecr.pose import Array
 from seecr.result import Record
+from seecr.units import in_unit, parameter_name, short, with_error
 
 
 def rms_words(rms: Rms) -> str:

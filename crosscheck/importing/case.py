@@ -27,9 +27,9 @@ from crosscheck.importing.strays import without_strays
 from crosscheck.importing.take import READERS, Take, take_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import load_commands
+from crosscheck.measurements.stated import LEAST
 from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
-from crosscheck.units import LEAST
 from seecr.columns.written import table_text
 from seecr.counted import counted
 from seecr.description.robot import Robot

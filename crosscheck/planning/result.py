@@ -13,10 +13,10 @@ from crosscheck.fit.words import belongs
 from crosscheck.planning.planned import Planned
 from crosscheck.planning.proposer import Suggestion
 from crosscheck.planning.visibility import LEVEL, NAMED, POWER, Signal
-from crosscheck.units import in_unit, short
 from seecr.counted import counted
 from seecr.pose import Array
 from seecr.result import Record, Result
+from seecr.units import in_unit, short
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,9 +22,9 @@ from crosscheck.fit.words import measured
 from crosscheck.inference.fit import FLAT, Data, Fit, fit, without_rows
 from crosscheck.inference.noise import outliers
 from crosscheck.preparation.parts import LaidOut
-from crosscheck.units import parameter_name
 from seecr.effects import ApartLayout, Term, Terms, apart, layout_of
 from seecr.pose import Array
+from seecr.units import parameter_name
 
 __all__ = ["Freed", "freed"]
 

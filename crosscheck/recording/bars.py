@@ -10,10 +10,10 @@ from crosscheck.diagnosis.path import Stage
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.fit.least_squares.problem import Kind, kinds_read
 from crosscheck.fit.reasons import DiagnosisVerdict
-from crosscheck.units import short
 from seecr.recording import colours, layout
 from seecr.recording.colours import Rgba
 from seecr.recording.stream import Recording
+from seecr.units import short
 
 ROOT = "bars"
 # The drawing is 100 wide; y points down, with one row per model.

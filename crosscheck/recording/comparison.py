@@ -13,11 +13,11 @@ from crosscheck.fit.least_squares.problem import Kind
 from crosscheck.recording import misfit, words
 from crosscheck.recording.misfit import MEASURED, Misfit
 from crosscheck.recording.words import plain
-from crosscheck.units import in_unit, short
 from seecr.recording import colours, layout, plots, shapes
 from seecr.recording.legends import Legend, legend_of
 from seecr.recording.scene import Scene
 from seecr.recording.stream import Index, Recording, pose_index, recording_file
+from seecr.units import in_unit, short
 
 if TYPE_CHECKING:
     from crosscheck.comparison.result import Comparison

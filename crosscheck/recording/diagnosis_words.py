@@ -10,7 +10,7 @@ from crosscheck.diagnosis.words import removed
 from crosscheck.recording import misfit, words
 from crosscheck.recording.misfit import Misfit
 from crosscheck.recording.words import plain
-from crosscheck.units import in_unit, parameter_name, short, with_error
+from seecr.units import in_unit, parameter_name, short, with_error
 
 _MOST_PARAMETERS, _MOST_CANDIDATES, _MOST_LISTED = 9, 6, 6
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from crosscheck.fit.least_squares.problem import Kind
 from crosscheck.measurements.data import Measurements
-from crosscheck.units import short
 from seecr.counted import counted
 from seecr.pose import Array, pose_difference, rxyz_from_quat
 from seecr.recording.plots import DEG, MM
+from seecr.units import short
 
 _READ_ME = """# {name}
 {sentence}

@@ -14,7 +14,7 @@ from crosscheck.report.drawing import BEFORE, CALM
 from crosscheck.report.page import facts, title_of
 from crosscheck.report.tables import association_block
 from crosscheck.report.where import caption, failure_map
-from crosscheck.units import in_unit, short
+from seecr.units import in_unit, short
 
 _MOST = 5
 

@@ -10,9 +10,9 @@ from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.words import removed
 from crosscheck.fit.reasons import probability_words
 from crosscheck.fit.words import rms_words
-from crosscheck.units import in_unit, parameter_name, short, with_error
 from seecr.counted import counted
 from seecr.effects import Terms
+from seecr.units import in_unit, parameter_name, short, with_error
 
 # Correlations above this are named; parameters beyond this many plausible sizes are doubtful.
 _CORRELATED, PLAUSIBLE = 0.9, 5.0

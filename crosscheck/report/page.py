@@ -8,10 +8,10 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from crosscheck.fit.least_squares.problem import Problem, kinds_read
 from crosscheck.report.glossary import with_glossary
-from crosscheck.units import short
 from seecr import __version__
 from seecr.counted import counted
 from seecr.made import Made
+from seecr.units import short
 
 
 def page_of(template: str, made: Made | None, **context: Any) -> str:

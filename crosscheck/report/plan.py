@@ -14,8 +14,8 @@ from crosscheck.planning.words import alike, gain_words
 from crosscheck.report.confusion import Confusion, draw_confusion
 from crosscheck.report.drawing import AFTER, BEFORE, INK, blank, grid, image, plain_log, styled
 from crosscheck.report.page import facts, title_of
-from crosscheck.units import short
 from seecr.pose import Array, rotvec_from_quat
+from seecr.units import short
 
 _ROW = 0.19
 

@@ -16,10 +16,10 @@ from crosscheck.fit.noise.whiteness import STRUCTURED
 from crosscheck.fit.reasons import probability_words
 from crosscheck.inference.priors import SURE
 from crosscheck.report.findings import PLAUSIBLE
-from crosscheck.units import chance, in_unit, parameter_name, short
 from seecr.effects import Term
 from seecr.effects.base import Layout
 from seecr.effects.setup import Setup
+from seecr.units import chance, in_unit, parameter_name, short
 
 # Noise within this factor of what was stated is as stated.
 _AS_STATED = 1.25

@@ -26,7 +26,7 @@ from crosscheck.report.drawing import (
     plain_log,
     styled,
 )
-from crosscheck.units import short
+from seecr.units import short
 
 # Errors this many times the noise need a logarithmic axis for both to be seen.
 _FAR = 12.0

@@ -15,8 +15,8 @@ from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.comparison.result import Comparison, Group
 from crosscheck.fit.least_squares.problem import KINDS, Kind, Rms
 from crosscheck.terminal.lines import cell, console_for, four_digits, heading, say, table_of
-from crosscheck.units import in_unit
 from seecr.counted import counted
+from seecr.units import in_unit
 
 _MOST, _MOST_WORST, _MOST_UNSOLVED = 12, 5, 5
 

@@ -12,10 +12,10 @@ from rich.table import Table
 
 from crosscheck.fit.words import belongs, shown
 from crosscheck.terminal.lines import console_for, say
-from crosscheck.units import in_unit, parameter_name
 from seecr.description.robot import Robot
 from seecr.effects import BUILT_IN, PLACES, Effect, effect_named, layout_of
 from seecr.result import Record
+from seecr.units import in_unit, parameter_name
 
 EACH = {"one": "", "cable": ", one per cable", "vector": ", x y z", "point": ", x y z per cable"}
 """What a parameter's size says in words."""

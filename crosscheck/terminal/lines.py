@@ -12,9 +12,9 @@ from rich.text import Text
 
 from crosscheck.fit.least_squares.problem import KINDS, Kind, Rms
 from crosscheck.fit.words import value_lines
-from crosscheck.units import without_rounding
 from seecr.effects.base import Layout
 from seecr.pose import Array
+from seecr.units import without_rounding
 
 _WIDE = 160
 

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.units import in_unit
 from seecr.description.joints import locked
 from seecr.description.robot import Robot
 from seecr.effects import catalogue
@@ -28,6 +27,7 @@ from seecr.pose import Array, quat_conjugate, rxyz_from_quat
 from seecr.pose_rows import products, rotation_vectors
 from seecr.prediction.experiment import Experiment, Prediction
 from seecr.prediction.parted import Parted, rates_by_length
+from seecr.units import in_unit
 
 # Columns of a residual row: position, orientation, then tensions.
 POSITION, ORIENTATION, TENSION = slice(0, 3), slice(3, 6), slice(6, None)

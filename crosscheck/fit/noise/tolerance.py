@@ -17,7 +17,7 @@ from crosscheck.fit.least_squares.problem import KINDS, Problem, Rms
 from crosscheck.fit.words import rms_words
 from crosscheck.given import check_above_zero
 from crosscheck.measurements.data import Sigma
-from crosscheck.units import SI, parse_kind
+from crosscheck.measurements.stated import SI, parse_kind
 
 __all__ = ["HALF_THE_NOISE", "LeftOver", "Tolerance", "doubt_of", "remainder_of"]
 

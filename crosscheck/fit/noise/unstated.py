@@ -9,9 +9,9 @@ import numpy as np
 
 from crosscheck.fit.least_squares.problem import Problem, Rms, kinds_read, kinds_stated
 from crosscheck.fit.noise.smooth import monomials
-from crosscheck.units import short
 from seecr.pose import Array, rotvec_from_quat
 from seecr.prediction.experiment import Prediction
+from seecr.units import short
 
 # An estimate was wrong if the rms of the remainder is less than this part of it.
 _TOO_LARGE = 0.5

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.fit.least_squares.problem import BY_NAME, Problem
-from crosscheck.units import short
 from seecr.description.robot import Robot
 from seecr.effects.base import Readings
 from seecr.pose import (
@@ -16,6 +15,7 @@ from seecr.pose import (
     rotvec_from_quat,
     rxyz_from_quat,
 )
+from seecr.units import short
 
 # A model is worse than none if it is so many times as far from the readings as the commands are,
 # and as the noise is.

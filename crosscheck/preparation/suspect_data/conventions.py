@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.fit.least_squares.problem import BY_NAME, Problem
-from crosscheck.units import short
 from seecr.effects.base import Readings
 from seecr.pose import (
     Array,
@@ -28,6 +27,7 @@ from seecr.pose import (
     rotvec_from_quat,
     rxyz_from_quat,
 )
+from seecr.units import short
 
 # Another convention brings four rows in five so many times nearer to what the model expects, also
 # if the target may sit on the platform, or the tracker stand, in any orientation. If it brings them

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.preparation.suspect_data.orders import reordered
 from crosscheck.preparation.suspect_data.pulls import Pulls
-from crosscheck.units import short
 from seecr.pose import Array, quat_from_rxyz
 from seecr.prediction.experiment import Prediction
+from seecr.units import short
 
 # Another cable explains a column this many times better than its own, and than any other does.
 _BETTER = 4.0

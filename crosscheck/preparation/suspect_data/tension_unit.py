@@ -8,9 +8,9 @@ import numpy as np
 
 from crosscheck.fit.least_squares.problem import TENSION, Problem
 from crosscheck.preparation.suspect_data.pulls import Pulls
-from crosscheck.units import short
 from seecr.pose import Array
 from seecr.prediction.experiment import Prediction
+from seecr.units import short
 
 # Units of other load cells [N].
 _UNITS = {"kgf": 9.80665, "lbf": 4.44822, "grams (gf)": 9.80665e-3}

@@ -23,8 +23,8 @@ from crosscheck.recording.diagnosis import write_diagnosis_recording
 from crosscheck.recording.diagnosis_words import model_words
 from crosscheck.recording.misfit import Misfit, predicted_poses, states_of, worst_row
 from crosscheck.recording.words import plain
-from crosscheck.units import short
 from seecr.errors import InputFileError
+from seecr.units import short
 
 pytestmark = pytest.mark.slow
 

@@ -39,9 +39,9 @@ from crosscheck.report.tables import candidate_rows, checks, untried
 from crosscheck.report.waterfall import waterfall
 from crosscheck.report.where import failure_map
 from crosscheck.report.write import render
-from crosscheck.units import short, with_error
 from seecr.effects import Terms, layout_of
 from seecr.errors import InputFileError
+from seecr.units import short, with_error
 
 pytestmark = pytest.mark.slow
 

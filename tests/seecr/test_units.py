@@ -1,4 +1,4 @@
-"""Units as files spell them, people type them and results show them."""
+"""Units as files spell them and results show them."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ import math
 import numpy as np
 import pytest
 
-from crosscheck.errors import CrosscheckError
-from crosscheck.units import (
-    EXAMPLE,
-    SI,
+from seecr.units import (
+    UNITS,
     chance,
     in_unit,
+    millimetres,
+    of_columns,
     parameter_name,
-    parse_quantity,
     short,
     with_error,
 )
-from seecr.units import UNITS, millimetres, of_columns
 
 
 def test_columns_of_millimetres_are_rounded_once() -> None:
@@ -52,33 +50,6 @@ def test_each_spelling_and_each_shown_unit_is_there_once() -> None:
     assert len(spelt) == len(set(spelt))
     shown = [unit.si for unit in UNITS if unit.shown]
     assert len(shown) == len(set(shown))
-
-
-@pytest.mark.parametrize(
-    ("kind", "text", "value"),
-    [
-        ("position", "0.5mm", 0.0005),
-        ("position", " 3 µm ", 3e-6),
-        ("orientation", "180°", math.pi),
-        ("orientation", "1e1 mrad", 0.01),
-        ("tension", "2kN", 2000.0),
-        ("length", "0.1 cm", 0.001),
-    ],
-)
-def test_quantities_with_their_unit(kind: str, text: str, value: float) -> None:
-    assert parse_quantity("--x", kind, text) == pytest.approx(value, rel=1e-15)
-
-
-@pytest.mark.parametrize("kind", list(SI))
-def test_the_example_of_each_kind_is_one(kind: str) -> None:
-    assert parse_quantity("--x", kind, EXAMPLE[kind]) > 0
-
-
-def test_a_unit_of_another_kind_is_refused() -> None:
-    with pytest.raises(CrosscheckError) as error:
-        parse_quantity("--x", "tension", "1mm")
-    expected = "--x: expected a number with its unit (N, mN, kN) such as 1N, got unit 'mm' in '1mm'"
-    assert str(error.value) == expected
 
 
 @pytest.mark.parametrize(
