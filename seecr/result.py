@@ -8,6 +8,7 @@ from html import escape
 from itertools import islice
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from seecr.counted import counted
@@ -25,9 +26,20 @@ COORDINATES = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
 """Columns of a pose in a data frame."""
 
 
+MOTION = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
+"""Columns of a motion, or of its errors, in a data frame."""
+
+
 def named(pattern: str, names: Sequence[str], values: NDArray[Any]) -> Record:
-    """Part of a record: values (k,), with keys from the pattern and each name."""
-    return {pattern.format(name): value for name, value in zip(names, values.tolist(), strict=True)}
+    """Part of a record (k,) or columns (n, k), with keys from the pattern and each name."""
+    parts = zip(names, values.T.tolist(), strict=True)
+    return {pattern.format(name): value for name, value in parts}
+
+
+def rows_of(columns: Mapping[str, Sequence[Any] | NDArray[Any]]) -> list[Record]:
+    """Columns of n values each as n records."""
+    lists = [one.tolist() if isinstance(one, np.ndarray) else one for one in columns.values()]
+    return [dict(zip(columns, row, strict=True)) for row in zip(*lists, strict=True)]
 
 
 class Result(ABC):

@@ -38,7 +38,7 @@ from crosscheck.fit.reasons import Refusal
 from seecr.counted import counted
 from seecr.effects import Terms
 from seecr.pose import Array
-from seecr.result import Record, Result
+from seecr.result import Record, Result, named, rows_of
 from seecr.statics.solution import Status
 from seecr.units import short
 
@@ -255,11 +255,8 @@ class Comparison(Result):
         every = zip(*channels(self.problem), measured, strict=True)
         heads = [f"{name.replace(' ', '_')}_{unit}" for name, unit, there in every if there]
         errors = np.where(self.problem.counted, self.state.raw, np.nan)[:, measured]
-        values = [[None if e != e else e for e in row] for row in errors.tolist()]
-        return [
-            {"line": line, "run": run, **dict(zip(heads, row, strict=True))}
-            for line, run, row in zip(data.line.tolist(), data.run.tolist(), values, strict=True)
-        ]
+        values = np.where(np.isnan(errors), None, errors)
+        return rows_of({"line": data.line, "run": data.run, **named("{}", heads, values)})
 
     def as_json(self) -> dict[str, Any]:
         """The content of ``comparison.json``: SI, null where a number does not exist."""

@@ -24,7 +24,7 @@ from seecr.commands.loads import Loads
 from seecr.counted import counted, plural, some
 from seecr.description.robot import Robot
 from seecr.pose import Array
-from seecr.result import Record, Result
+from seecr.result import Record, Result, rows_of
 
 Mask = NDArray[np.bool_]
 Names = NDArray[np.str_]
@@ -328,11 +328,7 @@ class Measurements(Result):
 
     def records(self) -> list[Record]:
         """Commands and readings row by row, named as in the file; None if not read."""
-        columns = dict(self.columns())
-        return [
-            dict(zip(columns, values, strict=True))
-            for values in zip(*columns.values(), strict=True)
-        ]
+        return rows_of(dict(self.columns()))
 
     def columns(self) -> Iterator[tuple[str, list[Any]]]:
         """The columns of the file, in SI units, by name; None if not read."""

@@ -16,7 +16,7 @@ from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.verdicts import UNSOLVED, PoseFinding, Verdict
 from seecr.description.robot import Robot
 from seecr.pose import Array
-from seecr.result import COORDINATES, Record, Result, named
+from seecr.result import COORDINATES, Record, Result, named, rows_of
 from seecr.statics.solution import Solution
 
 if TYPE_CHECKING:
@@ -140,13 +140,14 @@ class CaseResult(Result):
     def records(self) -> list[Record]:
         """One row per pose: the command, both answers, and their differences [SI]."""
         poses = {"cmd": self.case.poses, "seecr": self.solution.pose, "mujoco": self.settling.pose}
-        gaps = {name: getattr(self.difference, name).tolist() for name in QUANTITIES}
-        return [
-            {"pose": i, "verdict": self.verdict[i].name.lower()}
-            | {key: v for n, rows in poses.items() for key, v in _pose(n, rows[i]).items()}
-            | {f"difference_{name}": values[i] for name, values in gaps.items()}
-            for i in range(len(self))
-        ]
+        columns: Record = {
+            "pose": range(len(self)),
+            "verdict": [verdict.name.lower() for verdict in self.verdict],
+        }
+        for name, rows in poses.items():
+            columns |= named(f"{name}_{{}}", COORDINATES, rows)
+        gaps = {f"difference_{name}": getattr(self.difference, name) for name in QUANTITIES}
+        return rows_of(columns | gaps)
 
     def as_json(self) -> dict[str, Any]:
         """As in ``results.json``: every number, pose by pose."""
@@ -184,11 +185,6 @@ def worst_of(results: Sequence[CaseResult]) -> tuple[CaseResult, Worst] | None:
     """The case and difference nearest to its allowance, or farthest beyond it."""
     pairs = [(result, worst) for result in results for worst in result.worst.values()]
     return max(pairs, key=lambda pair: pair[1].ratio, default=None)
-
-
-def _pose(name: str, pose: Array) -> Record:
-    """A pose (7,) as columns of a data frame."""
-    return named(f"{name}_{{}}", COORDINATES, pose)
 
 
 class Counted(Protocol):

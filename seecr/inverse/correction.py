@@ -28,7 +28,7 @@ from seecr.inverse.told import told_lengths
 from seecr.pose import Array
 from seecr.pose_rows import changes_between
 from seecr.prediction.experiment import Experiment, Prediction, effects_of
-from seecr.result import COORDINATES, Record, Result, named
+from seecr.result import COORDINATES, MOTION, Record, Result, named, rows_of
 from seecr.statics.solution import Solution
 from seecr.statics.spans import spanless
 from seecr.statics.starts import Commanded, commands_from
@@ -196,20 +196,18 @@ class Correction(Result):
 
     def records(self) -> list[Record]:
         """One row per pose: wanted pose, lengths, remaining error, tensions."""
-        cables, left = self.robot.cable_names, self.left
-        moved = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
-        return [
+        cables = self.robot.cable_names
+        return rows_of(
             {
-                **named("want_{}", COORDINATES, self.wanted[i]),
-                **named("length_{}_m", [str(k + 1) for k in range(len(cables))], self.lengths[i]),
-                "held": bool(self.held[i]),
-                "reached": bool(self.reached[i]),
-                "why_not": self.why_not[i],
-                **named("left_{}", moved, left[i]),
-                **named("tension_{}_N", cables, self.solution.tensions[i]),
+                **named("want_{}", COORDINATES, self.wanted),
+                **named("length_{}_m", [str(k + 1) for k in range(len(cables))], self.lengths),
+                "held": self.held,
+                "reached": self.reached,
+                "why_not": self.why_not,
+                **named("left_{}", MOTION, self.left),
+                **named("tension_{}_N", cables, self.solution.tensions),
             }
-            for i in range(len(self.wanted))
-        ]
+        )
 
     def as_json(self, kept: Array | None = None) -> Record:
         """``correction.json``.

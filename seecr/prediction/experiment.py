@@ -22,7 +22,7 @@ from seecr.effects.setup import Setup, plain_setup
 from seecr.effects.terms import Term
 from seecr.effects.unfed import unfed
 from seecr.pose import Array
-from seecr.result import COORDINATES, Record, Result, named
+from seecr.result import COORDINATES, Record, Result, named, rows_of
 from seecr.statics import batch
 from seecr.statics.led import led
 from seecr.statics.solution import Solution, certify
@@ -130,16 +130,14 @@ class Prediction(Result):
 
     def records(self) -> list[Record]:
         """The readings, one row per command."""
-        cables, read = self.setup.robot.cable_names, self.readings
-        poses = np.concatenate([read.position, read.quat_wxyz], axis=1)
-        return [
+        read = self.readings
+        return rows_of(
             {
-                "solved": bool(self.solved[i]),
-                **named("{}", COORDINATES, poses[i]),
-                **named("tension_{}_N", cables, read.tensions[i]),
+                "solved": self.solved,
+                **named("{}", COORDINATES, np.hstack([read.position, read.quat_wxyz])),
+                **named("tension_{}_N", self.setup.robot.cable_names, read.tensions),
             }
-            for i in range(len(read.position))
-        ]
+        )
 
     def solution(self) -> Solution:
         """The rows as a certified :class:`seecr.Solution`."""

@@ -19,7 +19,7 @@ from seecr.prediction.cells import UNSEEN, Where, number_of
 from seecr.prediction.experiment import Experiment, senses
 from seecr.prediction.model import CALIBRATION, FIT, Model, model_given
 from seecr.prediction.sensitivity import sensitivities
-from seecr.result import Record, Result, named
+from seecr.result import MOTION, Record, Result, named, rows_of
 from seecr.statics.starts import Commanded, answered, commands_from
 from seecr.units import short
 
@@ -76,15 +76,13 @@ class Spread(Result):
     def records(self) -> list[Record]:
         """One row per command."""
         cables = [str(k + 1) for k in range(self.tensions.shape[1])]
-        moved = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
-        return [
+        return rows_of(
             {
-                **named("stderr_{}", moved, np.concatenate([self.position[i], self.rotation[i]])),
-                **named("stderr_seen_{}", moved, self.seen[i]),
-                **named("stderr_tension_{}_N", cables, self.tensions[i]),
+                **named("stderr_{}", MOTION, np.hstack([self.position, self.rotation])),
+                **named("stderr_seen_{}", MOTION, self.seen),
+                **named("stderr_tension_{}_N", cables, self.tensions),
             }
-            for i in range(len(self.position))
-        ]
+        )
 
 
 def _longest(vectors: Array) -> float:

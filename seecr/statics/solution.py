@@ -28,7 +28,7 @@ from seecr.errors import InputError
 from seecr.parallel import in_parts
 from seecr.pose import Array
 from seecr.pose_rows import rotation_vectors
-from seecr.result import COORDINATES, Record, Result, named
+from seecr.result import COORDINATES, Record, Result, named, rows_of
 from seecr.statics import batch
 from seecr.statics.inertia import mass_matrices
 from seecr.statics.spans import spanless
@@ -306,20 +306,19 @@ class Solution(Result):
 
     def records(self) -> list[Record]:
         """One row per pose: command, pose, status, tensions and slack cables by name."""
-        cables, stiffness = self.robot.cable_names, self.smallest_eigenvalue
-        return [
+        cables = self.robot.cable_names
+        return rows_of(
             {
-                "status": self.status[i].name,
-                **named("command_{}", COORDINATES, self.command[i]),
-                **named("{}", COORDINATES, self.pose[i]),
-                "residual": float(self.residual[i]),
-                "energy_J": float(self.energy[i]),
-                "smallest_eigenvalue_N_per_m": float(stiffness[i]),
-                **named("tension_{}_N", cables, self.tensions[i]),
-                **named("slack_{}", cables, self.slack[i]),
+                "status": [status.name for status in self.status],
+                **named("command_{}", COORDINATES, self.command),
+                **named("{}", COORDINATES, self.pose),
+                "residual": self.residual,
+                "energy_J": self.energy,
+                "smallest_eigenvalue_N_per_m": self.smallest_eigenvalue,
+                **named("tension_{}_N", cables, self.tensions),
+                **named("slack_{}", cables, self.slack),
             }
-            for i in range(len(self))
-        ]
+        )
 
     def as_json(self) -> Record:
         """``seecr`` of a case in ``results.json``: the results of all poses, by quantity."""

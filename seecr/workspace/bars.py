@@ -16,7 +16,7 @@ from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.planar import BarRest, bar_equilibria, bar_tilt
 from seecr.pose import Array, quat_from_rotvec, quat_multiply, quat_rotate, transform_points
-from seecr.result import COORDINATES, Record, Result, named
+from seecr.result import COORDINATES, Record, Result, named, rows_of
 from seecr.statics.solution import Solution, check_solution
 from seecr.statics.starts import commanded_poses
 
@@ -148,11 +148,13 @@ class BarManifold(Result):
 
     def records(self) -> Sequence[Record]:
         """One row per pose."""
-        columns = self.tilt.tolist(), self.there.tolist(), self.at_command.tolist()
-        return [
-            {"tilt_rad": tilt, "manifold_there_rad": there, "manifold_at_command_rad": asked}
-            for tilt, there, asked in zip(*columns, strict=True)
-        ]
+        return rows_of(
+            {
+                "tilt_rad": self.tilt,
+                "manifold_there_rad": self.there,
+                "manifold_at_command_rad": self.at_command,
+            }
+        )
 
 
 def bar_manifold(solution: Solution, commanded: bool = True) -> BarManifold | None:

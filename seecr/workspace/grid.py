@@ -12,7 +12,7 @@ from seecr.counted import between, counted
 from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.pose import Array
-from seecr.result import Record, Result
+from seecr.result import MOTION, Record, Result, named, rows_of
 from seecr.statics.solution import Status
 from seecr.units import millimetres
 from seecr.workspace.extent import directions_words
@@ -24,7 +24,6 @@ __all__ = ["NEVER", "STATUSES", "Workspace", "codes_of"]
 NEVER = -1
 STATUSES = tuple(Status)
 """What the codes of a map's statuses count: 0 is the first."""
-_FREEDOMS = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
 
 
 def codes_of(status: NDArray[np.object_]) -> NDArray[np.int8]:
@@ -279,19 +278,18 @@ class Workspace(Result):
         """One row per pose of the grid."""
         places = self.places.reshape(-1, 3)
         columns = {
-            **{f"{axis}_m": places[:, k] for k, axis in enumerate("xyz")},
+            **named("{}_m", "xyz", places),
             "margin_N": self.margin.ravel(),
             "feasible": self.feasible.ravel(),
             **({} if self.chance is None else {"probability": self.chance.ravel()}),
             "slack": self.slack.ravel(),
             **self._statuses(),
-            **{f"d{a}_m": self.deviation[..., k].ravel() for k, a in enumerate("xyz")},
-            **{f"r{a}_rad": self.rotation[..., k].ravel() for k, a in enumerate("xyz")},
+            **named("d{}_m", "xyz", self.deviation.reshape(-1, 3)),
+            **named("r{}_rad", "xyz", self.rotation.reshape(-1, 3)),
             "smallest_eigenvalue_N_per_m": self.stiffness.ravel(),
-            **{f"softest_{name}": self.softest[..., k].ravel() for k, name in enumerate(_FREEDOMS)},
+            **named("softest_{}", MOTION, self.softest.reshape(-1, 6)),
         }
-        listed = {name: values.tolist() for name, values in columns.items()}
-        return [dict(zip(listed, row, strict=True)) for row in zip(*listed.values(), strict=True)]
+        return rows_of(columns)
 
     def _statuses(self) -> dict[str, NDArray[np.object_]]:
         """The column of names of the statuses, if there are any."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from seecr.description.robot import Robot
 from seecr.planar import midline_point
 from seecr.pose import Array, transform_points
-from seecr.result import Record, Result
+from seecr.result import Record, Result, named, rows_of
 from seecr.statics.solution import Solution, check_solution
 
 __all__ = ["Midlines", "midline_points"]
@@ -61,10 +61,7 @@ class Midlines(Result):
 
     def records(self) -> Sequence[Record]:
         """One row per pose."""
-        return [
-            {**dict(zip(("x_m", "y_m", "z_m"), point.tolist(), strict=True)), "beside_m": beside}
-            for point, beside in zip(self.points, self.beside.tolist(), strict=True)
-        ]
+        return rows_of({**named("{}_m", "xyz", self.points), "beside_m": self.beside})
 
 
 def midline_points(solution: Solution) -> Midlines | None:
