@@ -254,9 +254,9 @@ class Comparison(Result):
         data, measured = self.problem.data, np.asarray(self.problem.measured.any(axis=0))
         every = zip(*channels(self.problem), measured, strict=True)
         heads = [f"{name.replace(' ', '_')}_{unit}" for name, unit, there in every if there]
-        errors = np.where(self.problem.counted, self.state.raw, np.nan)[:, measured]
-        values = np.where(np.isnan(errors), None, errors)
-        return rows_of({"line": data.line, "run": data.run, **named("{}", heads, values)})
+        errors = np.where(self.problem.counted, self.state.raw, np.nan)[:, measured].astype(object)
+        errors[errors != errors] = None
+        return rows_of({"line": data.line, "run": data.run, **named("{}", heads, errors)})
 
     def as_json(self) -> dict[str, Any]:
         """The content of ``comparison.json``: SI, null where a number does not exist."""
