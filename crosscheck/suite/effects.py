@@ -26,6 +26,7 @@ from crosscheck.twin.robot import TRUE_EFFECTS
 from crosscheck.twin.trajectory import trajectory
 from seecr.commands.data import Commands
 from seecr.commands.loads import Loads
+from seecr.counted import counted, some
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
@@ -303,3 +304,82 @@ def _robot_and_commands(path: Path) -> tuple[Robot, Commands]:
     temperature = 20.0 + 4.0 * np.sin(np.arange(rows.sum()))
     commands = Commands(pose=way.pose[rows], run=run, time=way.t_s[rows], temperature=temperature)
     return robot, commands
+
+
+EFFECT_HEADS = [
+    "effect", "robot", "moves [m]", "position [m]", "orientation [rad]", "tension [N]", "result",
+    "against",
+]  # fmt: skip
+
+
+def effects_line(results: Sequence[EffectResult]) -> str:
+    """How many effects agree, with what, the worst differences, and those that do not agree."""
+    every = [result.case.model for result in results]
+    robots = {model for model in every if every.count(model) > 1} or set(every)
+    alone = [f"{r.case.effect} on {r.case.model.stem}" for r in results
+             if r.case.model not in robots]  # fmt: skip
+    effects = {result.case.effect for result in results} - {LOADS}
+    loads = " and known loads" if any(result.case.effect == LOADS for result in results) else ""
+    bad = [result.case.name for result in results if result.outcome is not Outcome.AGREE]
+    verdict = "all agree"
+    if bad:
+        verb = "does" if len(bad) == 1 else "do"
+        verdict = f"{len(bad)} of {counted(len(results), 'case')} {verb} not agree: {some(bad)}"
+    worst = max(results, key=lambda result: result.worst[0])
+    orientation = max(result.worst[1] for result in results)
+    tension = max(result.worst[2] for result in results)
+    return (
+        f"{counted(len(effects), 'effect')}{loads} on {counted(len(robots), 'robot')}"
+        f"{''.join(f', {name}' for name in alone)} against "
+        f"{_counterparts(results)}: {verdict}; worst {worst.worst[0]:.1e} m "
+        f"({worst.case.name}), {orientation:.1e} rad, {tension:.1e} N."
+    )
+
+
+def _counterparts(results: Sequence[EffectResult]) -> str:
+    """How many effects are compared with what, in words."""
+    kinds = {
+        kind: {r.case.effect for r in results if r.case.against is kind} - {LOADS}
+        for kind in Counterpart
+    }
+    parts = [f"{kind.value} ({len(names)})" for kind, names in kinds.items() if names]
+    return " and ".join(parts)
+
+
+def against_line(results: Sequence[EffectResult]) -> str:
+    """What seecr's mathematics was compared with: MuJoCo's own means, or our own, written again."""
+    kinds: dict[Counterpart, list[str]] = {}
+    for result in results:
+        kinds.setdefault(result.case.against, []).append(result.case.effect)
+    return " ".join(
+        f"Checked against {kind.value}: {', '.join(dict.fromkeys(names))}."
+        for kind, names in kinds.items()
+    )
+
+
+def effect_text(result: EffectResult) -> str:
+    """One effect's differences, the allowed ones, and the size of the effect itself."""
+    position, orientation, tension = result.worst
+    parts = [
+        f"position {position:.1e} m, orientation {orientation:.1e} rad, tension {tension:.1e} N",
+        f"allowed {POSITION_M:.0e} m, {ORIENTATION_RAD:.0e} rad, {result.tension_limit:.0e} N",
+        f"the effect moves a reading by {result.moved_m:.1e} m",
+    ]
+    if result.unsolved:
+        parts.append(
+            f"no equilibrium at {result.unsolved} of {counted(len(result.compared), 'pose')}"
+        )
+    return "; ".join(parts)
+
+
+def effect_failures(results: Sequence[EffectResult]) -> list[str]:
+    """One line for each effect that fails."""
+    bad = [result for result in results if result.outcome is not Outcome.AGREE]
+    return [f"{result.case.name}: {effect_text(result)}" for result in bad]
+
+
+def effect_cells(result: EffectResult) -> list[str]:
+    """An effect as a row: name, robot, how far it moves a reading, differences, result."""
+    values = (f"{value:.1e}" for value in (result.moved_m, *result.worst))
+    case = result.case
+    return [case.effect, case.model.stem, *values, result.outcome.value, case.against.value]

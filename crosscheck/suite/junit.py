@@ -7,9 +7,15 @@ import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from crosscheck.suite import words
-from crosscheck.suite.effects import GROUP
+from crosscheck.suite.effects import GROUP, effect_text
 from crosscheck.suite.outcome import Outcome
+from crosscheck.suite.results import (
+    QUANTITY_NAMES,
+    failure_lines,
+    finding_lines,
+    remarks,
+    widened_lines,
+)
 
 if TYPE_CHECKING:
     from crosscheck.suite.effects import EffectResult
@@ -34,16 +40,16 @@ def junit_xml(run: Run) -> str:
         counts = _counts(run.results, run.wall_s)
         suite = ET.SubElement(root, "testsuite", {"name": "crosscheck run", **counts})
         for result in run.results:
-            lines, found = words.failures(result), _report(result)
+            lines, found = failure_lines(result), _report(result)
             _add(
-                suite, "crosscheck", result, words.remarks(result), "\n".join(lines),
+                suite, "crosscheck", result, remarks(result), "\n".join(lines),
                 "\n".join(found),
             )  # fmt: skip
     if run.effects:
         counts = _counts(run.effects, sum(effect.wall_s for effect in run.effects))
         suite = ET.SubElement(root, "testsuite", {"name": GROUP, **counts})
         for effect in run.effects:
-            said = words.effect_text(effect)
+            said = effect_text(effect)
             wrong = f"{effect.case.name}: {said}"
             _add(suite, f"crosscheck.{GROUP}", effect, said, wrong, said)
     ET.indent(root)
@@ -82,10 +88,10 @@ def _add(
 
 def _report(result: CaseResult) -> list[str]:
     lines = [
-        f"{words.NAMES[name]}: {worst.value:.3e}, allowed {worst.allowed:.3e}, pose {worst.pose}"
+        f"{QUANTITY_NAMES[name]}: {worst.value:.3e}, allowed {worst.allowed:.3e}, pose {worst.pose}"
         for name, worst in result.worst.items()
     ]
-    return [*lines, *words.findings(result), *words.widened_lines(result)]
+    return [*lines, *finding_lines(result), *widened_lines(result)]
 
 
 def _clean(text: str) -> str:

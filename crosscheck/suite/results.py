@@ -1,4 +1,7 @@
-"""The result of a case: both physics' answers, their differences, and how the case ended."""
+"""The result of a case: both physics' answers, their differences, and how the case ended.
+
+The functions at the end give its numbers units and rounding, as people read them.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,7 @@ from crosscheck.suite.cases import Case
 from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.verdicts import UNSOLVED, PoseFinding, Verdict
+from seecr.counted import counted
 from seecr.description.robot import Robot
 from seecr.pose import Array
 from seecr.result import COORDINATES, Record, Result, named, rows_of
@@ -21,6 +25,31 @@ from seecr.statics.solution import Solution
 
 if TYPE_CHECKING:
     from crosscheck.settle.settler import SettlingBatch
+
+QUANTITY_HEADS = {
+    "settled_position_m": "settled [m]",
+    "settled_orientation_rad": "settled [rad]",
+    "position_m": "polished [m]",
+    "orientation_rad": "polished [rad]",
+    "tension_N": "tension [N]",
+}
+"""Column heads of the quantities, in the order of ``QUANTITIES``."""
+
+QUANTITY_NAMES = {
+    "settled_position_m": "position after plain settling",
+    "settled_orientation_rad": "orientation after plain settling",
+    "position_m": "position",
+    "orientation_rad": "orientation",
+    "tension_N": "tension of a cable",
+}
+_UNITS = {name: head[head.index("[") + 1 : -1] for name, head in QUANTITY_HEADS.items()}
+_SHORT = {
+    Verdict.NEUTRAL: "free to move",
+    Verdict.BRANCH: "two equilibria",
+    Verdict.DIFFERS: "differ",
+    Verdict.SEECR_UNSOLVED: "SEECR unsolved",
+    Verdict.MUJOCO_UNSOLVED: "MuJoCo unsolved",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,9 +162,7 @@ class CaseResult(Result):
 
     def lines(self) -> list[str]:
         """The outcome, the worst difference, and each pose that does not simply agree."""
-        from crosscheck.suite import words
-
-        return [words.case_line(self), *words.failures(self), *words.findings(self)]
+        return [case_line(self), *failure_lines(self), *finding_lines(self)]
 
     def records(self) -> list[Record]:
         """One row per pose: the command, both answers, and their differences [SI]."""
@@ -208,3 +235,116 @@ def _timing(result: CaseResult) -> dict[str, float]:
         "mujoco_polish_ms_per_pose": 1e3 * float(polish_s),
         "case_s": result.wall_s,
     }
+
+
+def difference_cell(worst: Worst | None) -> str:
+    """A difference for a cell of a table."""
+    return "–" if worst is None else f"{worst.value:.1e}"
+
+
+def remarks(result: CaseResult) -> str:
+    """Counts of poses that do not simply agree, and of widened thresholds."""
+    parts = [_counted(result, verdict) for verdict in _SHORT if result.count(verdict)]
+    widened = int(result.allowance.widened.sum())
+    if widened:
+        parts.append(f"{widened} widened")
+    return ", ".join(parts)
+
+
+def _counted(result: CaseResult, verdict: Verdict) -> str:
+    beyond = sum(one.beyond_limits for one in result.findings if one.verdict is verdict)
+    too_many = f" ({beyond} beyond limits)" if beyond else ""
+    return f"{result.count(verdict)} {_SHORT[verdict]}{too_many}"
+
+
+def case_cells(result: CaseResult) -> list[str]:
+    """A case as a row: name, poses, the five worst differences, times, result, remarks."""
+    worst = result.worst
+    return [
+        result.case.name,
+        str(len(result)),
+        *(difference_cell(worst.get(name)) for name in QUANTITIES),
+        f"{result.seecr_us:.0f}",
+        f"{result.mujoco_ms:.1f}",
+        result.outcome.value,
+        remarks(result),
+    ]
+
+
+TABLE_HEADS = [
+    "case",
+    "poses",
+    *QUANTITY_HEADS.values(),
+    "SEECR [µs]",
+    "MuJoCo [ms]",
+    "result",
+    "remarks",
+]
+
+
+def worst_sentence(pair: tuple[CaseResult, Worst] | None) -> str:
+    """The worst difference, with case and pose."""
+    if pair is None:
+        return "no pose could be compared"
+    result, worst = pair
+    return (
+        f"worst difference {worst.value:.2e} {_UNITS[worst.quantity]} "
+        f"({QUANTITY_NAMES[worst.quantity]}), {_share(worst.ratio)} the allowed one, "
+        f"in {result.case.name} at pose {worst.pose}"
+    )
+
+
+def failure_lines(result: CaseResult) -> list[str]:
+    """One line for each pose that makes a case fail."""
+    return [_line(result, finding) for finding in result.findings if finding.fails]
+
+
+def finding_lines(result: CaseResult) -> list[str]:
+    """One line for each finding that does not make a case fail."""
+    return [_line(result, finding) for finding in result.findings if not finding.fails]
+
+
+def _line(result: CaseResult, finding: PoseFinding) -> str:
+    limits = " (beyond the limits in thresholds.toml)" if finding.beyond_limits else ""
+    at = command_words(result, finding.pose)
+    return f"pose {finding.pose}, commanded {at}: {finding.text}{limits}"
+
+
+def case_line(result: CaseResult) -> str:
+    """A case in a line: name, poses, outcome, the worst difference."""
+    worst = max(result.worst.values(), key=lambda one: one.ratio, default=None)
+    poses, pair = counted(len(result), "pose"), None if worst is None else (result, worst)
+    notes = f" ({remarks(result)})" if remarks(result) else ""
+    return f"{result.case.name}: {poses}, {result.outcome.value}{notes}; {worst_sentence(pair)}"
+
+
+def widened_lines(result: CaseResult) -> list[str]:
+    """One line for each pose with widened thresholds."""
+    rows = [i for i, wide in enumerate(result.allowance.widened) if wide]
+    return [
+        f"pose {i}, commanded {command_words(result, i)}: allowed "
+        + ", ".join(
+            f"{getattr(result.allowance, name)[i]:.1e} {_UNITS[name]} ({QUANTITY_NAMES[name]})"
+            for name in QUANTITIES
+        )
+        + f"; the smallest stiffness there is {result.solution.smallest_eigenvalue[i]:.1e} N/m"
+        for i in rows
+    ]
+
+
+def command_words(result: CaseResult, pose: int) -> str:
+    """A commanded pose, position [m] and quaternion, and its start if that is elsewhere."""
+    case = result.case
+    begun = "" if case.starts is None else f", started at {_numbers(case.starts[pose])}"
+    return f"{_numbers(case.poses[pose])}{begun}"
+
+
+def _numbers(row: Array) -> str:
+    return f"({' '.join(f'{v:.4g}' for v in row[:3])}; {' '.join(f'{v:.4g}' for v in row[3:])})"
+
+
+def _share(ratio: float) -> str:
+    """A ratio as a percentage, with no more digits than it needs."""
+    if ratio >= 10.0:
+        return f"{ratio:.3g} times"
+    return f"{100 * ratio:.2g} % of" if ratio < 1.0 else f"{100 * ratio:.4g} % of"

@@ -19,14 +19,27 @@ from crosscheck.settle.model import ignored_note
 from crosscheck.suite.agreement import allowances, differences_of
 from crosscheck.suite.cases import Case
 from crosscheck.suite.chosen import GivenCase, chosen_cases
-from crosscheck.suite.effects import EffectCase, EffectResult, run_effects
+from crosscheck.suite.effects import (
+    EffectCase,
+    EffectResult,
+    effect_failures,
+    effects_line,
+    run_effects,
+)
 from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.outcome import Outcome
-from crosscheck.suite.results import CaseResult, Worst, counts, worst_of
+from crosscheck.suite.results import (
+    CaseResult,
+    Worst,
+    counts,
+    failure_lines,
+    worst_of,
+    worst_sentence,
+)
 from crosscheck.suite.thresholds import Thresholds, load_thresholds
-from crosscheck.suite.verdicts import Answers, Verdict, held_to, judge_poses
+from crosscheck.suite.verdicts import FINDINGS, Answers, Verdict, held_to, judge_poses
 from seecr.arguments import whole
-from seecr.counted import counted
+from seecr.counted import counted, some
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve as seecr_solve
@@ -94,11 +107,9 @@ class Run(Result):
 
     def lines(self) -> list[str]:
         """The verdict, the failures, and what MuJoCo's side ignores."""
-        from crosscheck.suite import words
-
-        failures = [f"{r.case.name}, {line}" for r in self.results for line in words.failures(r)]
+        failures = [f"{r.case.name}, {line}" for r in self.results for line in failure_lines(r)]
         notes = [f"note: {note}" for note in self.notes]
-        return [words.verdict_line(self), *failures, *words.effect_failures(self.effects), *notes]
+        return [verdict_line(self), *failures, *effect_failures(self.effects), *notes]
 
     def records(self) -> list[Record]:
         """One row per pose of every case; effects have none."""
@@ -129,6 +140,42 @@ class Run(Result):
             "packages": package_versions(),
             "effects": self.effects,
         }
+
+
+def verdict_line(run: Run) -> str:
+    """How the run ended, and the difference nearest to its allowance or farthest beyond it.
+
+    Effects are only named here if they fail; if nothing else was run, the line is about them.
+    """
+    if not run.every:
+        return "Nothing was run."
+    if not run.results:
+        return effects_line(run.effects)
+    total = sum(len(result) for result in run.results)
+    aside = sum(run.count(verdict) for verdict in FINDINGS)
+    poses = f"{counted(total, 'pose')} of {counted(len(run.results), 'case')}"
+    if aside:
+        poses = f"{total - aside} of {poses} ({counted(aside, 'finding')})"
+    bad = [r.case.name for r in run.every if r.outcome is not Outcome.AGREE]
+    start = {
+        Outcome.AGREE: f"SEECR and MuJoCo agree at {poses}",
+        Outcome.DIFFER: f"SEECR and MuJoCo differ in {some(bad)}",
+        Outcome.NOT_CONVERGED: f"not every solve converged: see {some(bad)}",
+    }[run.outcome]
+    return f"{start}; {worst_sentence(run.worst)}."
+
+
+def threshold_cells(run: Run) -> list[str]:
+    """The thresholds as a row of the same table."""
+    settled, polished = run.thresholds.settled, run.thresholds.polished
+    values = [
+        settled.position_m,
+        settled.orientation_rad,
+        polished.position_m,
+        polished.orientation_rad,
+        polished.tension_N,
+    ]
+    return ["allowed", "", *(f"{value:.0e}" for value in values), "", "", "", ""]
 
 
 def run_case(case: Case, thresholds: Thresholds, record: Recorder | None = None) -> CaseResult:

@@ -5,7 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from crosscheck.suite import words
+from crosscheck.suite.effects import (
+    EFFECT_HEADS,
+    against_line,
+    effect_cells,
+    effect_failures,
+    effects_line,
+)
+from crosscheck.suite.results import (
+    TABLE_HEADS,
+    case_cells,
+    failure_lines,
+    finding_lines,
+    widened_lines,
+)
+from crosscheck.suite.run import threshold_cells, verdict_line
 
 if TYPE_CHECKING:
     from crosscheck.suite.results import CaseResult
@@ -19,7 +33,7 @@ def summary_md(run: Run, worst_pose: str) -> str:
         run: the run.
         worst_pose: sentence about the file with the worst pose.
     """
-    parts = ["# SEECR against MuJoCo", words.verdict_line(run)]
+    parts = ["# SEECR against MuJoCo", verdict_line(run)]
     if run.results:
         parts += _cases(run, worst_pose)
     parts += [f"Note: {note}." for note in run.notes]
@@ -38,31 +52,31 @@ def _cases(run: Run, worst_pose: str) -> list[str]:
         "brought to rest by its own dynamics; `polished` and tensions: after Newton's method on "
         f"its inverse dynamics. Times are per pose, on one processor. {worst_pose}",
     ]
-    parts += _section(run, "Failures", words.failures)
-    parts += _section(run, "Findings", words.findings)
-    parts += _section(run, "Widened thresholds", words.widened_lines)
+    parts += _section(run, "Failures", failure_lines)
+    parts += _section(run, "Findings", finding_lines)
+    parts += _section(run, "Widened thresholds", widened_lines)
     return parts
 
 
 def _effects(run: Run) -> list[str]:
     """How the effects ended, which failed, and a folded table of all."""
-    heads = words.EFFECT_HEADS
+    heads = EFFECT_HEADS
     rule = ["---", "---", *["---:"] * (len(heads) - 4), "---", "---"]
-    table = "\n".join(_row(row) for row in [heads, rule, *map(words.effect_cells, run.effects)])
-    failed = [f"- {line}" for line in words.effect_failures(run.effects)]
+    table = "\n".join(_row(row) for row in [heads, rule, *map(effect_cells, run.effects)])
+    failed = [f"- {line}" for line in effect_failures(run.effects)]
     return [
         "## Effects",
-        words.effects_line(run.effects),
-        words.against_line(run.effects),
+        effects_line(run.effects),
+        against_line(run.effects),
         *(["\n".join(failed)] if failed else []),
         f"<details><summary>All {len(run.effects)}</summary>\n\n{table}\n\n</details>",
     ]
 
 
 def _table(run: Run) -> str:
-    heads = words.TABLE_HEADS
+    heads = TABLE_HEADS
     rule = ["---", *["---:"] * (len(heads) - 3), "---", "---"]
-    rows = [heads, rule, *(words.cells(r) for r in run.results), words.threshold_cells(run)]
+    rows = [heads, rule, *(case_cells(r) for r in run.results), threshold_cells(run)]
     return "\n".join(_row(row) for row in rows)
 
 

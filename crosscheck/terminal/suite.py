@@ -9,8 +9,16 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from crosscheck.suite import words
+from crosscheck.suite.effects import effect_failures, effects_line
 from crosscheck.suite.outcome import Outcome
+from crosscheck.suite.results import (
+    QUANTITY_HEADS,
+    TABLE_HEADS,
+    case_cells,
+    failure_lines,
+    widened_lines,
+)
+from crosscheck.suite.run import threshold_cells, verdict_line
 from crosscheck.suite.verdicts import FINDINGS, Verdict
 from crosscheck.terminal.lines import console_for, say
 from seecr.counted import counted
@@ -27,9 +35,9 @@ _STYLE = {
 # Failures told on the terminal; summary.md and results.json have them all.
 _MOST = 5
 # Columns of words, of the case's result, and those shown on any terminal.
-_RESULT = words.TABLE_HEADS.index("result")
+_RESULT = TABLE_HEADS.index("result")
 _WORDS = (0, _RESULT, _RESULT + 1)
-_ESSENTIAL = (0, *(words.TABLE_HEADS.index(head) for head in words.HEADS.values()), _RESULT)
+_ESSENTIAL = (0, *(TABLE_HEADS.index(head) for head in QUANTITY_HEADS.values()), _RESULT)
 _ROOMY = 124
 
 
@@ -50,35 +58,35 @@ def print_run(run: Run, out: Path, console: Console | None = None) -> None:
         if run.count(verdict):
             poses = counted(run.count(verdict), "pose")
             say(console, f"Finding at {poses}: {verdict.value}.")
-    _print_lines(console, words.effect_failures(run.effects), "effects")
+    _print_lines(console, effect_failures(run.effects), "effects")
     if run.effects and run.results:
-        say(console, words.effects_line(run.effects))
-    say(console, words.verdict_line(run), _STYLE[run.outcome])
+        say(console, effects_line(run.effects))
+    say(console, verdict_line(run), _STYLE[run.outcome])
     say(console, f"{run.wall_s:.1f} s; results in {out}/")
 
 
 def _table(run: Run, width: int) -> Table:
     """The cases, without the columns that are left out where the terminal is narrow."""
-    shown = [i for i in range(len(words.TABLE_HEADS)) if width >= _ROOMY or i in _ESSENTIAL]
+    shown = [i for i in range(len(TABLE_HEADS)) if width >= _ROOMY or i in _ESSENTIAL]
     table = Table(box=None, header_style="bold", pad_edge=False)
     for i in shown:
-        head = Text(words.TABLE_HEADS[i].replace(" [", "\n["))
+        head = Text(TABLE_HEADS[i].replace(" [", "\n["))
         table.add_column(head, justify="left" if i in _WORDS else "right", no_wrap=True)
     for result in run.results:
-        cells = [Text(cell) for cell in words.cells(result)]
+        cells = [Text(cell) for cell in case_cells(result)]
         cells[_RESULT].stylize(_STYLE[result.outcome])
         table.add_row(*(cells[i] for i in shown))
-    limits = words.threshold_cells(run)
+    limits = threshold_cells(run)
     table.add_row(*(Text(limits[i], style="dim") for i in shown))
     return table
 
 
 def _print_notes(console: Console, result: CaseResult) -> None:
     """Failures, branches and widened thresholds of a case; its free motions are only counted."""
-    lines = words.failures(result)
+    lines = failure_lines(result)
     branches = [f for f in result.findings if f.verdict is Verdict.BRANCH and not f.fails]
     lines += [f"pose {f.pose}: {f.text}" for f in branches]
-    lines += words.widened_lines(result)
+    lines += widened_lines(result)
     name = result.case.name
     _print_lines(console, [f"{name}, {line}" for line in lines], name)
 

@@ -8,14 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck.suite import words
 from crosscheck.suite.effects import (
     LOADS,
     Counterpart,
     EffectCase,
     EffectResult,
     _number,
+    against_line,
     effect_cases,
+    effect_cells,
+    effects_line,
     shipped_effect_cases,
 )
 from crosscheck.suite.outcome import Outcome
@@ -47,11 +49,11 @@ def test_sag_is_run_where_it_is_large_and_tensions_go_with_the_weight(good):
     assert good.tension_limit == pytest.approx(1e-6)
     heavy = replace(good, case=last)
     assert heavy.tension_limit == pytest.approx(1e-6 * 91.058 / 0.4)
-    line = words.effects_line([good, good, heavy])
+    line = effects_line([good, good, heavy])
     assert "on 1 robot, cable_weight on cogiro_large against" in line
     bad = replace(good, position_m=np.array([1.0, 1.0]))
-    assert ": 1 of 2 cases does not agree: " in words.effects_line([good, bad])
-    assert ": 2 of 2 cases do not agree: " in words.effects_line([bad, bad])
+    assert ": 1 of 2 cases does not agree: " in effects_line([good, bad])
+    assert ": 2 of 2 cases do not agree: " in effects_line([bad, bad])
 
 
 def test_the_seed_draws_the_size():
@@ -82,12 +84,12 @@ def test_results_and_summary_say_what_stood_against_an_effect(good):
     assert good.as_json()["against"] is Counterpart.OURS
     assert good.as_json()["poses"] == {"total": 2, "unsolved": 0}
     other = replace(good, case=EffectCase(PARALLEL, "pulley_radius"))
-    line = words.against_line([good, other])
+    line = against_line([good, other])
     assert line == (
         "Checked against our own mathematics, written a second time: backlash. "
         "Checked against MuJoCo's own means: pulley_radius."
     )
-    assert words.effect_cells(other)[-1] == "MuJoCo's own means"
+    assert effect_cells(other)[-1] == "MuJoCo's own means"
 
 
 @pytest.mark.parametrize(

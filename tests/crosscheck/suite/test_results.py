@@ -13,12 +13,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from crosscheck.suite import words
 from crosscheck.suite.cases import Case
 from crosscheck.suite.junit import junit_xml
 from crosscheck.suite.poses import demobot_sweep
-from crosscheck.suite.results import CaseResult
-from crosscheck.suite.run import Run, results_json, run_case
+from crosscheck.suite.results import CaseResult, remarks
+from crosscheck.suite.run import Run, results_json, run_case, verdict_line
 from crosscheck.suite.summary import summary_md
 from crosscheck.suite.thresholds import load_thresholds
 from crosscheck.suite.verdicts import PoseFinding, Verdict
@@ -108,7 +107,7 @@ def test_json_says_null_where_there_is_no_number(good):
 def test_a_run_shows_itself_and_has_a_row_per_pose(good):
     run = run_of(good, failed(good, "bad"))
     lines = str(run).splitlines()
-    assert lines[0] == words.verdict_line(run)
+    assert lines[0] == verdict_line(run)
     assert lines[1] == "bad, pose 1, commanded (0.4 0.25 0.1; 1 0 0 0): a <millimetre> apart"
     assert "a &lt;millimetre&gt; apart" in run._repr_html_()
     frame = run.to_frame()
@@ -159,11 +158,11 @@ def test_summary_is_a_table_with_failures_below(good):
 
 
 def test_verdict_line_names_the_worst_difference(good):
-    line = words.verdict_line(run_of(good, failed(good)))
+    line = verdict_line(run_of(good, failed(good)))
     assert "worst difference 1.00e-03 m (position), 1e+05 times the allowed one" in line
     assert line.endswith("at pose 1.")
     everything = replace(good, verdict=np.full(3, Verdict.NEUTRAL, dtype=object))
-    line = words.verdict_line(run_of(everything))
+    line = verdict_line(run_of(everything))
     assert "agree at 0 of 3 poses of 1 case (3 findings); no pose could be compared" in line
 
 
@@ -210,7 +209,7 @@ def test_widened_thresholds_are_told(good):
     run = run_of(replace(good, allowance=allowance))
     assert "allowed 1.0e-06 m (position after plain settling)" in summary_md(run, "")
     assert "3.0e-05 m (position)" in summary_md(run, "")
-    assert "1 widened" in words.remarks(run.results[0])
+    assert "1 widened" in remarks(run.results[0])
 
 
 def test_worst_pose_opens_in_mujoco_at_rest(good, tmp_path):

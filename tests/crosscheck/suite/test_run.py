@@ -14,7 +14,7 @@ import pytest
 import seecr
 from crosscheck.errors import CrosscheckError
 from crosscheck.settle.settler import Settling, SettlingBatch
-from crosscheck.suite import agreement, verdicts, words
+from crosscheck.suite import agreement, verdicts
 from crosscheck.suite import run as suite
 from crosscheck.suite.cases import (
     Case,
@@ -25,7 +25,7 @@ from crosscheck.suite.cases import (
 from crosscheck.suite.mujoco_robot import MujocoRobot, screw_motion
 from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.poses import demobot_random, demobot_sweep, robot_random, robot_sweep
-from crosscheck.suite.results import CaseResult, worst_of
+from crosscheck.suite.results import CaseResult, failure_lines, finding_lines, remarks, worst_of
 from crosscheck.suite.run import run_case, run_suite
 from crosscheck.suite.thresholds import SHIPPED, FindingLimits, load_thresholds, thresholds_toml
 from crosscheck.suite.verdicts import Verdict
@@ -167,8 +167,8 @@ def test_the_other_rest_of_a_tilted_command_does_not_pass(shipped, cable, side, 
     result = run_case(case, load_thresholds())
     assert list(result.verdict) == [Verdict.BRANCH] * 2
     assert result.outcome is Outcome.DIFFER
-    assert words.remarks(result) == "2 two equilibria (2 beyond limits)"
-    assert ", started at (0.4 0.25 0.15; 1 0 0 0): two stable" in words.failures(result)[1]
+    assert remarks(result) == "2 two equilibria (2 beyond limits)"
+    assert ", started at (0.4 0.25 0.15; 1 0 0 0): two stable" in failure_lines(result)[1]
 
 
 @pytest.mark.slow
@@ -585,10 +585,10 @@ def test_a_finding_beyond_the_limits_fails_its_case():
     result = run_case(case_of(PARALLEL, CORNER), load_thresholds())
     assert list(result.verdict) == [Verdict.NEUTRAL]
     assert result.outcome is Outcome.DIFFER
-    assert words.remarks(result) == "1 free to move (1 beyond limits)"
-    (line,) = words.failures(result)
+    assert remarks(result) == "1 free to move (1 beyond limits)"
+    (line,) = failure_lines(result)
     assert line.endswith("(beyond the limits in thresholds.toml)")
-    assert words.findings(result) == []
+    assert finding_lines(result) == []
 
 
 # --- running -------------------------------------------------------------------------------

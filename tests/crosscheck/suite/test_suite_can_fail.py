@@ -19,13 +19,13 @@ from crosscheck.settle.physics import Physics
 from crosscheck.settle.settler import Settling
 from crosscheck.suite import effects as effects_suite
 from crosscheck.suite import run as suite
-from crosscheck.suite import verdicts, words
+from crosscheck.suite import verdicts
 from crosscheck.suite.cases import Case, shipped_cases
 from crosscheck.suite.effects import EffectCase, run_effect
 from crosscheck.suite.junit import junit_xml
 from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.outcome import Outcome
-from crosscheck.suite.run import Run, run_suite
+from crosscheck.suite.run import Run, run_suite, verdict_line
 from crosscheck.suite.thresholds import load_thresholds
 from seecr.compiled import columns
 from seecr.description.shipped import model_path
@@ -367,7 +367,7 @@ def test_a_planted_error_makes_the_suite_fail_and_name_the_case(fault, monkeypat
     tests = ET.fromstring(junit_xml(run)).iter("testcase")
     red = {test.get("name") for test in tests if {part.tag for part in test} & {"failure", "error"}}
     assert fault.case in red
-    assert sorted(red)[0] in words.verdict_line(run)
+    assert sorted(red)[0] in verdict_line(run)
 
 
 def test_another_equilibrium_is_no_error_of_either_physics(monkeypatch):
@@ -437,4 +437,4 @@ def test_a_planted_error_of_an_effect_is_named(name, monkeypatch):
     assert result.outcome is Outcome.DIFFER
     run = Run([], THRESHOLDS, seed=0, jobs=1, wall_s=0.0, effects=[result])
     assert run.outcome.exit_status == 1
-    assert case.name in words.verdict_line(run)
+    assert case.name in verdict_line(run)
