@@ -35,7 +35,6 @@ if TYPE_CHECKING:
         parameter,
     )
     from seecr.effects.setup import Setup
-    from seecr.equilibrium.following import Jump
     from seecr.equilibrium.multiple import equilibria
     from seecr.equilibrium.passes import Barrier, barriers
     from seecr.equilibrium.solving import solve
@@ -55,7 +54,7 @@ if TYPE_CHECKING:
     from seecr.prediction.sensed import placed, tracked
     from seecr.prediction.sensitivity import sensitivities
     from seecr.prediction.uncertainty import Spread, spread_of
-    from seecr.statics.solution import Solution, Status
+    from seecr.statics.solution import Jump, Solution, Status
     from seecr.workspace.bars import BarBalance, BarManifold, bar_balances, bar_manifold
     from seecr.workspace.chances import held_chance, kept_chance
     from seecr.workspace.edges import boundary
@@ -83,7 +82,6 @@ _MODULES = {
     ),
     "prediction.experiment": ("Experiment", "Prediction", "predict"),
     "exported.export": ("Export", "export"),
-    "equilibrium.following": ("Jump",),
     "commands.loads": ("Loads",),
     "inverse.correction": ("Correction", "correct"),
     "workspace.edges": ("boundary",),
@@ -97,7 +95,7 @@ _MODULES = {
     "prediction.sensed": ("placed", "tracked"),
     "prediction.sensitivity": ("sensitivities",),
     "effects.setup": ("Setup",),
-    "statics.solution": ("Solution", "Status"),
+    "statics.solution": ("Jump", "Solution", "Status"),
     "description.shipped": ("model_names", "model_path"),
     "prediction.uncertainty": ("Spread", "spread_of"),
     "workspace.bars": ("BarBalance", "BarManifold", "bar_balances", "bar_manifold"),

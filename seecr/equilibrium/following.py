@@ -9,7 +9,7 @@ platform moves far however small the step is, that is a jump.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,16 +22,14 @@ from seecr.compiled.outcomes import CONVERGED, SINGULAR
 from seecr.description.robot import Robot
 from seecr.effects.setup import Setup
 from seecr.equilibrium.coordinates import evaluated, moved, step_between
-from seecr.pose import Array, pose_difference
-from seecr.result import COORDINATES, Record, Result, named
+from seecr.pose import Array
 from seecr.statics import batch
 from seecr.statics.batch import under_moment
-from seecr.statics.solution import Solution, certify
+from seecr.statics.solution import Jump, Solution, certify
 from seecr.statics.starts import start_of
 from seecr.statics.tables import Tables, assemble, take
-from seecr.units import joules, millimetres
 
-__all__ = ["Jump", "follow_commands", "moved", "step_between"]
+__all__ = ["follow_commands", "moved", "step_between"]
 
 # Largest motion of the command between two waypoints, as a part of the robot's length.
 _WAY = 0.05
@@ -52,68 +50,6 @@ _FLAT, _TOUCH = 1e-10, 1e-3
 
 SetupOf = Callable[[Commands, NDArray[np.integer]], Setup]
 """Function of N waypoints and the row (N,) that each belongs to; returns their setup."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Jump(Result):
-    """A point on the commanded path where the equilibrium that was followed ceases to exist.
-
-    Attributes:
-        command: (7,) commanded pose at that point.
-        before: (7,) last pose of the equilibrium that was followed.
-        after: (7,) pose where the platform comes to rest afterwards; NaN if nothing holds it.
-        energy: [J] released by the jump; infinite if nothing holds the platform, NaN if there is no
-            potential energy.
-        certain: whether the platform lands there with rotations damped a tenth, once and ten times
-            as much as translations, over the robot's length. Inertia is not considered.
-    """
-
-    command: Array
-    before: Array
-    after: Array
-    energy: float
-    certain: bool
-
-    @property
-    def size(self) -> Array:
-        """(6,) [m, rad] displacement and rotation vector from ``before`` to ``after``."""
-        return pose_difference(self.after, self.before)
-
-    def as_json(self) -> Record:
-        """One entry of a row's ``jumps`` in ``sweep.json``."""
-        return {
-            "command": self.command,
-            "before": self.before,
-            "after": self.after,
-            "energy_J": self.energy,
-            "certain": self.certain,
-        }
-
-    @property
-    def words(self) -> str:
-        """A sentence: how far the platform jumps and how much energy that releases."""
-        if not np.isfinite(self.after).all():
-            return "its equilibrium ends, and nothing holds it after that"
-        moved, turned = np.linalg.norm(self.size[:3]), np.linalg.norm(self.size[3:])
-        free = f", releasing {joules(self.energy)}" if np.isfinite(self.energy) else ""
-        sure = "" if self.certain else "; where it lands depends on damping"
-        return (
-            f"its equilibrium ends and it jumps by {millimetres(moved)} and "
-            f"{np.degrees(turned):.4g} deg{free}{sure}"
-        )
-
-    def lines(self) -> list[str]:
-        """One line: the commanded position and ``words``."""
-        place = ", ".join(f"{value:.4g}" for value in self.command[:3])
-        return [f"at command ({place}) m: {self.words}"]
-
-    def records(self) -> Sequence[Record]:
-        """One row: the command, the pose before and after, and the energy released."""
-        poses = (("command_{}", self.command), ("before_{}", self.before), ("after_{}", self.after))
-        record: Record = {}
-        for pattern, pose in poses:
-            record |= named(pattern, COORDINATES, pose)
-        return [{**record, "energy_J": float(self.energy), "certain": self.certain}]
 
 
 def follow_commands(robot: Robot, commands: Commands, setup_of: SetupOf) -> Solution:

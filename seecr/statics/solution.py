@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,7 +27,7 @@ from seecr.counted import between, counted, rows_words
 from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.parallel import in_parts
-from seecr.pose import Array
+from seecr.pose import Array, pose_difference
 from seecr.pose_rows import rotation_vectors
 from seecr.result import COORDINATES, Record, Result, named, rows_of
 from seecr.statics import batch
@@ -34,10 +35,7 @@ from seecr.statics.inertia import mass_matrices
 from seecr.statics.spans import spanless
 from seecr.statics.starts import start_of
 from seecr.statics.tables import Tables, take
-from seecr.units import millimetres
-
-if TYPE_CHECKING:
-    from seecr.equilibrium.following import Jump
+from seecr.units import joules, millimetres
 
 
 class Status(Enum):
@@ -77,6 +75,68 @@ _PER_ROW = (
 _NO_FREQUENCY = 1e-12
 # Errors [mm, deg] that differ by less than this, or by this part of them, are alike.
 _ALIKE = 1e-9
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Jump(Result):
+    """A point on the commanded path where the equilibrium that was followed ceases to exist.
+
+    Attributes:
+        command: (7,) commanded pose at that point.
+        before: (7,) last pose of the equilibrium that was followed.
+        after: (7,) pose where the platform comes to rest afterwards; NaN if nothing holds it.
+        energy: [J] released by the jump; infinite if nothing holds the platform, NaN if there is no
+            potential energy.
+        certain: whether the platform lands there with rotations damped a tenth, once and ten times
+            as much as translations, over the robot's length. Inertia is not considered.
+    """
+
+    command: Array
+    before: Array
+    after: Array
+    energy: float
+    certain: bool
+
+    @property
+    def size(self) -> Array:
+        """(6,) [m, rad] displacement and rotation vector from ``before`` to ``after``."""
+        return pose_difference(self.after, self.before)
+
+    def as_json(self) -> Record:
+        """One entry of a row's ``jumps`` in ``sweep.json``."""
+        return {
+            "command": self.command,
+            "before": self.before,
+            "after": self.after,
+            "energy_J": self.energy,
+            "certain": self.certain,
+        }
+
+    @property
+    def words(self) -> str:
+        """A sentence: how far the platform jumps and how much energy that releases."""
+        if not np.isfinite(self.after).all():
+            return "its equilibrium ends, and nothing holds it after that"
+        moved, turned = np.linalg.norm(self.size[:3]), np.linalg.norm(self.size[3:])
+        free = f", releasing {joules(self.energy)}" if np.isfinite(self.energy) else ""
+        sure = "" if self.certain else "; where it lands depends on damping"
+        return (
+            f"its equilibrium ends and it jumps by {millimetres(moved)} and "
+            f"{np.degrees(turned):.4g} deg{free}{sure}"
+        )
+
+    def lines(self) -> list[str]:
+        """One line: the commanded position and ``words``."""
+        place = ", ".join(f"{value:.4g}" for value in self.command[:3])
+        return [f"at command ({place}) m: {self.words}"]
+
+    def records(self) -> Sequence[Record]:
+        """One row: the command, the pose before and after, and the energy released."""
+        poses = (("command_{}", self.command), ("before_{}", self.before), ("after_{}", self.after))
+        record: Record = {}
+        for pattern, pose in poses:
+            record |= named(pattern, COORDINATES, pose)
+        return [{**record, "energy_J": float(self.energy), "certain": self.certain}]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

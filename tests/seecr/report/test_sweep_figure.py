@@ -18,11 +18,10 @@ from slab import slides
 from seecr.cli import main
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
-from seecr.equilibrium.following import Jump
 from seecr.equilibrium.solving import solve
 from seecr.prediction.uncertainty import Spread, spread_of
 from seecr.report.sweep_panels import sweep_figure
-from seecr.statics.solution import Solution
+from seecr.statics.solution import Jump, Solution
 from seecr.workspace.bars import bar_manifold
 from seecr.workspace.midlines import midline_points
 from seecr.workspace.spans import slack_spans
