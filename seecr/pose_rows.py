@@ -27,9 +27,9 @@ __all__ = [
 @cache
 def _compiled() -> ModuleType:
     """Loaded when it is first used: effects, which use it, are listed without Numba."""
-    from seecr.compiled import turns
+    from seecr.compiled import algebra
 
-    return turns
+    return algebra
 
 
 def products(a: Array, b: Array) -> Array:

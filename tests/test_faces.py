@@ -140,7 +140,7 @@ TRADE = {
     "seecr.equilibrium.strained": {"strained", "strained_rows"},
     "seecr.equilibrium.multiple": {"elsewhere", "on_their_way"},
     # processes
-    "seecr.compiled.telling": {"tell_compiling"},
+    "seecr.compiled.compile_notice": {"tell_compiling"},
     "seecr.parallel": {"processors"},
 }
 

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 import click
 
 from seecr import SeecrError, __version__
-from seecr.compiled.telling import tell_compiling
+from seecr.compiled.compile_notice import tell_compiling
 
 CommandTable: TypeAlias = Mapping[str, tuple[str, str]]
 

@@ -3,7 +3,7 @@
 A run starts at the robot's reference pose (or at its first row, if the commands say so) and goes
 straight to its first row and from row to row, in the platform's degrees of freedom. Loads change at
 the row before, ahead of the motion. Effects with history depend on this path (see
-:mod:`seecr.compiled.walk` and :func:`seecr.commands.data.play`).
+:mod:`seecr.compiled.history` and :func:`seecr.commands.data.play`).
 """
 
 from __future__ import annotations

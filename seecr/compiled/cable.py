@@ -11,8 +11,18 @@ import math
 import numpy as np
 
 from seecr.compiled.algebra import next_within, solve_3x3
-from seecr.compiled.bracketed import guess_by_brackets
-from seecr.compiled.catenary import catenary_energy, solve_catenary
+from seecr.compiled.cable_law import (
+    along,
+    length_in_plane,
+    lift_slope,
+    lowered,
+    pulley_geometry,
+    soften,
+    straight_law,
+    strain_of_tension,
+    winch_tension,
+)
+from seecr.compiled.catenary import catenary_energy, guess_by_brackets, solve_catenary
 from seecr.compiled.columns import (
     ENERGY,
     GAP,
@@ -27,9 +37,6 @@ from seecr.compiled.columns import (
     WINCH_TENSION,
 )
 from seecr.compiled.jit import jit, jit_inner, jit_merged, jit_pasted
-from seecr.compiled.law import straight_law, strain_of_tension, winch_tension
-from seecr.compiled.pulley import length_in_plane, pulley_geometry
-from seecr.compiled.yielding import along, lift_slope, lowered, soften
 
 # Most Newton steps for the lift of an exit point, of which two or three suffice where a cable stays
 # taut; errors [of the rest length] at which they end, and of a lift that was found.

@@ -1,4 +1,4 @@
-"""Columns and entries of the compiled tables: of a cable, of its state, of a load."""
+"""Columns and entries of the compiled tables, and how a descent ends."""
 
 from __future__ import annotations
 
@@ -41,3 +41,17 @@ N_RATES = 22
 # Entries of the load of a pose.
 FORCE_OF_WEIGHT, CENTRE_OF_MASS, EXTERNAL_FORCE, EXTERNAL_MOMENT, UP = 0, 3, 6, 9, 12
 N_LOAD = 15
+
+
+# How a descent ends, and the limits that decide it.
+
+# seecr/statics/solution.py turns them into sentences.
+CONVERGED, UNSTABLE, SINGULAR, STALLED, FALLING, CABLE_LAW, ITERATIONS, SPINNING = range(8)
+NO_LENGTH = 8
+
+# A stiffness below this part of the largest diagonal entry counts as zero.
+SINGULAR_PART = 1e-11
+# A tension below this part of the load is rounding.
+IDLE = 1e-11
+# Largest residual of an equilibrium, relative to the load.
+TOLERANCE = 1e-9

@@ -6,7 +6,7 @@ enter the equations multiplied by the robot's length, so that all components of 
 newtons and all steps are metres.
 
 The coordinates of a free platform are (translation, rotation vector), both in the base frame. For a
-platform on joints see :mod:`seecr.compiled.joints`.
+platform on joints see :mod:`seecr.compiled.joint_kinematics`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,9 @@ import math
 
 import numpy as np
 
+from seecr.compiled.algebra import rotated_less
 from seecr.compiled.cable import cable_pull
+from seecr.compiled.cable_law import is_linear
 from seecr.compiled.columns import (
     ANCHOR,
     CENTRE_OF_MASS,
@@ -42,9 +44,13 @@ from seecr.compiled.columns import (
     WINCH_TENSION,
 )
 from seecr.compiled.jit import jit, jit_allocating, jit_inner, jit_pasted
-from seecr.compiled.joints import N_CURRENT, VALUE, joint_columns, onto_joints, place_joints
-from seecr.compiled.law import is_linear
-from seecr.compiled.rotation import rotated_less
+from seecr.compiled.joint_kinematics import (
+    N_CURRENT,
+    VALUE,
+    joint_columns,
+    onto_joints,
+    place_joints,
+)
 
 # Columns of what is constant while the platform moves (see prepare), one row per cable and one for
 # the load: arm of the anchor point and the point itself at the commanded pose, its distance to the

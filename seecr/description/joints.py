@@ -33,8 +33,10 @@ def pose_of_values(robot: Robot, values: Array) -> tuple[Array, Array]:
     A joint is a row of kind (0 slide, 1 hinge), axis and point in the base frame. The first joint
     is the outermost, as in MJCF (product of exponentials from the reference pose).
     """
-    from seecr.compiled.joints import N_CURRENT  # takes a while to import
-    from seecr.compiled.reaching import place_home_batch
+    from seecr.compiled.joint_kinematics import (
+        N_CURRENT,  # takes a while to import
+        place_home_batch,
+    )
 
     values = np.array(np.atleast_2d(values), float, order="C")
     poses = np.empty((len(values), 7))
@@ -130,8 +132,11 @@ def _in_closed_form(robot: Robot, poses: Array) -> tuple[Array, Array, Array, Ar
 
     The distance is in robot's lengths or rad, and infinite where there is no closed form.
     """
-    from seecr.compiled.joints import N_CURRENT  # takes a while to import
-    from seecr.compiled.reaching import N_SCRATCH, reach_batch
+    from seecr.compiled.joint_kinematics import (
+        N_CURRENT,  # takes a while to import
+        N_SCRATCH,
+        reach_batch,
+    )
 
     home = _home_screws(robot)
     n, d = len(poses), len(home)

@@ -260,7 +260,7 @@ class Setup:
 def _straight_lengths(
     robot: Robot, poses: Array, anchors: Array, exits: Array, radii: Array
 ) -> Array:
-    from seecr.compiled.pulley import lengths_at  # takes a while to import
+    from seecr.compiled.cable_law import lengths_at  # takes a while to import
 
     out = np.empty((len(poses), robot.n_cables))
     lengths_at(poses, anchors, exits, radii, robot.up, out)

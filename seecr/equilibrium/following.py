@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from seecr.commands.data import Commands
 from seecr.commands.path import Path, waypoints_of
-from seecr.compiled.outcomes import CONVERGED, SINGULAR
+from seecr.compiled.columns import CONVERGED, SINGULAR
 from seecr.description.robot import Robot
 from seecr.effects.setup import Setup
 from seecr.equilibrium.coordinates import evaluated, moved, step_between

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seecr.compiled.columns import EXTERNAL_MOMENT
-from seecr.compiled.outcomes import TOLERANCE
+from seecr.compiled.columns import EXTERNAL_MOMENT, TOLERANCE
 from seecr.equilibrium.coordinates import evaluated, moved, step_between
 from seecr.equilibrium.following import apart_from, rest_below
 from seecr.equilibrium.strings import SOFTEST, strings

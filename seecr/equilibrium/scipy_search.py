@@ -7,8 +7,15 @@ import warnings
 import numpy as np
 from scipy import optimize
 
-from seecr.compiled.columns import ANCHOR
-from seecr.compiled.outcomes import CONVERGED, SINGULAR, SINGULAR_PART, STALLED, TOLERANCE, UNSTABLE
+from seecr.compiled.columns import (
+    ANCHOR,
+    CONVERGED,
+    SINGULAR,
+    SINGULAR_PART,
+    STALLED,
+    TOLERANCE,
+    UNSTABLE,
+)
 from seecr.effects.setup import Setup
 from seecr.pose import Array, quat_from_rotvec, quat_multiply, transform_points
 from seecr.statics import batch

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seecr.commands.data import Commands
+from seecr.compiled.cable_law import LEAST
 from seecr.compiled.columns import CUBIC, FORCE_OF_WEIGHT, QUADRATIC, STRAIN, UP
-from seecr.compiled.law import LEAST
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects import Effect

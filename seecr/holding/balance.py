@@ -224,7 +224,7 @@ def straight_balance(tables: Tables, rows: NDArray[np.intp], away: Array) -> tup
     tables that are :func:`is_straight`: the pulls' directions follow from the poses alone, without
     rest lengths and tensions, ten times as fast.
     """
-    from seecr.compiled.straight import straight_balance_batch  # takes a while to import
+    from seecr.compiled.orientation import straight_balance_batch  # takes a while to import
 
     (m, d), k = (tables.cables.shape[1], tables.n_dof), len(rows)
     matrices, loads = np.empty((k, d, m)), np.empty((k, d))

@@ -89,7 +89,7 @@ def distribute(
     Returns:
         (n, m) [N], and (n,) whether they balance; otherwise they come near to balance.
     """
-    from seecr.compiled.projection import FOUND, UNDECIDED, project_batch  # slow to import
+    from seecr.compiled.tensions import FOUND, UNDECIDED, project_batch  # slow to import
 
     n, _, m = matrices.shape
     rows = [np.array(np.broadcast_to(one, (n, m)), order="C") for one in (aim, low, high)]
@@ -118,7 +118,7 @@ def nearly_balanced(matrices: Array, loads: Array, low: Array, high: Array) -> A
     Args:
         matrices: (n, d, m) with m < d. loads: (n, d).
     """
-    from seecr.compiled.projection import nearest_batch  # slow to import
+    from seecr.compiled.tensions import nearest_batch  # slow to import
 
     n, _, m = matrices.shape
     tensions = np.empty((n, m))

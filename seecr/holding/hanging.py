@@ -73,7 +73,7 @@ def rest_after(tables: Tables, rest: Array, tensions: Array) -> Array:
     """
     if not tables.cables[..., FRICTION].any():
         return rest
-    from seecr.compiled.lengthening import stretched_lengths  # takes a while to import
+    from seecr.compiled.rates import stretched_lengths  # takes a while to import
 
     spans, there = np.empty_like(rest), tables.cables.copy()
     there[..., REST] = rest
@@ -88,7 +88,7 @@ def rest_after(tables: Tables, rest: Array, tensions: Array) -> Array:
 
 def _straight_rest(tables: Tables, spans: Array, tensions: Array, follows: bool = False) -> Array:
     """(n, m) [m] rest lengths with which straight cables over these spans have these tensions."""
-    from seecr.compiled.lengthening import rest_lengths_for  # takes a while to import
+    from seecr.compiled.rates import rest_lengths_for  # takes a while to import
 
     out, pulls = np.empty_like(spans), np.array(tensions, order="C")
 

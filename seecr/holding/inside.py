@@ -383,7 +383,7 @@ def can_balance(
 
 def _decided(matrices: Array, loads: Array, low: Array, high: Array, scale: Array) -> Array:
     """(n,) positive where tensions balance, to rounding; NaN where W is singular or too narrow."""
-    from seecr.compiled.feasible import MOST, feasible_of  # takes a while to import
+    from seecr.compiled.tensions import MOST, feasible_of  # takes a while to import
 
     room, spare = _BALANCED * scale, matrices.shape[2] - matrices.shape[1]
     if not 0 <= spare <= MOST:
@@ -419,7 +419,7 @@ def _innermost(
     matrices: Array, loads: Array, low: Array, high: Array, scale: Array
 ) -> tuple[Array, Array]:
     """The same; NaN where W is singular or there are too few cables."""
-    from seecr.compiled.margin import innermost_of  # takes a while to import
+    from seecr.compiled.tensions import innermost_of  # takes a while to import
 
     n = len(matrices)
     margins, tensions = np.full(n, np.nan), np.full(low.shape, np.nan)

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.compiled.columns import TENSION
-from seecr.compiled.outcomes import TOLERANCE
+from seecr.compiled.columns import TENSION, TOLERANCE
 from seecr.holding.balance import (
     Rates,
     bends,

@@ -138,7 +138,7 @@ def _least_beyond(
     """How the search ended; (m,) [N] tensions above the upper or below the lower limits, or NaN."""
     d, m = matrix.shape
     if 0 <= m - d <= _SPARE:
-        from seecr.compiled.beyond import least_beyond  # takes a while to import
+        from seecr.compiled.tensions import least_beyond  # takes a while to import
 
         pulls, rows = np.empty(m), [np.array(one, order="C") for one in (matrix, load, low, high)]
         if least_beyond(*rows, pulls):

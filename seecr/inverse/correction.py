@@ -483,7 +483,7 @@ class _Search:
 
 def _tensions_at(strain: float, tables: Tables) -> Array:
     """(m,) [N] tensions that strain no cable by more, in any row; infinite without rows."""
-    from seecr.compiled.lengthening import tensions_at_strain  # takes a while to import
+    from seecr.compiled.rates import tensions_at_strain  # takes a while to import
 
     out = np.empty(tables.cables.shape[:2])
     tensions_at_strain(tables.cables, strain, out)

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from seecr.commands.data import Commands
 from seecr.commands.path import Path, waypoints_of
-from seecr.compiled.columns import STRAIN, TENSION
-from seecr.compiled.outcomes import CONVERGED, ITERATIONS, SINGULAR, STALLED
+from seecr.compiled.columns import CONVERGED, ITERATIONS, SINGULAR, STALLED, STRAIN, TENSION
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect, Readings

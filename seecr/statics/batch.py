@@ -10,33 +10,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.commands.path import Path
-from seecr.compiled.change import change_at_rest, change_of_each_cable
 from seecr.compiled.columns import (
+    CABLE_LAW,
+    CONVERGED,
     CREEP_PART,
     EA,
     EXTERNAL_MOMENT,
     GAP,
-    N_RATES,
-    N_STATE,
-    RADIUS,
-    REST,
-    SLACK,
-    TENSION,
-)
-from seecr.compiled.descent import FINE, STIFF, solve_batch
-from seecr.compiled.joints import N_CURRENT, place_batch
-from seecr.compiled.outcomes import (
-    CABLE_LAW,
-    CONVERGED,
     IDLE,
     ITERATIONS,
+    N_RATES,
+    N_STATE,
     NO_LENGTH,
+    RADIUS,
+    REST,
     SINGULAR,
+    SLACK,
     STALLED,
+    TENSION,
     TOLERANCE,
 )
+from seecr.compiled.history import change_on_the_way, walk_in_order
+from seecr.compiled.joint_kinematics import N_CURRENT, place_batch
+from seecr.compiled.newton import FINE, STIFF, solve_batch
 from seecr.compiled.platform import add_skew, evaluate_batch
-from seecr.compiled.walk import change_on_the_way, walk_in_order
+from seecr.compiled.rates import change_at_rest, change_of_each_cable
 from seecr.parallel import in_parts, run_parts
 from seecr.pose import Array, quat_conjugate
 from seecr.pose_rows import deviated, products
@@ -163,7 +161,7 @@ def motions(tables: Tables, at: Evaluation) -> Array:
     n = len(tables)
     if tables.screws.shape[1] == 0:
         return np.broadcast_to(np.eye(6), (n, 6, 6))
-    from seecr.compiled.apart import apart_batch  # takes a while to import
+    from seecr.compiled.joint_kinematics import apart_batch  # takes a while to import
 
     apart, out, rows = np.empty((n, 6)), np.empty((n, tables.n_dof, 6)), np.arange(n)
 
@@ -337,7 +335,7 @@ def pull_and_change(tables: Tables, at: Evaluation) -> tuple[Evaluation, Array, 
         gradient, residual, tensions and catenaries, without a stiffness; and the derivatives [N/m]
         of the gradient, (n, d, m), and of each cable's own tension, (n, m).
     """
-    from seecr.compiled import lengthening  # takes a while to import
+    from seecr.compiled import rates  # takes a while to import
 
     (n, m), d = tables.cables.shape[:2], tables.n_dof
     out, pulls = Evaluation.at_commands(tables), np.empty((n, m))
@@ -345,7 +343,7 @@ def pull_and_change(tables: Tables, at: Evaluation) -> tuple[Evaluation, Array, 
     gradient, tension = np.empty((n, m, d)), np.empty((n, m))
 
     def run(part: slice) -> None:
-        lengthening.pull_and_change(
+        rates.pull_and_change(
             tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
             out.deviation[part], out.values[part], tables.length, out.guess[part],
             out.gradient[part], pulls[part], gradient[part], tension[part],

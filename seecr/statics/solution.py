@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seecr.compiled.columns import REST, TENSION
-from seecr.compiled.outcomes import (
+from seecr.compiled.columns import (
     CABLE_LAW,
     CONVERGED,
     FALLING,
     ITERATIONS,
+    REST,
     SINGULAR,
     SPINNING,
     STALLED,
+    TENSION,
     TOLERANCE,
     UNSTABLE,
 )
@@ -271,7 +272,7 @@ class Solution(Result):
     @cached_property
     def _softest(self) -> tuple[Array, Array]:
         """Smallest eigenvalue of the scaled stiffness (n,), and the motion (n, 6) [m] along it."""
-        from seecr.compiled.softest import softest_batch, softest_motions  # take a while to import
+        from seecr.compiled.algebra import softest_batch, softest_motions  # take a while to import
 
         hessian = self._softer_side.hessian
         values, directions = np.empty(len(hessian)), np.empty((len(hessian), 6))

@@ -149,7 +149,7 @@ def tension_margin(
     Raises:
         InputError, InputFileError: as for :func:`feasible`.
     """
-    from seecr.compiled.margin import margins_at  # takes a while to import
+    from seecr.compiled.tensions import margins_at  # takes a while to import
 
     robot = robot_of(robot)
     places = commanded_poses(poses)
@@ -237,7 +237,7 @@ def margins_from(matrices: Array, loads: Array, low: Array, high: Array, scale: 
         low, high: (m,) [N].
         scale: [N] load that rounding is measured against.
     """
-    from seecr.compiled.margin import margins_of  # takes a while to import
+    from seecr.compiled.tensions import margins_of  # takes a while to import
 
     matrices, out = np.ascontiguousarray(matrices), np.full(len(matrices), np.nan)
     if matrices.shape[2] >= matrices.shape[1]:
@@ -274,7 +274,7 @@ def _by_rank(matrices: Array, loads: Array, low: Array, high: Array, scale: floa
     Minus infinity if the load is outside that range, or if numbers are not finite because a cable's
     equations have no solution.
     """
-    from seecr.compiled.margin import margins_of  # takes a while to import
+    from seecr.compiled.tensions import margins_of  # takes a while to import
 
     out = np.full(len(matrices), -np.inf)
     sound = np.isfinite(matrices).all(axis=(1, 2)) & np.isfinite(loads).all(axis=(1, 2))

@@ -9,6 +9,7 @@ import numpy as np
 
 from seecr.compiled import columns
 from seecr.compiled.cable import cable_pull
+from seecr.compiled.cable_law import geometric_length
 from seecr.compiled.columns import (
     EA,
     GAP,
@@ -19,7 +20,6 @@ from seecr.compiled.columns import (
     TENSION,
 )
 from seecr.compiled.platform import N_WORK
-from seecr.compiled.pulley import geometric_length
 
 UP = np.array([0.0, 0.0, 1.0])
 

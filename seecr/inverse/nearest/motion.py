@@ -144,7 +144,7 @@ class PlatformMotion:
 
     def _apart_and_columns(self, away: Array, rows: Rows) -> tuple[Array, Array]:
         """(k, 6) [m] from the wanted poses, and (k, d, 6) motion per step of each joint."""
-        from seecr.compiled.apart import apart_batch  # takes a while to import
+        from seecr.compiled.joint_kinematics import apart_batch  # takes a while to import
 
         k, d = away.shape
         apart, columns = np.empty((k, 6)), np.empty((k, d, 6))
@@ -161,7 +161,7 @@ class PlatformMotion:
 
     def _brought(self, away: Array, rows: Rows, places: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Displacements (k, d) with origins at places (k, 3) [m], and whether they are there."""
-        from seecr.compiled.placing import bring_batch  # takes a while to import
+        from seecr.compiled.joint_kinematics import bring_batch  # takes a while to import
 
         out, there = np.array(away, order="C"), np.empty(len(rows), dtype=np.bool_)
         of, to = np.ascontiguousarray(rows), np.ascontiguousarray(places)

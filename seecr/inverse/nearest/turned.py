@@ -2,7 +2,7 @@
 
 The orientation that holds changes little from one position to the next. So searches from many
 orientations are made for a few positions, and the others start from their neighbours' results.
-What is found is in balance with straight cables; see :mod:`seecr.compiled.turning`.
+What is found is in balance with straight cables; see :mod:`seecr.compiled.orientation`.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class Turned:
         Args:
             farther: try all starts, and turn on to where tensions are farther inside.
         """
-        from seecr.compiled.turning import turn_batch  # takes a while to import
+        from seecr.compiled.orientation import turn_batch  # takes a while to import
 
         tables, part = self.tables, [self.deviation[rows], self.values[rows], self.margins[rows]]
         given = (

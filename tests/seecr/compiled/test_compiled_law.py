@@ -11,8 +11,8 @@ from one_cable import cable, in_direction, pull
 from scipy.integrate import quad
 from scipy.optimize import brentq, root
 
-from seecr.compiled.bracketed import bracketed_pull
-from seecr.compiled.catenary import catenary_span
+from seecr.compiled.cable_law import dahl, pulley_geometry, strain_of_tension, winch_tension
+from seecr.compiled.catenary import bracketed_pull, catenary_span
 from seecr.compiled.columns import (
     CREEP,
     EA,
@@ -24,8 +24,6 @@ from seecr.compiled.columns import (
     STRETCH_BEFORE,
     WINCH_TENSION,
 )
-from seecr.compiled.law import dahl, strain_of_tension, winch_tension
-from seecr.compiled.pulley import pulley_geometry
 
 DIRECTIONS = (-40.0, 0.0, 20.0, 60.0, 89.0)
 KINDS: dict[str, dict[str, float]] = {

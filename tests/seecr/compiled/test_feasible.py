@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seecr.compiled.feasible import feasible_of
-from seecr.compiled.margin import innermost_of
+from seecr.compiled.tensions import feasible_of, innermost_of
 from seecr.holding.unheld import _by_program, _least_beyond
 
 LIMITS = [(0.0, np.inf), (0.2, np.inf), (0.2, 1.5)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from from_python import from_python
 
-from seecr.compiled.margin import innermost_of, margins_at, margins_of, null_space
+from seecr.compiled.tensions import innermost_of, margins_at, margins_of, null_space
 from seecr.description.mjcf import load_robot
 
 # Two cables that pull a body along a line, one each way.

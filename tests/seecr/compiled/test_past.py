@@ -20,7 +20,7 @@ from seecr.compiled.columns import (
     TENSION,
     WINCH_TENSION,
 )
-from seecr.compiled.past import N_KEPT, keep_past, take_past
+from seecr.compiled.history import N_KEPT, keep_past, take_past
 
 take, keep = from_python(take_past), from_python(keep_past)
 # Three per cent of an elastic strain of T / 1000 N creep, with 50 s.

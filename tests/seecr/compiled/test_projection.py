@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from seecr.compiled.projection import FOUND, NONE, project, project_batch
+from seecr.compiled.tensions import FOUND, NONE, project, project_batch
 
 LINE = np.array([[1.0, -1.0]])
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from seecr.compiled.softest import softest_batch, softest_motions
+from seecr.compiled.algebra import softest_batch, softest_motions
 from seecr.pose import Array
 
 # Parts of the largest entry: a few roundings of six unknowns. LAPACK leaves a quarter of that.

@@ -10,8 +10,8 @@ from threading import Event
 import numba
 import pytest
 
-from seecr.compiled import jit, telling
-from seecr.compiled.telling import Watch
+from seecr.compiled import compile_notice, jit
+from seecr.compiled.compile_notice import Watch
 
 LONG = 10.0  # [s] a thread that does not say it by then never does
 
@@ -49,9 +49,9 @@ def test_numba_tells_of_what_it_compiles_and_not_of_what_it_has(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     seen: list[str] = []
-    monkeypatch.setattr(telling, "begins", lambda: seen.append("begins"))
-    monkeypatch.setattr(telling, "ends", lambda: seen.append("ends"))
-    assert jit.telling is telling
+    monkeypatch.setattr(compile_notice, "begins", lambda: seen.append("begins"))
+    monkeypatch.setattr(compile_notice, "ends", lambda: seen.append("ends"))
+    assert jit.telling is compile_notice
 
     @numba.njit  # type: ignore[misc]
     def twice(x: float) -> float:

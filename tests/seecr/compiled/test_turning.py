@@ -11,7 +11,7 @@ from random_robots import random_poses, random_robot
 from rejointed import WAYS, rejointed
 
 from seecr.commands.data import Commands
-from seecr.compiled.straight import (
+from seecr.compiled.orientation import (
     balance_straight,
     left_of,
     make_turning_space,

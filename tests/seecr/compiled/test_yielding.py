@@ -8,7 +8,7 @@ from from_python import from_python
 from one_cable import UP as ABOVE
 from one_cable import cable, in_direction, pull
 
-from seecr.compiled.yielding import lift_slope, soften
+from seecr.compiled.cable_law import lift_slope, soften
 
 softer, slope = from_python(soften), from_python(lift_slope)
 UP = np.array([0.0, 0.6, 0.8])

@@ -10,7 +10,7 @@ from effect_cases import experiment_of, moved, robot_of
 from random_robots import random_poses, random_robot
 
 from seecr.commands.data import Commands
-from seecr.compiled.pulley import pulley_geometry
+from seecr.compiled.cable_law import pulley_geometry
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path

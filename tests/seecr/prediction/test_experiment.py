@@ -9,7 +9,7 @@ import pytest
 from effect_cases import KINDS, experiment_of, random_effect
 
 from seecr.commands.data import Commands
-from seecr.compiled.outcomes import STALLED
+from seecr.compiled.columns import STALLED
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Joint, Robot
 from seecr.description.shipped import model_path

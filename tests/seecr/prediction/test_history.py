@@ -11,6 +11,7 @@ from effect_cases import experiment_of, robot_of
 
 from seecr.commands.data import Commands, play
 from seecr.commands.path import waypoints_of
+from seecr.compiled.cable_law import dahl, winch_tension
 from seecr.compiled.columns import (
     EA,
     FRICTION,
@@ -24,7 +25,6 @@ from seecr.compiled.columns import (
     TENSION,
     WINCH_TENSION,
 )
-from seecr.compiled.law import dahl, winch_tension
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Joint, Robot
 from seecr.description.shipped import CABLES

@@ -10,12 +10,11 @@ from numba import njit
 from random_robots import KINDS, random_poses, random_robot
 
 from seecr.commands.data import Commands
-from seecr.compiled.algebra import cholesky
+from seecr.compiled.algebra import cholesky, rotated_less, turned
 from seecr.compiled.columns import EXTERNAL_MOMENT, GAP, N_LOAD, REST, STRAIN, TENSION
-from seecr.compiled.joints import N_CURRENT, place_joints
+from seecr.compiled.joint_kinematics import N_CURRENT, place_joints
+from seecr.compiled.newton import residual_size
 from seecr.compiled.platform import work_of_moment
-from seecr.compiled.rotation import rotated_less, turned
-from seecr.compiled.steps import residual_size
 from seecr.description.joints import pose_of_values
 from seecr.description.robot import Robot
 from seecr.effects.setup import plain_setup

@@ -10,11 +10,20 @@ from effect_cases import experiment_of, lengthened
 
 from seecr.commands.data import Commands
 from seecr.commands.path import Path
-from seecr.compiled.change import change_at_rest, change_of_each_cable
-from seecr.compiled.columns import COMPLIANCE, EA, N_COLUMNS, OF_THE_PAST, REST, SLACK, TENSION
-from seecr.compiled.descent import solve_batch
-from seecr.compiled.outcomes import CONVERGED, TOLERANCE
-from seecr.compiled.pulley import lengths_at
+from seecr.compiled.cable_law import lengths_at
+from seecr.compiled.columns import (
+    COMPLIANCE,
+    CONVERGED,
+    EA,
+    N_COLUMNS,
+    OF_THE_PAST,
+    REST,
+    SLACK,
+    TENSION,
+    TOLERANCE,
+)
+from seecr.compiled.newton import solve_batch
+from seecr.compiled.rates import change_at_rest, change_of_each_cable
 from seecr.parallel import undivided
 from seecr.prediction.experiment import Experiment
 from seecr.statics import batch

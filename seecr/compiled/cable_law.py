@@ -20,6 +20,7 @@ from seecr.compiled.columns import (
     CUBIC,
     EA,
     ENERGY,
+    EXIT,
     EXTRA,
     EXTRA_SLOPE,
     FRICTION,
@@ -27,7 +28,9 @@ from seecr.compiled.columns import (
     HYSTERESIS_BEFORE,
     HYSTERESIS_NOW,
     HYSTERESIS_STRETCH,
+    N_COLUMNS,
     QUADRATIC,
+    RADIUS,
     REST,
     SLACK,
     STRAIN,
@@ -37,7 +40,7 @@ from seecr.compiled.columns import (
     WINCH_SIDE,
     WINCH_TENSION,
 )
-from seecr.compiled.jit import jit, jit_inner
+from seecr.compiled.jit import jit, jit_allocating, jit_inner
 
 # A softening cable keeps this part of its stiffness.
 LEAST = 0.01
@@ -287,3 +290,115 @@ def strain_of_tension(row, tension):
         before, strain = abs(following - strain), following
     _t, slope, z = tension_of_strain(row, strain)
     return strain, slope, z
+
+
+# Straight cables over swivelling pulleys: their length, and where they leave the pulley.
+
+
+@jit
+def pulley_geometry(across, rise, radius):
+    """Length and direction of a straight cable over its swivelling pulley.
+
+    In the pulley's own vertical plane, seen from the exit point A, the anchor point is ``across``
+    [m] away horizontally and ``rise`` [m] above (negative: below). The cable enters at A from
+    below, runs over the top, and leaves along the tangent at the angle psi, measured at the centre
+    from the horizontal direction upwards.
+
+    Returns:
+        total length (arc and free part), free length, and the direction from the pulley to the
+        anchor point, (sin psi, -cos psi).
+    """
+    dx, dz = across - radius, rise
+    distance = math.sqrt(dx * dx + dz * dz)
+    free = math.sqrt(max(distance * distance - radius * radius, 0.0))
+    # angle(d) + acos(r/D), from its sine and cosine
+    psi = math.atan2(dz, dx) + math.atan2(free, radius)
+    return free + radius * (math.pi - psi), free, math.sin(psi), -math.cos(psi)
+
+
+@jit
+def geometric_length(row, anchor, up):
+    """Length [m] of a straight cable from A over the pulley to the anchor point (3,)."""
+    dx, dy, dz = anchor[0] - row[0], anchor[1] - row[1], anchor[2] - row[2]
+    if row[RADIUS] == 0.0:
+        return math.sqrt(dx * dx + dy * dy + dz * dz)
+    rise = dx * up[0] + dy * up[1] + dz * up[2]
+    across = math.sqrt(max(dx * dx + dy * dy + dz * dz - rise * rise, 0.0))
+    return pulley_geometry(across, rise, row[RADIUS])[0]
+
+
+@jit_inner
+def length_in_plane(row, across, rise):
+    """Straight length over the pulley, from the plane's coordinates [m]."""
+    if row[RADIUS] == 0.0:
+        return math.sqrt(across * across + rise * rise)
+    return pulley_geometry(across, rise, row[RADIUS])[0]
+
+
+@jit_allocating
+def lengths_at(poses, anchors, exits, radii, up, out):
+    """Straight lengths (n, m) [m] of cables over the pulleys, at poses (n, 7)."""
+    row, anchor = np.zeros(N_COLUMNS), np.empty(3)
+    for i in range(exits.shape[0]):
+        row[EXIT], row[EXIT + 1], row[EXIT + 2] = exits[i, 0], exits[i, 1], exits[i, 2]
+        row[RADIUS] = radii[i]
+        a, b, c = anchors[i, 0], anchors[i, 1], anchors[i, 2]
+        for n in range(poses.shape[0]):
+            w, x, y, z = poses[n, 3], poses[n, 4], poses[n, 5], poses[n, 6]
+            # b + 2 q x (q x b + w b)
+            tx, ty, tz = y * c - z * b + w * a, z * a - x * c + w * b, x * b - y * a + w * c
+            anchor[0] = poses[n, 0] + a + 2.0 * (y * tz - z * ty)
+            anchor[1] = poses[n, 1] + b + 2.0 * (z * tx - x * tz)
+            anchor[2] = poses[n, 2] + c + 2.0 * (x * ty - y * tx)
+            out[n, i] = geometric_length(row, anchor, up)
+
+
+# An exit point whose compliance upwards differs from that sideways, compiled.
+#
+# A frame moves its exit points by C p under the pull p = -force of a cable on its anchor point, C
+# = c (I - z z^T) + c_up z z^T with the vertical z. The isotropic part, c p, is along the cable and
+# lengthens it by c T (column COMPLIANCE, in series with all else). The remainder lifts the exit
+# point by s = (c_up - c) z.p, one unknown per cable:
+#
+#     s - (c_up - c) z . p(move - s z) = 0,
+#
+# where p(move) is the pull of the cable from an exit point that is not lifted. The slope 1 + (c_up
+# - c) z.K z is positive, since K, with c in series, is no stiffer than 1/c.
+
+
+@jit_inner
+def along(up, vector):
+    """Component of a vector (3,) along the vertical."""
+    return up[0] * vector[0] + up[1] * vector[1] + up[2] * vector[2]
+
+
+@jit_inner
+def lowered(move, lift, up, out):
+    """``out`` = displacement of the anchor point as seen from the lifted exit point."""
+    for k in range(3):
+        out[k] = move[k] - lift * up[k]
+
+
+@jit_inner
+def lift_slope(more, up, stiffness):
+    """Slope of the equation for the lift."""
+    total = 0.0
+    for i in range(3):
+        total += up[i] * along(up, stiffness[i])
+    return 1.0 + more * total
+
+
+@jit_inner
+def soften(more, up, stiffness, gradient, column):
+    """Stiffness (3, 3) and gradient (3,) of a cable with its yielding exit point, in place.
+
+    By Sherman and Morrison: K (I + e z z^T K)^-1 = K - e/(1 + e z.K z) (K z)(K z)^T.
+    """
+    share = more / lift_slope(more, up, stiffness)
+    for i in range(3):
+        column[i] = along(up, stiffness[i])
+    slope = along(up, gradient)
+    for i in range(3):
+        gradient[i] -= share * slope * column[i]
+        for j in range(3):
+            stiffness[i, j] -= share * column[i] * column[j]

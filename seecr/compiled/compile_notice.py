@@ -10,7 +10,13 @@ import os
 from collections.abc import Callable
 from threading import Lock, Timer
 
-__all__ = ["Watch", "begins", "ends", "tell_compiling"]
+__all__ = [
+    "Watch",
+    "begins",
+    "ends",
+    "tell_compiling",
+]
+
 
 Say = Callable[[], None]
 
