@@ -124,7 +124,7 @@ TRADE = {
     "seecr.made": {"Made"},
     "seecr.description.fingerprint": {"fingerprint"},
     # what people type: files of commands and readings (in Python crosscheck.load_commands), numbers
-    "seecr.columns.command_file": {"read_commands"},
+    "seecr.columns.commands": {"read_commands"},
     "seecr.workspace.extent": {"own_directions"},
     "seecr.columns.reach": {"ABSURD"},
     "seecr.description.shipped": {"CABLES"},

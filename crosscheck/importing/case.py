@@ -30,7 +30,7 @@ from crosscheck.measurements.read import load_commands
 from crosscheck.measurements.stated import LEAST
 from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
-from seecr.columns.written import table_text
+from seecr.columns.csv import table_text
 from seecr.counted import counted
 from seecr.description.robot import Robot
 from seecr.errors import InputError, InputFileError

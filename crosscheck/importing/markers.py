@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from crosscheck.importing.logged import Logged, Stream
-from seecr.columns.table import read_table
+from seecr.columns.csv import read_table
 from seecr.counted import counted
 from seecr.errors import InputFileError
 from seecr.pose import Array

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 from crosscheck.importing.logged import Logged
 from crosscheck.importing.rows import unit_quaternions
 from crosscheck.measurements.sentinels import is_nines
-from seecr.columns.table import Table, read_table, show
-from seecr.columns.times import began, times_of_day
+from seecr.columns.commands import began, times_of_day
+from seecr.columns.csv import Table, read_table, show
 from seecr.counted import counted, some
 from seecr.errors import InputError
 from seecr.pose import Array

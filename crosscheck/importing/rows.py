@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.columns.table import show, taken_for
+from seecr.columns.csv import show, taken_for
 from seecr.counted import counted
 from seecr.errors import InputFileError
 from seecr.files import read_text

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from crosscheck.importing.logged import Logged
 from crosscheck.importing.rows import Block, FileRows, check_body, unit_quaternions
-from seecr.columns.table import VICON
+from seecr.columns.csv import VICON
 from seecr.pose import Array
 from seecr.units import of_columns
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.stated import EXAMPLE, LEAST_NOISE, MOST, parse_quantity
-from seecr.columns.beside import CHOICES, choice
+from seecr.columns.commands import CHOICES, choice
 from seecr.effects import catalogue
 from seecr.files import Toml, read_toml
 

@@ -20,16 +20,15 @@ from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.dwells import averaged_dwells
 from crosscheck.measurements.notice import notice
 from crosscheck.measurements.together import together
+from seecr.columns.commands import began, known_loads, runs, temperatures, times
+from seecr.columns.csv import read_table
 from seecr.columns.known import POSITION, Columns, know_columns
-from seecr.columns.loads import known_loads
 from seecr.columns.poses import (
     command_lengths,
     command_poses,
     measured_orientation,
     wanted_poses,
 )
-from seecr.columns.table import read_table
-from seecr.columns.times import began, runs, temperatures, times
 from seecr.commands.data import Commands
 from seecr.counted import counted
 from seecr.errors import InputError

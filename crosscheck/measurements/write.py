@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from crosscheck.measurements.data import Measurements
-from seecr.columns.written import table_text
+from seecr.columns.csv import table_text
 from seecr.errors import InputError
 from seecr.files import write_texts
 

@@ -21,7 +21,7 @@ from seecr.cli.options import FILE, json_option, made_by, out_option, progress_s
 
 if TYPE_CHECKING:
     from seecr import Model, Robot
-    from seecr.columns.command_file import CommandFile
+    from seecr.columns.commands import CommandFile
 
 # A tracker that reads poses off by less [m] is not worth a line.
 _SEEN = 1e-6
@@ -107,7 +107,7 @@ def command(
     3 a pose without an answer, one at which the platform does not come to rest, or none reached.
     """  # fmt: skip
     from seecr import InputFileError, correct, kept_chance
-    from seecr.columns.command_file import read_commands
+    from seecr.columns.commands import read_commands
     from seecr.files import check_replaces, json_text, staged, with_toml, write_texts
     from seecr.report.corrections import chance_lines, corrected_csv, corrected_toml, turned_words
 

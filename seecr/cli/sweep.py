@@ -275,7 +275,7 @@ def _commands(
 ) -> tuple[Commands, _Columns, tuple[str, ...], NDArray[np.float64] | None]:
     """The commands, what else their file says, notes on it, and the poses that lengths are for."""
     from seecr import Commands, InputError
-    from seecr.columns.command_file import read_commands
+    from seecr.columns.commands import read_commands
 
     ways = [name for name in ("line", "grid") if getattr(given, name)]
     if len(ways) + (poses is not None) != 1:

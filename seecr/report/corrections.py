@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.columns.command_file import CommandFile
-from seecr.columns.written import table_text
+from seecr.columns.commands import CommandFile
+from seecr.columns.csv import table_text
 from seecr.inverse.correction import Correction
 from seecr.pose import Array, pose_difference
 from seecr.report.commanded import load_columns, toml_beside

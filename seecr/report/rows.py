@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from seecr.columns.written import table_text
+from seecr.columns.csv import table_text
 from seecr.commands.loads import Loads
 from seecr.pose import Array
 from seecr.prediction.uncertainty import Spread

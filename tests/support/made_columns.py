@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from seecr.columns.csv import Table
 from seecr.columns.known import Columns, know_columns
-from seecr.columns.table import Table
 
 
 def columns_of(header: str, *rows: str, n_cables: int = 6) -> Columns:

@@ -13,8 +13,8 @@ from random_robots import random_robot
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import load_commands, load_measurements
 from crosscheck.measurements.write import write_measurements
+from seecr.columns.csv import Table
 from seecr.columns.known import know_columns
-from seecr.columns.table import Table
 from seecr.commands.loads import Loads
 from seecr.description.robot import Robot
 from seecr.errors import InputFileError

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from crosscheck.measurements.read import load_measurements
-from seecr.columns.command_file import read_commands
+from seecr.columns.commands import read_commands
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.equilibrium.solving import solve

@@ -10,8 +10,8 @@ import pytest
 from made_columns import columns_of
 from random_robots import random_robot
 
+from seecr.columns.csv import read_table
 from seecr.columns.poses import command_lengths, command_poses, measured_orientation
-from seecr.columns.table import read_table
 from seecr.description.robot import Joint, Robot
 from seecr.errors import InputFileError
 from seecr.pose import quat_from_rxyz

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from crosscheck.measurements.read import load_commands
-from seecr.columns.command_file import read_commands
+from seecr.columns.commands import read_commands
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path

@@ -10,7 +10,7 @@ import pytest
 from made_columns import columns_of
 from rectangle import RECTANGLE
 
-from seecr.columns.loads import known_loads
+from seecr.columns.commands import known_loads
 from seecr.errors import InputFileError
 
 # A twentieth of E S of all four cables, and ten times the platform's weight.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from seecr.columns.names import (
+from seecr.columns.known import (
     meant_by,
     no_cable_note,
     numbered,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from seecr.columns.quantity import QUANTITY, is_number
+from seecr.columns.csv import QUANTITY, is_number
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_columns import columns_of
 
-from seecr.columns.times import began, runs, temperatures, times, times_of_day
+from seecr.columns.commands import began, runs, temperatures, times, times_of_day
 from seecr.errors import InputFileError
 
 NIGHT = ("2024-02-28T23:59:30", "2024-02-28 23:59:30.5", "2024-02-29T00:00:15")

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from seecr.columns.table import read_table
-from seecr.columns.written import table_text
+from seecr.columns.csv import read_table, table_text
 
 ODD = ("#a", " #b", "a#b", "b, c", 'said "d"', "two\nlines", "two\r\nlines", "1;5", "'", "µ")
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from seecr.columns.command_file import CommandFile, read_commands
+from seecr.columns.commands import CommandFile, read_commands
 from seecr.commands.data import Commands
 from seecr.commands.loads import Loads
 from seecr.description.mjcf import load_robot

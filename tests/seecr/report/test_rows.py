@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from recordings import Readback
 
-from seecr.columns.command_file import read_commands
+from seecr.columns.commands import read_commands
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.equilibrium.solving import solve

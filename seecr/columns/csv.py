@@ -9,18 +9,32 @@ import csv
 import io
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.columns.quantity import is_number
 from seecr.counted import counted
 from seecr.errors import InputFileError, MissingPackageError
 from seecr.files import no_text, read_bytes
 from seecr.pose import LARGEST, Array
+
+# The parts of a column's name: a quantity and, after the last underscore, its unit.
+
+QUANTITY = re.compile(
+    r"(t|temperature|run|(?:cmd|meas|want)_(?:q[wxyz]|r?[xyz])|(?:length|tension)_\d+"
+    r"|payload(?:_[xyz])?|(?:force|moment)_[xyz])(?:_([^_]*))?"
+)
+
+
+def is_number(name: str) -> bool:
+    """Whether a column of that name holds numbers that are read; runs have names."""
+    found = QUANTITY.fullmatch(name.strip())
+    return found is not None and found[1] != "run"
+
 
 EXPECTED_FILE = "expected a CSV file in UTF-8 with a header row and one row per resting pose"
 
@@ -296,3 +310,34 @@ def _cell_fault(cell: str, blank_is_nan: bool) -> str | None:
     return (
         f"{expected}, got {show(cell)}, which is too large; numbers go from -{largest} to {largest}"
     )
+
+
+# The text of a CSV, as seecr.columns.csv reads it: every file of rows is written here.
+
+
+def table_text(columns: Mapping[str, Sequence[Any] | Array], digits: int | None = None) -> str:
+    """A table as CSV; numbers that are missing or not finite are empty cells.
+
+    Args:
+        columns: the values of each column by its name, all of one length.
+        digits: significant digits of numbers; all of them by default.
+    """
+    rows = zip(*columns.values(), strict=True)
+    lines = [",".join(_cell(value, digits) for value in row) for row in rows]
+    return "\n".join([",".join(columns), *lines]) + "\n"
+
+
+def _cell(value: object, digits: int | None) -> str:
+    if isinstance(value, float):
+        # adding zero turns -0.0 into 0.0
+        number = float(value) + 0.0
+        text = repr(number) if digits is None else f"{number:.{digits}g}"
+        return text if math.isfinite(number) else ""
+    return "" if value is None else _quoted(str(value))
+
+
+def _quoted(text: str) -> str:
+    """Text as a cell; a leading # would make its line a comment."""
+    if any(mark in text for mark in ',"\n\r') or text.lstrip().startswith("#"):
+        return '"' + text.replace('"', '""') + '"'
+    return text
