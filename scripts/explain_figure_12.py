@@ -21,7 +21,7 @@ import make_paper
 import numpy as np
 from matplotlib.patches import Rectangle
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.effects import Effect, Layout, catalogue, layout_of
 from seecr.pose import Array, pose_difference
 from seecr.prediction.experiment import Experiment, read

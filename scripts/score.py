@@ -49,8 +49,7 @@ from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.twin.hidden import choose, times
 from crosscheck.twin.lab import random_of, sweeps
 from crosscheck.twin.measure import Truth, measure
-from seecr.commands.data import Commands
-from seecr.commands.loads import Loads
+from seecr.commands import Commands, Loads
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path

@@ -23,7 +23,7 @@ from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.suite.poses import demobot_sweep
 from crosscheck.twin.make import make_twin
 from crosscheck.twin.measure import measure
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.shipped import model_path
 from seecr.inverse.correction import correct
 from seecr.pose import Array

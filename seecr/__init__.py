@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING
 from seecr.lazy import lazily
 
 if TYPE_CHECKING:
-    from seecr.commands.data import Commands
-    from seecr.commands.loads import Loads
+    from seecr.commands import Commands, Loads
     from seecr.description.mjcf import load_robot
     from seecr.description.robot import Joint, Robot
     from seecr.description.shipped import model_names, model_path
@@ -70,7 +69,7 @@ __version__ = "0.1.0"
 _MODULES = {
     "equilibrium.passes": ("Barrier", "barriers"),
     "workspace.chances": ("held_chance", "kept_chance"),
-    "commands.data": ("Commands",),
+    "commands": ("Commands", "Loads",),
     "effects": (
         "Effect", "Knowledge", "Readings", "Term", "Terms", "catalogue", "effect_named",
         "layout_of", "parameter",
@@ -82,7 +81,6 @@ _MODULES = {
     ),
     "prediction.experiment": ("Experiment", "Prediction", "predict"),
     "exported.export": ("Export", "export"),
-    "commands.loads": ("Loads",),
     "inverse.correction": ("Correction", "correct"),
     "workspace.edges": ("boundary",),
     "workspace.grid": ("Workspace",),

@@ -239,7 +239,7 @@ DESCRIPTION = {
 
 # Beside it: what winches are told, how things are counted, that numbers are numbers, and files.
 BESIDE = {
-    "seecr.commands.data", "seecr.commands.loads", "seecr.counted", "seecr.arguments",
+    "seecr.commands", "seecr.counted", "seecr.arguments",
     "seecr.files",
 }  # fmt: skip
 # What the effects edit is SEECR's side of them.

@@ -19,8 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from crosscheck.given import check_above_zero
 from crosscheck.measurements.named import named_columns
 from crosscheck.measurements.stated import parsed
-from seecr.commands.data import Commands
-from seecr.commands.loads import Loads
+from seecr.commands import Commands, Loads
 from seecr.counted import counted, plural, some
 from seecr.description.robot import Robot
 from seecr.pose import Array

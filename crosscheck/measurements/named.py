@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.commands.loads import Loads
+from seecr.commands import Loads
 from seecr.pose import Array
 from seecr.result import COORDINATES
 

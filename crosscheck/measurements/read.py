@@ -29,7 +29,7 @@ from seecr.columns.poses import (
     measured_orientation,
     wanted_poses,
 )
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.counted import counted
 from seecr.errors import InputError
 from seecr.files import path_of

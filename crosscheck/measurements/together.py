@@ -11,7 +11,7 @@ import numpy as np
 
 from crosscheck.measurements.data import Measurements, Names, Sigma
 from crosscheck.measurements.notice import twice
-from seecr.commands.loads import Loads
+from seecr.commands import Loads
 from seecr.errors import InputFileError
 from seecr.pose import Array, rxyz_from_quat
 

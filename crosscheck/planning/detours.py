@@ -11,7 +11,7 @@ from crosscheck.measurements.data import Measurements
 from crosscheck.planning.adding import Adding, Extension, like
 from crosscheck.planning.extensions import PAYLOAD, named_again
 from crosscheck.planning.planned import Planned
-from seecr.commands.loads import Loads
+from seecr.commands import Loads
 from seecr.pose import Array
 from seecr.units import short
 from seecr.workspace.zones import feasible

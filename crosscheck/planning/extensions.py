@@ -17,7 +17,7 @@ from crosscheck.planning.planned import (
     expected_sigma,
     usual_cell,
 )
-from seecr.commands.loads import Loads
+from seecr.commands import Loads
 from seecr.description.robot import Robot
 from seecr.pose import Array
 from seecr.units import short

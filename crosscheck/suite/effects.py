@@ -24,8 +24,7 @@ from crosscheck.twin.hidden import CONTAINED, choose
 from crosscheck.twin.measure import measure
 from crosscheck.twin.robot import TRUE_EFFECTS
 from crosscheck.twin.trajectory import trajectory
-from seecr.commands.data import Commands
-from seecr.commands.loads import Loads
+from seecr.commands import Commands, Loads
 from seecr.counted import counted, some
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot

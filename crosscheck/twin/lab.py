@@ -17,7 +17,7 @@ from crosscheck.twin.answer import Moves
 from crosscheck.twin.hidden import times
 from crosscheck.twin.measure import Truth, measure
 from crosscheck.twin.trajectory import trajectory
-from seecr.commands.loads import Loads
+from seecr.commands import Loads
 from seecr.description.robot import Robot
 from seecr.effects import Effect, Term
 from seecr.pose import Array, quat_from_rotvec, quat_multiply

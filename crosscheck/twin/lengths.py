@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from crosscheck.errors import CrosscheckError
 from crosscheck.twin.robot import TrueRobot
 from crosscheck.twin.world import World
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.pose import Array, pose_add, pose_difference, transform_points
 
 # Number of points on the way to the first row of a run, and from row to row. The laws of cables

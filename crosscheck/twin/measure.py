@@ -14,8 +14,7 @@ from crosscheck.twin.lengths import Waypoints, paid_out, waypoints_of
 from crosscheck.twin.robot import true_robot
 from crosscheck.twin.springs import Cable, Springs
 from crosscheck.twin.world import World
-from seecr.commands.data import Commands
-from seecr.commands.loads import Loads
+from seecr.commands import Commands, Loads
 from seecr.description.robot import Robot
 from seecr.effects import Effect
 from seecr.pose import Array, pose_add, pose_difference

@@ -21,8 +21,7 @@ from seecr.columns.csv import Table, read_table, show
 from seecr.columns.known import ANGLES, POSITION, QUATERNION, Columns, know_columns
 from seecr.columns.poses import aimed_poses, command_lengths, command_poses
 from seecr.columns.reach import check_reach
-from seecr.commands.data import Commands
-from seecr.commands.loads import Loads
+from seecr.commands import Commands, Loads
 from seecr.description.robot import Robot
 from seecr.errors import InputFileError
 from seecr.files import Toml, read_toml

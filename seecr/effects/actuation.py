@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect, mean_length, of_length, parameter
 from seecr.effects.setup import Setup

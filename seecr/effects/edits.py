@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from operator import is_
 from threading import Lock
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.effects.checked import edit_setup

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from seecr.commands.data import Commands, play
+from seecr.commands import Commands, play
 from seecr.compiled import columns
 from seecr.description.robot import Robot
 from seecr.errors import InputError

@@ -7,7 +7,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.effects.base import Effect
 
 __all__ = ["unfed"]

@@ -16,8 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.commands.data import Commands
-from seecr.commands.path import Path, waypoints_of
+from seecr.commands import Commands, Path, waypoints_of
 from seecr.compiled.columns import CONVERGED, SINGULAR
 from seecr.description.robot import Robot
 from seecr.effects.setup import Setup

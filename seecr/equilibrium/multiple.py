@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr.arguments import whole
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seecr.arguments import finite, whole
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.counted import counted
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot

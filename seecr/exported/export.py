@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.compiled.cable_law import LEAST
 from seecr.compiled.columns import CUBIC, FORCE_OF_WEIGHT, QUADRATIC, STRAIN, UP
 from seecr.description.given import GivenRobot, robot_of

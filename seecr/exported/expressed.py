@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.robot import Robot
 from seecr.effects import Effect
 from seecr.effects.checked import edit_setup

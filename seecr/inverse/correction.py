@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.compiled.columns import RADIUS, STRAIN
 from seecr.counted import between, counted, rows_words
 from seecr.description.given import GivenRobot, robot_of

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.holding.lengths import Held, hold_again

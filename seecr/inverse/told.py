@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.inverse.aitken import to_their_limit

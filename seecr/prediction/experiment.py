@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.commands.data import Commands
-from seecr.commands.path import Path, waypoints_of
+from seecr.commands import Commands, Path, waypoints_of
 from seecr.compiled.columns import CONVERGED, ITERATIONS, SINGULAR, STALLED, STRAIN, TENSION
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.joints import reachable
 from seecr.description.robot import Robot

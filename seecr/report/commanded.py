@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from seecr.commands.data import Commands
-from seecr.commands.loads import Loads
+from seecr.commands import Commands, Loads
 
 __all__ = ["load_columns", "toml_beside"]
 

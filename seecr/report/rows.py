@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from seecr.columns.csv import table_text
-from seecr.commands.loads import Loads
+from seecr.commands import Loads
 from seecr.pose import Array
 from seecr.prediction.uncertainty import Spread
 from seecr.report.commanded import load_columns

@@ -9,7 +9,7 @@ from threading import Event
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.commands.path import Path
+from seecr.commands import Path
 from seecr.compiled.columns import (
     CABLE_LAW,
     CONVERGED,

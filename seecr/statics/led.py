@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.joints import motion_columns, pose_of_values, values_of_pose
 from seecr.description.robot import Robot
 from seecr.pose import Array, cross, pose_add, quat_rotate

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seecr.arguments import finite, numbers
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.counted import rows_words
 from seecr.description.joints import values_of_pose
 from seecr.description.robot import Robot

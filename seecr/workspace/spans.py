@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.arguments import finite
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.effects.edits import setup_with
 from seecr.equilibrium.coordinates import moved, step_between
 from seecr.equilibrium.solving import solve

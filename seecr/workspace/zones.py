@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr.arguments import finite, numbers
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.compiled.columns import EXTERNAL_FORCE, EXTERNAL_MOMENT
 from seecr.counted import counted
 from seecr.description.given import GivenRobot, robot_of

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from random_robots import random_poses, random_robot
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.compiled.columns import GAP, REST
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot

@@ -93,7 +93,7 @@ def one_angle() -> Diagnosis:
     rng = np.random.default_rng(4)
     angles = np.full((data.n_rows, 3), np.nan)
     angles[:, 1] = SIGMA.orientation_rad * rng.standard_normal(data.n_rows)
-    from seecr.commands.data import Commands
+    from seecr.commands import Commands
     from seecr.pose import rxyz_from_quat
     from seecr.prediction.experiment import Experiment
 

@@ -18,7 +18,7 @@ import pytest
 
 from crosscheck.twin import lab
 from crosscheck.twin.measure import Truth
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.robot import Robot
 from seecr.effects import Effect
 

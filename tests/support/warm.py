@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import seecr
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.holding.balance import straight_balance
 from seecr.holding.distribution import distribute
 from seecr.holding.inside import can_balance, innermost

@@ -12,7 +12,7 @@ import pytest
 from crosscheck.cli import main
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.write import write_measurements
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects.geometry import PulleyRadius

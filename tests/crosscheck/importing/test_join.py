@@ -9,7 +9,7 @@ import pytest
 
 from crosscheck.importing.join import held_commands
 from crosscheck.measurements.data import Measurements
-from seecr.commands.loads import Loads
+from seecr.commands import Loads
 
 ROWS = 4
 PULL = np.array([[0.0] * 6, [0.0] * 6, [5.0, 0, 0, 0, 0, 0], [0.0] * 6])

@@ -11,7 +11,7 @@ import pytest
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.dwells import averaged_dwells
 from crosscheck.measurements.read import measurements_of
-from seecr.commands.loads import Loads
+from seecr.commands import Loads
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.pose import quat_from_rotvec

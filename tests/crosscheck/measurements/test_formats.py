@@ -15,7 +15,7 @@ from crosscheck.measurements.read import load_commands, load_measurements
 from crosscheck.measurements.write import write_measurements
 from seecr.columns.csv import Table
 from seecr.columns.known import know_columns
-from seecr.commands.loads import Loads
+from seecr.commands import Loads
 from seecr.description.robot import Robot
 from seecr.errors import InputFileError
 from seecr.pose import quat_from_rotvec, quat_multiply

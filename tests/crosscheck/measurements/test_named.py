@@ -9,7 +9,7 @@ import numpy as np
 
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.named import named_columns
-from seecr.commands.loads import Loads
+from seecr.commands import Loads
 
 PLAIN = Measurements(
     path=Path("a.csv"),

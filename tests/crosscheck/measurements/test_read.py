@@ -10,7 +10,7 @@ from measured_csv import CMD, POSE
 
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import commands_of, load_commands, load_measurements
-from seecr.commands.loads import Loads
+from seecr.commands import Loads
 from seecr.errors import InputError, InputFileError
 from seecr.pose import quat_from_rxyz, quat_rotate, quat_to_matrix
 

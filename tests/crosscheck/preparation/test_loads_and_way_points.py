@@ -19,7 +19,7 @@ from crosscheck.planning.extensions import PAYLOAD, extensions
 from crosscheck.planning.planned import Reads, planned
 from crosscheck.preparation.prepare import prepare
 from crosscheck.twin.trajectory import trajectory
-from seecr.commands.loads import Loads
+from seecr.commands import Loads
 from seecr.effects import Terms
 from seecr.prediction.experiment import Experiment
 

@@ -16,7 +16,7 @@ from crosscheck.preparation.fitness import commands_table
 from crosscheck.preparation.parts import groups_of, laid_out, names_in
 from crosscheck.preparation.suspect_data.another_robot import another_robot_doubts
 from crosscheck.preparation.suspect_data.tension_unit import other_tensions
-from seecr.commands.loads import Loads
+from seecr.commands import Loads
 from seecr.effects import ApartLayout, Own, Terms, Values
 from seecr.effects.base import Readings
 

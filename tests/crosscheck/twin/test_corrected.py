@@ -10,7 +10,7 @@ import pytest
 from crosscheck.settle.settler import Settler
 from crosscheck.suite.poses import demobot_sweep
 from crosscheck.twin.measure import measure
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import CABLES, model_path
 from seecr.effects import Term

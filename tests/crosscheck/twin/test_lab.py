@@ -22,7 +22,7 @@ from crosscheck.twin.lab import (
     sweeps,
 )
 from crosscheck.twin.measure import Truth
-from seecr.commands.loads import Loads
+from seecr.commands import Loads
 from seecr.description.mjcf import load_robot
 from seecr.pose import pose_difference, quat_from_rotvec
 

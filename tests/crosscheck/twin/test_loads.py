@@ -9,8 +9,7 @@ import pytest
 from effect_cases import experiment_of
 
 from crosscheck.twin.measure import measure
-from seecr.commands.data import Commands
-from seecr.commands.loads import Loads
+from seecr.commands import Commands, Loads
 from seecr.description.robot import Robot
 from seecr.effects import Effect, effect_named
 from seecr.pose import pose_difference

@@ -23,7 +23,7 @@ from crosscheck.twin.hidden import choose, times
 from crosscheck.twin.make import make_twin
 from crosscheck.twin.robot import TRUE_EFFECTS
 from crosscheck.twin.trajectory import trajectory
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term, effect_named, layout_of

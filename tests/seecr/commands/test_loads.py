@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 from effect_cases import experiment_of, full_difference, random_term, robot_of
 
-from seecr.commands.data import Commands
-from seecr.commands.loads import Loads
-from seecr.commands.path import waypoints_of
+from seecr.commands import Commands, Loads, waypoints_of
 from seecr.effects import Effect, Terms, effect_named
 from seecr.errors import InputError
 from seecr.prediction.experiment import Experiment, Prediction

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from effect_cases import lengthened
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.compiled.columns import (
     EA,
     FRICTION,

@@ -10,7 +10,7 @@ from from_python import from_python
 from random_robots import random_poses, random_robot
 from rejointed import WAYS, rejointed
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.compiled.orientation import (
     balance_straight,
     left_of,

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seecr.commands.data import Commands
-from seecr.commands.loads import Loads
+from seecr.commands import Commands, Loads
 from seecr.description.mjcf import load_robot
 from seecr.effects import Term
 from seecr.prediction.experiment import Experiment

@@ -9,7 +9,7 @@ import pytest
 from effect_cases import experiment_of, moved, robot_of
 from random_robots import random_poses, random_robot
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.compiled.cable_law import pulley_geometry
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot

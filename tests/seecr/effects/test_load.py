@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rectangle import RECTANGLE
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.effects import layout_of
 from seecr.effects.load import CentreOfMass, ExternalWrench, GravityTilt, PlatformMass
 from seecr.effects.setup import Setup, plain_setup

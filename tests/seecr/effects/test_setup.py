@@ -7,8 +7,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from seecr.commands.data import Commands
-from seecr.commands.path import turning
+from seecr.commands import Commands, turning
 from seecr.compiled.columns import N_COLUMNS, N_LOAD
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from crosscheck.settle.settler import Settler
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from effect_cases import robot_of
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.effects.setup import plain_setup
 from seecr.equilibrium.scipy_search import GAVE_UP, first_guess, solve_with_scipy
 from seecr.equilibrium.solving import solve

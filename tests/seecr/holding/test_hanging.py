@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.compiled.columns import TENSION
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot

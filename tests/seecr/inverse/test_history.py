@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.holding.lengths import Held

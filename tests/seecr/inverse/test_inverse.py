@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from seecr.commands.data import Commands, play
-from seecr.commands.loads import Loads
+from seecr.commands import Commands, Loads, play
 from seecr.compiled.columns import STRAIN
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot

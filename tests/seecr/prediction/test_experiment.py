@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from effect_cases import KINDS, experiment_of, random_effect
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.compiled.columns import STALLED
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Joint, Robot

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from effect_cases import experiment_of, robot_of
 
-from seecr.commands.data import Commands, play
-from seecr.commands.path import waypoints_of
+from seecr.commands import Commands, play, waypoints_of
 from seecr.compiled.cable_law import dahl, winch_tension
 from seecr.compiled.columns import (
     EA,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from made_data import soft_cogiro, term
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.effects import Own, Term, Terms, apart
 from seecr.prediction.experiment import Experiment
 from seecr.prediction.parted import Parted, rates

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from seecr.cli import main
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.joints import off_joints
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path

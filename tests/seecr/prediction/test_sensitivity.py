@@ -9,7 +9,7 @@ import pytest
 from effect_cases import KINDS, experiment_of, random_term, robot_of, worst_mismatch
 from random_robots import random_poses
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.compiled.columns import REST, STRAIN
 from seecr.effects import Term, Terms, effect_named, layout_of
 from seecr.equilibrium.solving import solve

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from seecr.columns.commands import CommandFile, read_commands
-from seecr.commands.data import Commands
-from seecr.commands.loads import Loads
+from seecr.commands import Commands, Loads
 from seecr.description.mjcf import load_robot
 from seecr.equilibrium.solving import solve
 from seecr.report.commanded import toml_beside

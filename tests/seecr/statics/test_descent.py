@@ -9,7 +9,7 @@ import pytest
 from numba import njit
 from random_robots import KINDS, random_poses, random_robot
 
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.compiled.algebra import cholesky, rotated_less, turned
 from seecr.compiled.columns import EXTERNAL_MOMENT, GAP, N_LOAD, REST, STRAIN, TENSION
 from seecr.compiled.joint_kinematics import N_CURRENT, place_joints

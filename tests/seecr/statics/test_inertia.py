@@ -9,7 +9,7 @@ import pytest
 from three_cables import THREE
 
 import seecr
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.effects.setup import plain_setup
 from seecr.pose import Array, quat_from_rotvec, quat_rotate
 from seecr.statics.inertia import mass_matrices

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import seecr
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.pose import quat_from_rotvec, quat_multiply
 from seecr.prediction.experiment import Experiment
 from seecr.statics.led import led

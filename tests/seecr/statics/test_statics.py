@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from effect_cases import experiment_of, lengthened
 
-from seecr.commands.data import Commands
-from seecr.commands.path import Path
+from seecr.commands import Commands, Path
 from seecr.compiled.cable_law import lengths_at
 from seecr.compiled.columns import (
     COMPLIANCE,

@@ -15,7 +15,7 @@ from crosscheck.fit.noise.unstated import overestimated
 from crosscheck.inference.noise import chain_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.preparation.prepare import prepare
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.effects import Term, Terms

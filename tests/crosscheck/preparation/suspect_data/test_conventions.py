@@ -19,7 +19,7 @@ from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
 from crosscheck.preparation.prepare import prepare
 from crosscheck.preparation.suspect_data.conventions import Convention, misread_orientations
-from seecr.commands.data import Commands
+from seecr.commands import Commands
 from seecr.description.robot import Robot
 from seecr.effects import Term, Terms, catalogue
 from seecr.pose import Array, quat_from_rotvec, quat_multiply, rotvec_from_quat

@@ -1,23 +1,243 @@
-"""The path of a robot through its commands: waypoints, and where cables reverse between them.
-
-A run starts at the robot's reference pose (or at its first row, if the commands say so) and goes
-straight to its first row and from row to row, in the platform's degrees of freedom. Loads change at
-the row before, ahead of the motion. Effects with history depend on this path (see
-:mod:`seecr.compiled.history` and :func:`seecr.commands.data.play`).
-"""
+"""Commands to the winches and known loads, row by row, and the path through them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.commands.data import Commands
 from seecr.description.joints import motion_columns, pose_of_values, values_of_pose
 from seecr.description.robot import Robot
-from seecr.pose import Array, cross, pose_add, pose_difference, quat_rotate
+from seecr.errors import InputError
+from seecr.pose import LARGEST, Array, all_finite, cross, pose_add, pose_difference, quat_rotate
+
+# Known loads: what the platform carried in each row.
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """Known payloads and external wrenches of n rows, such as weights hung on the platform.
+
+    A payload's weight follows the model's gravity. It is attached before the way to its row begins.
+
+    Attributes:
+        mass: (n,) [kg] of the payload.
+        centre: (n, 3) [m] of the payload, in the platform's frame; NaN if it is the platform's own
+            centre of mass, including any effect on that.
+        wrench: (n, 6) [N, N m] force at the platform's origin and moment, base frame.
+    """
+
+    mass: Array
+    centre: Array
+    wrench: Array
+
+    @classmethod
+    def of(
+        cls,
+        n: int,
+        mass: Array | None = None,
+        centre: Array | None = None,
+        wrench: Array | None = None,
+    ) -> Loads:
+        """Loads of n rows; one number or vector applies to all rows, None means no load.
+
+        Raises:
+            InputError: a shape that does not fit n rows, or numbers that are not finite.
+        """
+        return cls(
+            _filled("payload mass", mass, 0.0, (n,)),
+            _filled("payload centre", centre, np.nan, (n, 3)),
+            _filled("wrench", wrench, 0.0, (n, 6)),
+        )
+
+    def __len__(self) -> int:
+        return len(self.mass)
+
+    def rows(self, index: NDArray[np.integer]) -> Loads:
+        """The loads of some rows."""
+        return Loads(self.mass[index], self.centre[index], self.wrench[index])
+
+    def followed_by(self, other: Loads) -> Loads:
+        """These rows, then those of another."""
+        return Loads(
+            *(
+                np.concatenate([getattr(self, name), getattr(other, name)])
+                for name in ("mass", "centre", "wrench")
+            )
+        )
+
+    @property
+    def kinds(self) -> NDArray[np.int64]:
+        """(n,) number of each row's load among the different loads."""
+        loaded = self.mass[:, None] != 0.0
+        # NaN (the platform's own centre) equals NaN, and the centre does not matter without a
+        # payload
+        own = np.isnan(self.centre) & loaded
+        centre = np.where(loaded & ~own, self.centre, 0.0)
+        table = np.concatenate([self.mass[:, None], own, centre, self.wrench], axis=1)
+        return np.asarray(np.unique(table, axis=0, return_inverse=True)[1].reshape(-1))
+
+    @property
+    def changes(self) -> NDArray[np.bool_]:
+        """(n,) rows with another load than the row before."""
+        return np.concatenate([[False], np.diff(self.kinds) != 0])
+
+
+def _filled(name: str, value: Array | None, otherwise: float, shape: tuple[int, ...]) -> Array:
+    given = np.asarray(otherwise if value is None else value, float)
+    try:
+        out = np.array(np.broadcast_to(given, shape))
+    except ValueError:
+        raise InputError(f"{name} must be {shape}, got {given.shape}") from None
+    if not all_finite(out[~np.isnan(out)]) or (otherwise == 0.0 and np.isnan(out).any()):
+        raise InputError(f"{name} must be finite numbers, none beyond {LARGEST:g}, got {given}")
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Commands:
+    """The commands to a robot, row by row, in time order within a run.
+
+    Attributes:
+        pose: (n, 7) commanded poses; if lengths are commanded, where the solver starts.
+        lengths: (n, m) [m] commanded rest lengths, or None.
+        run: (n,) int, number of the continuous motion that a row belongs to.
+        time: (n,) [s] or None.
+        temperature: (n,) [deg C] or None.
+        passed: (k, n, m) [m] commanded changes of length (or lengths) passed on the way to each
+            row, in order: at its start and where cables reverse; None if no effect needs them.
+        told: whether lengths are in the plain model's terms: at the reference pose they are the
+            robot's rest lengths, and from there the winch turns by the difference. Otherwise they
+            are absolute: the whole cable from the exit point on.
+        loads: known loads, or None.
+        stands: (n,) bool, rows whose run starts at its first row, at rest; other runs start at the
+            reference pose. None means that all of them do.
+        clock: (n,) int, number of the clock of ``time``; None if there is only one.
+        parts: names (n,) of the "file" and the "run" of each row, for effects that have values of
+            their own for each.
+        line: (n,) line of each row in its file; None without a file.
+    """
+
+    pose: Array
+    lengths: Array | None = None
+    run: NDArray[np.int64] | None = None
+    time: Array | None = None
+    temperature: Array | None = None
+    passed: Array | None = None
+    told: bool = False
+    loads: Loads | None = None
+    stands: NDArray[np.bool_] | None = None
+    clock: NDArray[np.int64] | None = None
+    parts: Mapping[str, NDArray[np.str_]] = field(default_factory=dict)
+    line: NDArray[np.int64] | None = None
+
+    def __len__(self) -> int:
+        return len(self.pose)
+
+    def rows(self, index: NDArray[np.integer]) -> Commands:
+        """Some rows, for what does not depend on the rows before."""
+
+        def of(values: NDArray[Any] | None) -> NDArray[Any] | None:
+            return None if values is None else values[index]
+
+        return Commands(
+            pose=self.pose[index], lengths=of(self.lengths), run=of(self.run), time=of(self.time),
+            temperature=of(self.temperature), told=self.told, stands=of(self.stands),
+            clock=of(self.clock), line=of(self.line),
+            loads=None if self.loads is None else self.loads.rows(index),
+            parts={kind: names[index] for kind, names in self.parts.items()},
+        )  # fmt: skip
+
+    @property
+    def starts(self) -> NDArray[np.bool_]:
+        """(n,) rows that start a run: the first, and those with another run than the row before."""
+        fresh = np.zeros(len(self), dtype=bool)
+        fresh[:1] = True
+        if self.run is not None:
+            fresh[1:] = self.run[1:] != self.run[:-1]
+        return fresh
+
+    @property
+    def absolute(self) -> bool:
+        """Whether absolute lengths are commanded."""
+        return self.lengths is not None and not self.told
+
+    @property
+    def starts_here(self) -> NDArray[np.bool_]:
+        """(n,) rows that start a run where they are, not at the reference pose."""
+        return self.starts & (False if self.stands is None else self.stands)
+
+    def change(self, robot: Robot) -> Array:
+        """Commanded changes of length (n, m) [m] since the winches were zeroed.
+
+        For absolute lengths these are the lengths themselves.
+        """
+        if self.lengths is None:
+            return self.nominal_change(robot)
+        return self.lengths - robot.rest_lengths if self.told else self.lengths
+
+    def home(self, robot: Robot) -> Array:
+        """The value of ``change`` at the reference pose, (m,) [m]."""
+        return robot.rest_lengths if self.absolute else np.zeros(robot.n_cables)
+
+    def before(self, rows: Array, home: Array) -> Array:
+        """The values of ``rows`` (n, k) at the start of the way to each row.
+
+        They are those of the row before, or ``home`` (k,) if a run starts there, or those of the
+        row itself if its run starts where it is.
+        """
+        before = np.roll(rows, 1, axis=0)
+        before[self.starts] = home
+        return np.where(self.starts_here[:, None], rows, before)
+
+    def nominal_change(self, robot: Robot) -> Array:
+        """Straight lengths at the commanded poses minus those at the reference pose, (n, m) [m]."""
+        if not self._kept or self._kept[0][0] is not robot:
+            change = robot.nominal_lengths(self.pose) - robot.reference_lengths
+            self._kept[:] = [(robot, change)]
+        return self._kept[0][1]
+
+    # for the last robot asked for, since every trial of a fit asks again
+    _kept: list[tuple[Robot, Array]] = field(default_factory=list, repr=False, init=False)
+
+
+def play(
+    told: Array, starts: NDArray[np.bool_], half_width: Array, passed: Array | None = None
+) -> Array:
+    """The play operator: an output that lags its input (n, m) by up to the half-width (m,).
+
+    It starts centred at the start of each run (``starts`` (n,)): on that row, or on ``passed[0]``.
+    Between rows the input passes through ``passed`` (k, n, m), if given, monotonically in between.
+    """
+    way = told[None] if passed is None else np.concatenate([passed, told[None]])
+    low, high = way[0] - half_width, way[0] + half_width
+    low[starts] = high[starts] = way[0, starts]
+    # an input moves the output to the nearest point of a band about it. A sequence of inputs acts
+    # as one band, too: computed for each row first, then for 2, 4, 8, ... rows
+    for at in way[1:]:
+        low, high = _band_of_both(low, high, at - half_width, at + half_width)
+    rows = 1
+    while np.any(low < high):
+        low[rows:], high[rows:] = _band_of_both(low[:-rows], high[:-rows], low[rows:], high[rows:])
+        rows *= 2
+    return np.asarray(low)
+
+
+def _band_of_both(low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array]:
+    """The band equivalent to ``low`` and ``high`` followed by ``least`` and ``most``."""
+    return np.clip(low, least, most), np.clip(high, least, most)
+
+
+# The path of a robot through its commands: waypoints, and where cables reverse between them.
+#
+# A run starts at the robot's reference pose (or at its first row, if the commands say so) and goes
+# straight to its first row and from row to row, in the platform's degrees of freedom. Loads change
+# at the row before, ahead of the motion. Effects with history depend on this path (see
+# seecr.compiled.history and seecr.commands.play).
 
 # Largest motion of the command from waypoint to waypoint [robot's length], and the fewest and most
 # waypoints on the way to a row. Where a cable's tension turns between two waypoints, hysteresis and

@@ -1,1 +1,0 @@
-"""Commands to the winches, known loads, and the path between rows."""
