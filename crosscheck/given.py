@@ -12,10 +12,8 @@ import numpy as np
 
 from crosscheck.errors import CrosscheckError
 from seecr.arguments import finite
-from seecr.description.given import GivenRobot, robot_of
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import GivenRobot, load_robot, robot_file, robot_of
 from seecr.description.robot import Robot
-from seecr.description.shipped import robot_file
 from seecr.effects import Term, Terms, catalogue, effect_named
 from seecr.errors import InputError, RobotError
 from seecr.pose import Array

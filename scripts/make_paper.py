@@ -19,9 +19,8 @@ import numpy as np
 from paper_search import METHODS, search
 from paper_stiffness import HEAD, stiffness_rows
 
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import CABLES, load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import CABLES, model_path
 from seecr.equilibrium.solving import solve
 from seecr.planar import bar_equilibria, bar_tilt, midline_point, solution_manifold
 from seecr.pose import Array, transform_points

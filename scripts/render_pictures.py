@@ -36,8 +36,7 @@ from crosscheck.suite.cases import Case, select, shipped_cases
 from crosscheck.suite.run import run_case
 from crosscheck.suite.thresholds import load_thresholds
 from crosscheck.twin.make import make_twin
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.equilibrium.solving import solve
 from seecr.report.map_slices import map_figure
 from seecr.workspace.grid import Workspace

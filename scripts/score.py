@@ -50,9 +50,8 @@ from crosscheck.twin.hidden import choose, times
 from crosscheck.twin.lab import random_of, sweeps
 from crosscheck.twin.measure import Truth, measure
 from seecr.commands import Commands, Loads
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms, effect_named, layout_of
 from seecr.pose import quat_from_rotvec, quat_multiply
 

@@ -24,7 +24,7 @@ from crosscheck.suite.poses import demobot_sweep
 from crosscheck.twin.make import make_twin
 from crosscheck.twin.measure import measure
 from seecr.commands import Commands
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import model_path
 from seecr.inverse.correction import correct
 from seecr.pose import Array
 from seecr.prediction.sensed import placed

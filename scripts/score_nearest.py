@@ -25,9 +25,8 @@ from brute_cables import Pull, hanging, nearly_straight, straight
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects.cable import CableWeight
 from seecr.holding.distribution import balanced
 from seecr.inverse.correction import correct

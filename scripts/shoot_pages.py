@@ -20,7 +20,7 @@ from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.planning import make_plan
 from crosscheck.report import write_page
 from crosscheck.twin.make import Twin, make_twin
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import model_path
 from seecr.made import Made
 
 WIDTHS = (1280, 390)

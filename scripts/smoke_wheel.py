@@ -18,7 +18,7 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 SOLVE = """
 import seecr
 from crosscheck.report.glossary import entries
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import model_path
 
 robot = seecr.load_robot(model_path("demobot_cogiro"))
 solution = seecr.solve(robot, [[0.4, 0.25, 0.1, 1, 0, 0, 0]])

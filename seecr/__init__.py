@@ -19,9 +19,8 @@ from seecr.lazy import lazily
 
 if TYPE_CHECKING:
     from seecr.commands import Commands, Loads
-    from seecr.description.mjcf import load_robot
+    from seecr.description.mjcf import load_robot, model_names, model_path
     from seecr.description.robot import Joint, Robot
-    from seecr.description.shipped import model_names, model_path
     from seecr.effects import (
         Effect,
         Knowledge,
@@ -85,7 +84,7 @@ _MODULES = {
     "workspace.edges": ("boundary",),
     "workspace.grid": ("Workspace",),
     "workspace.maps": ("default_axes", "with_history", "workspace_map"),
-    "description.mjcf": ("load_robot",),
+    "description.mjcf": ("load_robot", "model_names", "model_path",),
     "prediction.model": ("Model", "load_model", "new_model"),
     "equilibrium.multiple": ("equilibria",),
     "planar": ("BarRest", "bar_equilibria", "bar_tilt", "midline_point", "solution_manifold"),
@@ -94,7 +93,6 @@ _MODULES = {
     "prediction.sensitivity": ("sensitivities",),
     "effects.setup": ("Setup",),
     "statics.solution": ("Jump", "Solution", "Status"),
-    "description.shipped": ("model_names", "model_path"),
     "prediction.uncertainty": ("Spread", "spread_of"),
     "workspace.bars": ("BarBalance", "BarManifold", "bar_balances", "bar_manifold"),
     "workspace.midlines": ("Midlines", "midline_points"),

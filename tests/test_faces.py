@@ -127,7 +127,7 @@ TRADE = {
     "seecr.columns.commands": {"read_commands"},
     "seecr.workspace.extent": {"own_directions"},
     "seecr.columns.reach": {"ABSURD"},
-    "seecr.description.shipped": {"CABLES"},
+    "seecr.description.mjcf": {"CABLES"},
     "seecr.pose": {"NORM_TOLERANCE"},
     "seecr.statics.starts": {"commanded_poses"},
     "seecr.workspace.maps": {"evenly"},

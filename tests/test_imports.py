@@ -232,7 +232,6 @@ DESCRIPTION = {
     "seecr.pose",
     "seecr.description.robot",
     "seecr.description.mjcf",
-    "seecr.description.hindrances",
     "seecr.effects",
 }
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from seecr.description.fingerprint import check_robot
-from seecr.description.given import GivenRobot, robot_of
+from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects import Term, Terms, apart, effect_named, layout_of
 from seecr.errors import InputError, InputFileError

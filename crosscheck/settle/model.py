@@ -14,8 +14,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from seecr.description.hindrances import hindrances
-from seecr.description.mjcf import not_mjcf, quiet_mujoco
+from seecr.description.mjcf import hindrances, not_mjcf, quiet_mujoco
 from seecr.errors import InputFileError
 
 _DISABLE = (

@@ -24,7 +24,7 @@ from crosscheck.suite.poses import (
     robot_sweep,
 )
 from seecr.arguments import whole
-from seecr.description.shipped import CABLES, model_path, robot_file
+from seecr.description.mjcf import CABLES, model_path, robot_file
 from seecr.pose import Array, quat_from_rotvec
 
 
@@ -59,7 +59,7 @@ class Case:
         name: on the terminal, in file names and for ``--case``.
         model: MJCF file that SEECR reads.
         mujoco_model: MJCF file that MuJoCo settles; the same one, unless the two are to differ.
-        cable: name of one of ``CABLES`` of :mod:`seecr.description.shipped`; None keeps the MJCF's
+        cable: name of one of ``CABLES`` of :mod:`seecr.description.mjcf`; None keeps the MJCF's
             stiffness.
         kind: ``"sweep"``, whose poses follow each other along a line, ``"random"``, or
             ``"starts"``: one command from several starts.

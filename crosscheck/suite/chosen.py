@@ -9,7 +9,7 @@ from typing import TypeAlias
 from crosscheck.given import GivenRobot
 from crosscheck.suite.cases import Case, select, shipped_cases, user_cases
 from crosscheck.suite.effects import GROUP, PREFIX, EffectCase, shipped_effect_cases
-from seecr.description.shipped import model_names
+from seecr.description.mjcf import model_names
 from seecr.errors import InputError
 
 __all__ = ["GivenCase", "chosen_cases", "every_shipped", "select", "shipped_like"]

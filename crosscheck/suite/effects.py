@@ -26,9 +26,8 @@ from crosscheck.twin.robot import TRUE_EFFECTS
 from crosscheck.twin.trajectory import trajectory
 from seecr.commands import Commands, Loads
 from seecr.counted import counted, some
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects import Effect, Term
 from seecr.parallel import run_tasks
 from seecr.pose import Array

@@ -147,7 +147,7 @@ def robot_at(given: Path, cable: str | None = None) -> Robot:
     import numpy as np
 
     from seecr import InputError, load_robot
-    from seecr.description.shipped import CABLES
+    from seecr.description.mjcf import CABLES
 
     robot = load_robot(given)
     if cable is None:

@@ -1,27 +1,145 @@
-"""Read a robot from MJCF: MuJoCo compiles the model, and only its numbers are used."""
+"""Robots from MJCF, given by path or name: MuJoCo compiles, and only its numbers are used."""
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from seecr.counted import counted
-from seecr.description.hindrances import hindrances
 from seecr.description.robot import ABSURD, Joint, Robot
-from seecr.description.shipped import is_shipped, robot_file
-from seecr.errors import RobotError, SeecrError
-from seecr.files import no_text, read_bytes
+from seecr.errors import InputError, RobotError, SeecrError
+from seecr.files import no_text, path_of, read_bytes
 from seecr.pose import Array, quat_rotate, quat_to_matrix
 
 if TYPE_CHECKING:
     import mujoco
+
+
+# What an MJCF has that may hold or stop a platform beside its cables: statics leave it out.
+#
+# Damping is none of it: it delays a rest, and shifts none.
+
+# MuJoCo's mjtDisableBit: all constraints, dry friction, limits, contacts.
+_CONSTRAINT, _FRICTIONLOSS, _LIMIT, _CONTACT = 1, 4, 8, 16
+# A pair of excluded bodies is one number, the first body's in its upper half.
+_UPPER = 16
+
+
+def hindrances(model: mujoco.MjModel, platform: int) -> tuple[str, ...]:
+    """Names of what may hold or stop the platform beside its cables, such as "contacts".
+
+    Args:
+        model: as compiled; what its flags switch off does not count.
+        platform: index of the platform's body.
+    """
+    off = int(model.opt.disableflags)
+    if off & _CONSTRAINT:
+        return ()
+    found = {
+        "joint limits": not off & _LIMIT and model.jnt_limited.any(),
+        "tendon limits": not off & _LIMIT and model.tendon_limited.any(),
+        "dry friction": not off & _FRICTIONLOSS
+        and (model.dof_frictionloss.any() or model.tendon_frictionloss.any()),
+        "contacts": not off & _CONTACT and _may_touch(model, platform),
+    }
+    return tuple(what for what, there in found.items() if there)
+
+
+def _may_touch(model: mujoco.MjModel, platform: int) -> bool:
+    """Whether a geom of the platform may touch one of its surroundings."""
+    own = model.geom_bodyid == platform
+    # pairs that are listed touch, whatever their geoms and bodies say otherwise
+    if np.any(own[model.pair_geom1] != own[model.pair_geom2]):
+        return True
+    kind, asks = model.geom_contype, model.geom_conaffinity
+    mine, its = np.flatnonzero(own), np.flatnonzero(~own)
+    touch = (kind[mine, None] & asks[its]) | (kind[its] & asks[mine, None])
+    kept_apart = np.isin(its, _excluded(model, platform))
+    return bool(np.any(touch[:, ~kept_apart]))
+
+
+def _excluded(model: mujoco.MjModel, platform: int) -> np.ndarray:
+    """Indices of the geoms of bodies that are excluded from contact with the platform."""
+    first, second = model.exclude_signature >> _UPPER, model.exclude_signature % (1 << _UPPER)
+    bodies = np.concatenate([second[first == platform], first[second == platform]])
+    return np.flatnonzero(np.isin(model.geom_bodyid, bodies))
+
+
+# What comes with the package: the paper's robots as MJCF files, and its two cables.
+
+CABLES: dict[str, float] = {"vectran": 3000.0, "fishing": 300.0}
+"""k_c = E S [N] of the paper's two cables (eq 10), by name.
+
+The paper gives no number, only that the fishing line is "approximately 10 times" softer than
+the Vectran (section IV). The fishing line, 0.4 mm of nylon at 1.5 to 3 GPa, has 190 to 380 N:
+300 N is taken, and ten times that for the 0.7 mm Vectran. Fit them where it matters.
+"""
+
+_HERE = Path(__file__).resolve().parents[1]
+# inside the package if installed from a wheel, beside it in a checkout or an editable install
+_PLACES = (_HERE / "models", _HERE.parent / "models")
+
+
+def model_names() -> tuple[str, ...]:
+    """Names of the shipped robots, in alphabetical order."""
+    files = (file for place in _PLACES for file in place.glob("*/*.xml"))
+    return tuple(sorted({file.stem for file in files if file.stem == file.parent.name}))
+
+
+def model_path(name: str) -> Path:
+    """The MJCF file of a shipped robot.
+
+    Args:
+        name: as in ``models/<name>/<name>.xml``, for example ``"demobot_cogiro"``.
+
+    Raises:
+        InputError: there is no robot of that name; the message lists the names, nearest first.
+    """
+    if str(name) in model_names():
+        files = (place / name / f"{name}.xml" for place in _PLACES)
+        return next(file for file in files if file.is_file())
+    raise InputError(f"shipped robot {name!r}: expected one of {_names_near(str(name))}")
+
+
+def robot_file(given: str | Path) -> Path:
+    """The MJCF file for a path, or for the name of a shipped robot if there is no such file.
+
+    Raises:
+        InputError: neither, and without a file extension; the message lists the names, nearest
+            first.
+    """
+    path = path_of(given, "an MJCF file, or the name of a shipped robot")
+    if path.is_file() or path.suffix:
+        return path
+    if str(given) in model_names():
+        return model_path(str(given))
+    if path.exists() or path.name != str(given):
+        return path
+    raise InputError(
+        f"{given}: neither a file nor a shipped robot; expected an MJCF file or one of "
+        f"{_names_near(str(given))}"
+    )
+
+
+def is_shipped(path: Path) -> bool:
+    """Whether a file is that of a shipped robot, as :func:`model_path` gives it."""
+    return path.parent.parent in _PLACES and path.stem == path.parent.name and path.is_file()
+
+
+def _names_near(name: str) -> str:
+    known = model_names()
+    nearest = difflib.get_close_matches(name, known, n=max(1, len(known)))
+    names = ", ".join([*nearest, *(k for k in known if k not in nearest)])
+    return names or "none: the models folder is missing"
+
 
 # An attribute whose numbers include a nan: MuJoCo would warn and write a log before refusing it.
 _NO_NUMBER = re.compile(
@@ -393,3 +511,26 @@ def _site_in_world(model: mujoco.MjModel, site: int) -> Array:
         position = model.body_pos[body] + quat_rotate(model.body_quat[body], position)
         body = int(model.body_parentid[body])
     return np.asarray(position)
+
+
+# Robots as callers give them: loaded, or as a path or name to load from.
+
+GivenRobot: TypeAlias = Robot | str | Path
+"""A robot, the path of its MJCF, or the name of a shipped one."""
+
+
+def robot_of(given: GivenRobot) -> Robot:
+    """The robot, loaded if a path or name is given.
+
+    Raises:
+        RobotError: there is no such file, or it holds no cable robot.
+        InputError: neither a robot nor a path or name.
+    """
+    if isinstance(given, Robot):
+        return given
+    if isinstance(given, str | Path):
+        return load_robot(given)
+    raise InputError(
+        "expected a robot, the path of its MJCF or the name of a shipped one, got "
+        f"{type(given).__name__}"
+    )

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr.arguments import finite
-from seecr.description.given import GivenRobot
+from seecr.description.mjcf import GivenRobot
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect, Layout
 from seecr.effects.knowledge import Knowledge

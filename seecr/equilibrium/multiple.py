@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from seecr.arguments import whole
 from seecr.commands import Commands
-from seecr.description.given import GivenRobot, robot_of
 from seecr.description.joints import pose_of_values, values_of_pose
+from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects.edits import setup_with
 from seecr.effects.setup import Setup

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from seecr.arguments import finite, whole
 from seecr.commands import Commands
 from seecr.counted import counted
-from seecr.description.given import GivenRobot, robot_of
+from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects.edits import setup_with
 from seecr.effects.setup import Setup

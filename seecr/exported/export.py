@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from seecr.commands import Commands
 from seecr.compiled.cable_law import LEAST
 from seecr.compiled.columns import CUBIC, FORCE_OF_WEIGHT, QUADRATIC, STRAIN, UP
-from seecr.description.given import GivenRobot, robot_of
+from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects import Effect
 from seecr.effects.edits import setup_with

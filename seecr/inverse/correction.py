@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from seecr.commands import Commands
 from seecr.compiled.columns import RADIUS, STRAIN
 from seecr.counted import between, counted, rows_words
-from seecr.description.given import GivenRobot, robot_of
+from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.errors import InputError

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from seecr.commands import Commands, Path, waypoints_of
 from seecr.compiled.columns import CONVERGED, ITERATIONS, SINGULAR, STALLED, STRAIN, TENSION
-from seecr.description.given import GivenRobot, robot_of
+from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect, Readings
 from seecr.effects.checked import edit_readings

@@ -43,7 +43,7 @@ from tomlkit.exceptions import TOMLKitError
 
 from seecr.counted import counted
 from seecr.description.fingerprint import check_robot, fingerprint
-from seecr.description.given import GivenRobot, robot_of
+from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects import Effect, Term, Terms, catalogue
 from seecr.errors import InputError

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from seecr.commands import Commands
-from seecr.description.given import GivenRobot, robot_of
 from seecr.description.joints import reachable
+from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects import Effect
 from seecr.errors import InputError

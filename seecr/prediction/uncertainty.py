@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.counted import counted
-from seecr.description.given import GivenRobot, robot_of
+from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.effects import Terms
 from seecr.files import read_text
 from seecr.pose import Array

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seecr.description.given import GivenRobot, robot_of
+from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.prediction.model import GivenEffects

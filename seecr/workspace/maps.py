@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from seecr.arguments import finite, whole
 from seecr.commands import Commands
-from seecr.description.given import GivenRobot, robot_of
+from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError

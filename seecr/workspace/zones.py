@@ -20,8 +20,8 @@ from seecr.arguments import finite, numbers
 from seecr.commands import Commands
 from seecr.compiled.columns import EXTERNAL_FORCE, EXTERNAL_MOMENT
 from seecr.counted import counted
-from seecr.description.given import GivenRobot, robot_of
 from seecr.description.joints import motion_columns, values_of_pose
+from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.holding.balance import balance_of, bends

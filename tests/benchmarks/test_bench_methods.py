@@ -10,7 +10,7 @@ import pytest
 
 import seecr
 from crosscheck.suite.cases import shipped_cases
-from seecr.description.shipped import CABLES, model_path
+from seecr.description.mjcf import CABLES, model_path
 from seecr.equilibrium.solving import METHODS
 from seecr.pose import pose_difference
 

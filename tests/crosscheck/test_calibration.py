@@ -21,8 +21,7 @@ from crosscheck.inference.search import Search
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.together import together
 from crosscheck.preparation.prepare import prepare
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Terms
 from seecr.pose import quat_from_rotvec, quat_multiply, quat_rotate
 

@@ -14,8 +14,7 @@ import crosscheck
 from crosscheck import given
 from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.data import Measurements
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Terms
 from seecr.errors import InputError
 

@@ -10,8 +10,7 @@ import pytest
 
 import seecr
 from seecr.arguments import whole
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import effect_named
 from seecr.errors import InputError
 

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.planar import bar_equilibria, bar_tilt, midline_point, solution_manifold

@@ -8,8 +8,7 @@ import numpy as np
 
 from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.measurements.data import Measurements, Sigma
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 
 SIGMA = Sigma(position_m=3e-5, orientation_rad=3.5e-4)
 RUNS, ROWS = 6, 12

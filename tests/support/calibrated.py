@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.prediction.model import Model, load_model
 
 ROBOT = load_robot(model_path("demobot_cogiro"))

@@ -10,9 +10,8 @@ from random_robots import random_poses, random_robot
 
 from seecr.commands import Commands
 from seecr.compiled.columns import GAP, REST
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects import Effect, Term, Terms, effect_named, layout_of
 from seecr.prediction.experiment import Experiment, Prediction
 from seecr.prediction.sensitivity import readings_difference

@@ -15,9 +15,8 @@ from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.write import write_measurements
 from crosscheck.twin.trajectory import trajectory
 from seecr.commands import Commands, Loads
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms, effect_named, layout_of
 from seecr.pose import quat_from_rotvec, quat_multiply
 from seecr.prediction.experiment import Experiment

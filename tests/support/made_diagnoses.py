@@ -11,9 +11,8 @@ from made_data import measured, term
 from crosscheck.diagnosis.diagnose import diagnose as diagnose_with
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.measurements.data import Measurements, Sigma
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 
 SIGMA = Sigma(position_m=3e-5, orientation_rad=3.5e-4, tension_N=0.03)
 POINTS = 6

@@ -19,8 +19,7 @@ from crosscheck.inference import fit as fit_module
 from crosscheck.inference.fit import Data, fit
 from crosscheck.preparation.prepare import prepare
 from crosscheck.terminal.addition import why_not
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Term, Terms
 from seecr.errors import InputError
 from seecr.prediction.uncertainty import covariance_of, spread_of

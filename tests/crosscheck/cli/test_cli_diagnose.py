@@ -21,8 +21,7 @@ from crosscheck.fit.reasons import DiagnosisVerdict, Unfit
 from crosscheck.inference.fit import Data
 from crosscheck.measurements.read import load_measurements
 from crosscheck.measurements.write import write_measurements
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Terms
 from seecr.prediction.model import load_model
 from seecr.prediction.uncertainty import covariance_of

@@ -7,7 +7,7 @@ import json
 import pytest
 from made_data import case, refused, run
 
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import model_path
 
 pytestmark = pytest.mark.slow
 

@@ -20,7 +20,7 @@ from crosscheck.suite import run as suite
 from crosscheck.suite.cases import shipped_cases
 from crosscheck.twin.robot import TRUE_EFFECTS
 from seecr.cli.group import LazyGroup
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import model_path
 
 SMALL = ("--case", "planar-two-cable", "--no-recordings", "--jobs", "1")
 PLANAR = model_path("planar_vertical")

@@ -9,8 +9,7 @@ import pytest
 from made_data import run
 
 from crosscheck.measurements.write import write_measurements
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 
 pytestmark = pytest.mark.slow
 

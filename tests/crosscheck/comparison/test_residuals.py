@@ -17,8 +17,7 @@ from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.travel import STILL
 from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.data import Sigma
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.errors import InputFileError
 from seecr.files import json_text
 from seecr.pose import pose_add, pose_difference

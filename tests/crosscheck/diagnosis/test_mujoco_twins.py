@@ -14,8 +14,7 @@ from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.measurements.read import load_measurements
 from crosscheck.twin.answer import unseal
 from crosscheck.twin.make import make_twin
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 
 pytestmark = pytest.mark.slow
 

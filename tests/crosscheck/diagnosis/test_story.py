@@ -13,8 +13,7 @@ from crosscheck.cli import main
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.write import write_measurements
 from seecr.commands import Commands
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects.geometry import PulleyRadius
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
 from seecr.prediction.experiment import Experiment

@@ -12,9 +12,8 @@ from made_data import COGIRO, measured, term
 from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.measurements.data import Measurements
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
 
 Change = Callable[[Measurements], None]

@@ -12,8 +12,7 @@ from made_data import refused, soft_cogiro, soft_xml
 
 from crosscheck.importing import import_case
 from crosscheck.importing.choices import ImportChoices
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.errors import SeecrError
 
 ROBOT = soft_cogiro()

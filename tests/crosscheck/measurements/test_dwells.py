@@ -12,8 +12,7 @@ from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.dwells import averaged_dwells
 from crosscheck.measurements.read import measurements_of
 from seecr.commands import Loads
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.pose import quat_from_rotvec
 
 DWELLS, READINGS, NOISE_M, NOISE_RAD = 60, 40, 1e-4, 3e-4

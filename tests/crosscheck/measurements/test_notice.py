@@ -14,8 +14,7 @@ from crosscheck.measurements import notice
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.read import load_measurements
 from seecr.columns.known import Columns
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.errors import InputFileError
 from seecr.pose import quat_from_rotvec, quat_multiply
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from crosscheck.measurements.read import load_measurements
 from seecr.columns.commands import read_commands
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.equilibrium.solving import solve
 from seecr.pose import pose_difference
 

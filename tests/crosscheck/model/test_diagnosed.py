@@ -13,9 +13,8 @@ from made_data import COGIRO
 
 from crosscheck.model import load_diagnosed
 from seecr.description.fingerprint import fingerprint
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.errors import InputFileError
 from seecr.files import json_text
 from seecr.made import digits_of

@@ -12,8 +12,7 @@ from made_data import COGIRO, measured, term
 
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import Provenance, calibrated, renewed, save_model, with_fit
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import catalogue, layout_of
 from seecr.effects.limits import range_of
 from seecr.errors import InputFileError

@@ -23,8 +23,7 @@ from crosscheck.planning.planned import Reads, planned
 from crosscheck.planning.sight import sight_of
 from crosscheck.planning.write import remark_of
 from crosscheck.preparation.prepare import prepare
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Terms
 from seecr.equilibrium.solving import solve
 from seecr.workspace.zones import feasible

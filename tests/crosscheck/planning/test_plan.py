@@ -31,8 +31,7 @@ from crosscheck.planning.visibility import (
     signals_like,
     signals_together,
 )
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Terms
 from seecr.equilibrium.solving import solve
 from seecr.files import json_text

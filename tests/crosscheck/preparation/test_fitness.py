@@ -17,8 +17,7 @@ from crosscheck.fit.reasons import DiagnosisVerdict, Unfit
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.planning.design import make_plan
 from crosscheck.preparation.prepare import prepare
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Term, Terms
 from seecr.pose import quat_from_rotvec
 

@@ -17,9 +17,8 @@ from crosscheck.inference.catalogue import candidates
 from crosscheck.inference.fit import Data, unfitted
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.preparation.prepare import prepare
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects import Terms
 from seecr.pose import quat_from_rxyz, rxyz_from_quat
 

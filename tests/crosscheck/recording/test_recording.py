@@ -24,8 +24,7 @@ from crosscheck.suite.results import CaseResult
 from crosscheck.suite.run import Run, results_json, run_case
 from crosscheck.suite.thresholds import load_thresholds
 from crosscheck.suite.verdicts import Verdict
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.errors import InputFileError
 from seecr.pose import quat_conjugate, quat_multiply
 from seecr.recording import shapes

@@ -18,8 +18,7 @@ from crosscheck.settle.model import (
     platform_of,
 )
 from crosscheck.settle.physics import Physics
-from seecr.description.mjcf import load_robot, quiet_mujoco
-from seecr.description.shipped import model_names, model_path
+from seecr.description.mjcf import load_robot, model_names, model_path, quiet_mujoco
 from seecr.errors import InputFileError, RobotError
 
 PLANAR = model_path("planar_vertical").read_text(encoding="utf-8")

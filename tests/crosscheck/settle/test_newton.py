@@ -11,8 +11,7 @@ from crosscheck.settle.physics import Physics
 from crosscheck.twin.robot import true_robot
 from crosscheck.twin.springs import Springs
 from crosscheck.twin.world import World
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import effect_named
 
 EA, REST, MASS, G = 100.0, 0.75, 0.4, 9.81

@@ -23,7 +23,7 @@ from crosscheck.suite.effects import (
 from crosscheck.suite.outcome import Outcome
 from crosscheck.twin.hidden import CONTAINED
 from crosscheck.twin.robot import TRUE_EFFECTS
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import model_path
 
 PARALLEL = model_path("demobot_parallel")
 ROOT = Path(__file__).resolve().parents[3]

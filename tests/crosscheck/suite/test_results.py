@@ -23,7 +23,7 @@ from crosscheck.suite.thresholds import load_thresholds
 from crosscheck.suite.verdicts import PoseFinding, Verdict
 from crosscheck.suite.worst_pose import worst_pose, write_worst_pose
 from crosscheck.terminal.suite import print_run
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import model_path
 from seecr.errors import SeecrError
 from seecr.files import json_text, staged
 

@@ -29,7 +29,7 @@ from crosscheck.suite.results import CaseResult, failure_lines, finding_lines, r
 from crosscheck.suite.run import run_case, run_suite
 from crosscheck.suite.thresholds import SHIPPED, FindingLimits, load_thresholds, thresholds_toml
 from crosscheck.suite.verdicts import Verdict
-from seecr.description.shipped import CABLES, model_path
+from seecr.description.mjcf import CABLES, model_path
 from seecr.errors import InputFileError
 from seecr.files import plain
 from seecr.pose import pose_add, pose_difference, quat_from_rotvec

@@ -28,7 +28,7 @@ from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.run import Run, run_suite, verdict_line
 from crosscheck.suite.thresholds import load_thresholds
 from seecr.compiled import columns
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import model_path
 from seecr.effects import catalogue
 from seecr.equilibrium import search
 from seecr.pose import quat_conjugate, quat_from_rotvec, quat_multiply

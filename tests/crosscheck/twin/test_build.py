@@ -8,8 +8,7 @@ import pytest
 
 from crosscheck.twin.build import build, tail_of
 from crosscheck.twin.robot import true_robot
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import effect_named
 
 

@@ -11,8 +11,7 @@ from crosscheck.settle.settler import Settler
 from crosscheck.suite.poses import demobot_sweep
 from crosscheck.twin.measure import measure
 from seecr.commands import Commands
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import CABLES, model_path
+from seecr.description.mjcf import CABLES, load_robot, model_path
 from seecr.effects import Term
 from seecr.inverse.correction import correct
 from seecr.pose import pose_difference

@@ -24,8 +24,7 @@ from crosscheck.twin.make import make_twin
 from crosscheck.twin.robot import TRUE_EFFECTS
 from crosscheck.twin.trajectory import trajectory
 from seecr.commands import Commands
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Term, effect_named, layout_of
 from seecr.errors import InputError, InputFileError
 from seecr.files import json_text

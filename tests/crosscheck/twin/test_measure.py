@@ -22,8 +22,7 @@ from crosscheck.twin.robot import TRUE_EFFECTS, true_robot
 from crosscheck.twin.springs import Springs
 from crosscheck.twin.world import World
 from seecr.commands import Commands
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import BUILT_IN, Effect, effect_named, parameter
 from seecr.pose import pose_difference, quat_from_rotvec
 from seecr.prediction.experiment import Experiment

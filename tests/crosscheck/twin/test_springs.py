@@ -9,8 +9,7 @@ import pytest
 
 from crosscheck.twin.robot import TrueRobot, true_robot
 from crosscheck.twin.springs import Cable, Springs
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import effect_named
 
 EA, REST = 300.0, 0.8

@@ -16,8 +16,7 @@ from click.testing import CliRunner, Result
 from seecr.cli import COMMANDS, main
 from seecr.cli.arguments import robot_at
 from seecr.columns.commands import read_commands
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.equilibrium.solving import solve
 from seecr.planar import midline_point
 from seecr.pose import transform_points

@@ -16,8 +16,7 @@ from click.testing import CliRunner, Result
 from crosscheck.cli import main as crosscheck_main
 from seecr.cli import main as seecr_main
 from seecr.cli.following import following as next_line
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 
 QUIET = ("--figure", "none", "--no-recording")
 COGIRO = model_path("demobot_cogiro")

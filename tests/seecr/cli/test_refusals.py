@@ -9,8 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from seecr.cli import main
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 
 CSV = "run,cmd_x_m,cmd_y_m,cmd_z_m\na,0.4,0.25,0.1\n"
 ROBOT = "planar_vertical"

@@ -9,9 +9,8 @@ import pytest
 
 from crosscheck.measurements.read import load_commands
 from seecr.columns.commands import read_commands
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.errors import InputFileError
 
 LENGTHS = ",".join(f"length_{i}_mm" for i in range(1, 9))

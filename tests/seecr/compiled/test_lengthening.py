@@ -17,8 +17,7 @@ from seecr.compiled.columns import (
     TENSION,
     WINCH_SIDE,
 )
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Term, catalogue, layout_of
 from seecr.holding.balance import here, with_rest
 from seecr.holding.hanging import rest_after, rest_for

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from seecr.description.fingerprint import check_robot, fingerprint
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.errors import InputFileError
 
 PATH = Path("model.toml")

@@ -9,10 +9,8 @@ import pytest
 from click.testing import CliRunner
 
 from seecr.cli import main
-from seecr.description import hindrances as module
-from seecr.description.hindrances import hindrances
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_names, model_path
+from seecr.description import mjcf as module
+from seecr.description.mjcf import hindrances, load_robot, model_names, model_path
 
 PLANAR = model_path("planar_vertical").read_text(encoding="utf-8")
 SLIDE = '<joint name="x" type="slide"'

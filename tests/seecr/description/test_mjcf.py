@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from random_robots import KINDS, random_robot, write_mjcf
 
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.equilibrium.solving import solve
 from seecr.errors import RobotError
 from seecr.pose import quat_from_rotvec, quat_rotate

@@ -16,9 +16,8 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from seecr.description import shipped
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import CABLES, model_names, model_path, robot_file
+from seecr.description import mjcf
+from seecr.description.mjcf import CABLES, load_robot, model_names, model_path, robot_file
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.prediction.model import load_model
@@ -444,7 +443,7 @@ def test_a_robot_is_a_file_or_a_shipped_name(
 
 
 def test_missing_models_folder_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(shipped, "_PLACES", (tmp_path,))
+    monkeypatch.setattr(mjcf, "_PLACES", (tmp_path,))
     with pytest.raises(InputError, match="none: the models folder is missing"):
         model_path("demobot_cogiro")
 
@@ -470,7 +469,7 @@ def test_a_shipped_robot_is_read_once_and_again_if_its_file_is_written_anew(
     path.parent.mkdir()
     path.write_bytes(model_path("ipanema").read_bytes())
     assert load_robot(path) is not load_robot(path), "what a user's file includes may change"
-    monkeypatch.setattr(shipped, "_PLACES", (tmp_path,))
+    monkeypatch.setattr(mjcf, "_PLACES", (tmp_path,))
     before = load_robot("own")
     assert load_robot("own") is before
     path.write_bytes(model_path("own").read_bytes().replace(b"ipanema", b"other"))

@@ -10,9 +10,8 @@ import pytest
 from random_robots import KINDS, random_poses, random_robot
 
 from seecr.description.joints import motion_columns, pose_of_values, values_of_pose
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Joint, Robot
-from seecr.description.shipped import model_path
 from seecr.errors import InputError, RobotError
 from seecr.pose import pose_difference
 

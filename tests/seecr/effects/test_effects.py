@@ -20,9 +20,8 @@ from effect_cases import (
 )
 from random_robots import random_robot
 
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects import (
     BUILT_IN,
     PLACES,

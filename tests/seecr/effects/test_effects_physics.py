@@ -11,9 +11,8 @@ from random_robots import random_poses, random_robot
 
 from seecr.commands import Commands
 from seecr.compiled.cable_law import pulley_geometry
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects import Effect, effect_named, layout_of
 from seecr.effects.cable import usual_strain
 from seecr.effects.setup import plain_setup

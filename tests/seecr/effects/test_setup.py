@@ -9,9 +9,8 @@ import pytest
 
 from seecr.commands import Commands, turning
 from seecr.compiled.columns import N_COLUMNS, N_LOAD
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects.setup import QUANTITIES, History, Setup, plain_setup
 from seecr.errors import InputError
 from seecr.prediction.experiment import Experiment

@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 from plain_steps import Plain, plain_fsolve
 
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import CABLES, load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import CABLES, model_path
 from seecr.equilibrium.solving import solve
 from seecr.statics.solution import Status
 

@@ -10,9 +10,8 @@ import pytest
 from plain_steps import exact_residual
 from random_robots import KINDS, random_poses, random_robot
 
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Joint, Robot
-from seecr.description.shipped import model_path
 from seecr.effects import Term
 from seecr.equilibrium.solving import METHODS, solve
 from seecr.errors import InputError

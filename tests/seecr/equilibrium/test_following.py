@@ -9,9 +9,8 @@ import pytest
 
 from crosscheck.settle.settler import Settler
 from seecr.commands import Commands
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects import Term
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError

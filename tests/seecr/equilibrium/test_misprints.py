@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.pose import quat_from_rxyz, quat_to_matrix
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from seecr.description.joints import pose_of_values
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects import Term
 from seecr.equilibrium.coordinates import moved
 from seecr.equilibrium.multiple import _spread, elsewhere, equilibria

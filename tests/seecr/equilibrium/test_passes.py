@@ -7,9 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects import Term, effect_named, layout_of
 from seecr.equilibrium import passes
 from seecr.equilibrium.coordinates import evaluated, moved

@@ -13,8 +13,7 @@ from click.testing import CliRunner
 from crosscheck.planning.design import make_plan
 from seecr.cli import main
 from seecr.commands import Commands
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_names, model_path
+from seecr.description.mjcf import load_robot, model_names, model_path
 from seecr.equilibrium.solving import solve
 from seecr.equilibrium.strained import strained, strained_rows
 

@@ -11,9 +11,8 @@ from three_cables import THREE
 
 from crosscheck.settle.settler import Settler, settle_batch
 from seecr.compiled.catenary import catenary_span
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError, NoRestError

@@ -7,9 +7,8 @@ import pytest
 
 from seecr.commands import Commands
 from seecr.compiled.columns import TENSION
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects.base import Effect
 from seecr.effects.cable import CableWeight
 from seecr.effects.geometry import PulleyRadius

@@ -10,8 +10,7 @@ import pytest
 from scipy.optimize import minimize
 
 from seecr.commands import Commands
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Term
 from seecr.equilibrium.solving import solve
 from seecr.holding.hanging import least_of_heavy

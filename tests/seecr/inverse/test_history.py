@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from seecr.commands import Commands
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.holding.lengths import Held
 from seecr.inverse import history
 from seecr.inverse.history import REACHED, lengths_with_history

@@ -13,9 +13,8 @@ from scipy.optimize import minimize
 
 from seecr.commands import Commands, Loads, play
 from seecr.compiled.columns import STRAIN
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects import Term, catalogue, layout_of
 from seecr.errors import InputError
 from seecr.holding.unheld import why_not_held

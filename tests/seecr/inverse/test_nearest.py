@@ -7,8 +7,7 @@ import pytest
 import score_nearest
 
 from seecr.description.joints import pose_of_values, values_of_pose
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects.cable import CableWeight
 from seecr.effects.terms import Term
 from seecr.errors import InputError

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputFileError
 from seecr.prediction.data_reach import DataReach

@@ -10,9 +10,8 @@ from effect_cases import KINDS, experiment_of, random_effect
 
 from seecr.commands import Commands
 from seecr.compiled.columns import STALLED
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Joint, Robot
-from seecr.description.shipped import model_path
 from seecr.effects import effect_named
 from seecr.effects.setup import plain_setup
 from seecr.equilibrium.solving import solve

@@ -25,8 +25,8 @@ from seecr.compiled.columns import (
     WINCH_TENSION,
 )
 from seecr.description.joints import pose_of_values, values_of_pose
+from seecr.description.mjcf import CABLES
 from seecr.description.robot import Joint, Robot
-from seecr.description.shipped import CABLES
 from seecr.effects import Effect, effect_named
 from seecr.pose import pose_add, pose_difference
 from seecr.prediction.experiment import Experiment, Prediction

@@ -12,8 +12,7 @@ from click.testing import CliRunner
 from seecr.cli import main
 from seecr.commands import Commands
 from seecr.description.joints import off_joints
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Term
 from seecr.inverse.correction import correct
 from seecr.pose import pose_difference, quat_rotate

@@ -11,8 +11,7 @@ import pytest
 from recordings import Readback, headless_viewer
 from slab import slides
 
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.recording import elastic
 from seecr.recording.colours import scale_colours
 from seecr.recording.elastic import Elastic

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 import rerun.blueprint as rrb
 
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.recording.legends import Legend, legend_of
 from seecr.recording.shapes import cable_labels, extent
 

@@ -13,9 +13,8 @@ from kept_figures import keep_figures
 from matplotlib.colors import to_hex
 from slab import slides
 
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.report.map_slices import map_figure
 from seecr.report.maps import softest_line
 from seecr.workspace.grid import Workspace

@@ -11,8 +11,7 @@ import pytest
 from recordings import Readback
 
 from seecr.columns.commands import read_commands
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.equilibrium.solving import solve
 from seecr.files import json_text
 from seecr.inverse.correction import correct

@@ -16,8 +16,7 @@ from kept_figures import keep_figures
 from slab import slides
 
 from seecr.cli import main
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.equilibrium.solving import solve
 from seecr.prediction.uncertainty import Spread, spread_of
 from seecr.report.sweep_panels import sweep_figure

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 import seecr
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import model_path
 from seecr.effects import Term
 from seecr.equilibrium.passes import Barrier
 from seecr.pose import quat_from_rotvec

@@ -9,9 +9,8 @@ from one_cable import cable, in_direction, pull
 from scipy.integrate import quad
 
 from seecr.compiled.columns import EA, ENERGY, RADIUS, REST, WEIGHT
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects import Term
 from seecr.equilibrium.coordinates import evaluated, moved, step_between
 from seecr.equilibrium.multiple import equilibria

@@ -10,9 +10,8 @@ import pytest
 
 from crosscheck.settle.newton import stiffness
 from crosscheck.settle.physics import Physics
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects import Term
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from calibrated import KEPT, MODEL, POSES, ROBOT, model_of
 
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError

@@ -18,9 +18,8 @@ from random_robots import random_poses, random_robot
 from unbalanced import unbalanced
 
 from seecr import parallel
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.effects import Term
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from seecr.commands import Commands, Loads
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Term
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError

@@ -10,9 +10,8 @@ from random_robots import KINDS, random_poses, random_robot
 from scipy.optimize import linprog
 from unbalanced import unbalanced
 
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
-from seecr.description.shipped import model_path
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import quat_rotate

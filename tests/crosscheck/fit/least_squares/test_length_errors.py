@@ -13,8 +13,7 @@ from crosscheck.fit.least_squares import length_errors
 from crosscheck.fit.least_squares.length_errors import Rows, with_length_errors
 from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.measurements.data import Sigma
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.pose import Array
 
 SOFT = [("demobot_parallel", 5e-4), ("demobot_cogiro", 2e-3)]

@@ -14,8 +14,7 @@ from crosscheck.fit.noise.whiteness import whiteness
 from crosscheck.inference.fit import Data, fit
 from crosscheck.inference.noise import Noise
 from crosscheck.measurements.data import Sigma
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Terms
 from seecr.pose import quat_from_rotvec, quat_from_rxyz, quat_multiply, rxyz_from_quat
 

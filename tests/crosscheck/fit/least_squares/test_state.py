@@ -11,8 +11,7 @@ from made_data import SIGMA, measured
 from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.least_squares.state import State, evaluate
 from crosscheck.measurements.data import Measurements
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Terms
 from seecr.equilibrium.multiple import equilibria
 from seecr.pose import Array

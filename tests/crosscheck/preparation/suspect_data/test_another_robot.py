@@ -15,8 +15,7 @@ from crosscheck.measurements.read import load_commands, load_measurements
 from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
 from crosscheck.preparation.prepare import prepare
-from seecr.description.mjcf import load_robot
-from seecr.description.shipped import model_path
+from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Terms
 from seecr.errors import InputFileError
 from seecr.pose import quat_from_rotvec, quat_multiply, rotvec_from_quat
