@@ -136,7 +136,7 @@ TRADE = {
     "seecr.counted": {"counted"},
     "seecr.units": {"millimetres"},
     "seecr.description.robot": {"ITS_A_POINT"},
-    "seecr.effects.unfed": {"unfed"},
+    "seecr.effects.base": {"unfed"},
     "seecr.equilibrium.strained": {"strained", "strained_rows"},
     "seecr.equilibrium.multiple": {"elsewhere", "on_their_way"},
     # processes

@@ -184,7 +184,7 @@ def notes_of(
         commands: as given; None for poses without times and temperatures.
     """
     from seecr import Commands
-    from seecr.effects.unfed import unfed
+    from seecr.effects.base import unfed
     from seecr.equilibrium.strained import strained, strained_rows
     from seecr.report.scalar_last import scalar_last
 

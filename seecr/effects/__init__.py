@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from seecr.effects.base import PLACES, Effect, Layout, Readings, parameter
-from seecr.effects.knowledge import Knowledge
-from seecr.effects.own_values import Apart, ApartLayout, Own, Values, apart
+from seecr.effects.base import PLACES, Effect, Knowledge, Layout, Readings, parameter
 from seecr.effects.registry import BUILT_IN, catalogue, effect_named, layout_of
-from seecr.effects.terms import Term, Terms
+from seecr.effects.terms import Apart, ApartLayout, Own, Term, Terms, Values, apart
 
 __all__ = [
     "BUILT_IN",

@@ -10,9 +10,8 @@ import numpy as np
 
 from seecr.commands import Commands
 from seecr.description.robot import Robot
-from seecr.effects.base import Effect, mean_length, of_length, parameter
+from seecr.effects.base import Effect, Total, mean_length, of_length, parameter
 from seecr.effects.setup import Setup
-from seecr.effects.totals import Total
 from seecr.pose import Array
 from seecr.pose_rows import moved_by
 

@@ -15,18 +15,88 @@ An effect of your own goes through the entry point group ``seecr.effects`` (docs
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.commands import Commands
 from seecr.description.robot import Robot
 from seecr.effects.setup import Setup
-from seecr.effects.totals import Total
 from seecr.errors import InputError
 from seecr.pose import Array
+
+# What is known of an effect's parameters beside the data that a fit sees.
+
+
+@dataclass(frozen=True, eq=False)
+class Knowledge:
+    """Of p parameters: which are never fitted, and which somebody measured independently.
+
+    Attributes:
+        fixed: (p,) bool: stays as it is in every fit.
+        value: (p,) measured independently, each in its unit; NaN where nobody did.
+        stderr: (p,) standard error of that; inf where nobody did.
+    """
+
+    fixed: NDArray[np.bool_]
+    value: Array
+    stderr: Array
+
+    @classmethod
+    def nothing(cls, count: int) -> Knowledge:
+        """Of so many parameters, nothing."""
+        return cls(np.zeros(count, dtype=bool), np.full(count, np.nan), np.full(count, np.inf))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Knowledge]) -> Knowledge:
+        """Of several effects' parameters, one after another."""
+        whole = [cls.nothing(0), *parts]
+        return cls(
+            np.concatenate([part.fixed for part in whole]),
+            np.concatenate([part.value for part in whole]),
+            np.concatenate([part.stderr for part in whole]),
+        )
+
+    @property
+    def measured(self) -> NDArray[np.bool_]:
+        """(p,) whether a fit is to take what was measured as a reading."""
+        return np.asarray(np.isfinite(self.stderr) & ~self.fixed)
+
+    @property
+    def any(self) -> bool:
+        """Whether anything is known."""
+        return bool(np.any(self.fixed) or np.any(self.measured))
+
+
+# What a person who measures would find: totals, and those that no robot can have.
+#
+# An effect's parameter is often a difference: a platform 0.047 kg heavier. A scale shows 0.447 kg.
+
+
+@dataclass(frozen=True)
+class Total:
+    """A number as it can be measured on the robot.
+
+    Attributes:
+        value: with the effect. nominal: as the robot's file has it.
+        unit: of both, as in the suffixes of CSV columns.
+        lower, upper: what is possible lies between.
+    """
+
+    value: float
+    nominal: float
+    unit: str
+    lower: float = -np.inf
+    upper: float = np.inf
+
+    @property
+    def possible(self) -> bool:
+        """Whether a robot can have it."""
+        return bool(self.lower < self.value < self.upper)
+
 
 Scale = float | Callable[[Robot], float]
 PLACES = ("actuation", "geometry", "cable", "structure", "load", "sensing")
@@ -290,3 +360,57 @@ def of_length(part: float) -> OfRobot:
     """A plausible size that is a part of the mean cable length."""
     words = f"{100.0 * part:g} % of the mean cable length"
     return OfRobot(words, lambda robot: part * mean_length(robot))
+
+
+# How large the values of an effect may be, in a model's file or by name.
+#
+# Most parameters have physical bounds in their effect; these limits are for the others. They are
+# far beyond anything that a robot can have, so they only stop typing errors, units and damaged
+# files, whose squares the solver could not even compute.
+
+# A value may differ from null by so many plausible sizes, an angle by one full turn. What a tracker
+# reads may be in the coordinates of its hall.
+_LARGEST_SIZE, _LARGEST_READ, _TURN = 1e4, 1e5, 2.0 * np.pi
+
+
+def range_of(layout: Layout, i: int) -> tuple[float, float]:
+    """The lowest and the highest value that parameter i may have."""
+    lower, upper = float(layout.lower[i]), float(layout.upper[i])
+    if layout.shape[i]:  # its bounds are its search range
+        return lower, upper
+    sizes = _LARGEST_READ if layout.effect.place == "sensing" else _LARGEST_SIZE
+    most = _TURN if layout.units[i] == "rad" else sizes * float(layout.scale[i])
+    null = float(layout.null[i])
+    return max(lower, null - most), min(upper, null + most)
+
+
+def beyond(layout: Layout, i: int, value: float) -> str:
+    """What is wrong with a value that parameter i cannot have; "" if nothing is."""
+    low, high = range_of(layout, i)
+    if low <= value <= high:
+        return ""
+    return f"{value:g} is out of bounds; expected {low:g} to {high:g}"
+
+
+# Effects that do nothing because commands lack what they depend on: their times, temperatures.
+
+# What commands may lack: as an effect names it, and its column in a file.
+_COLUMNS = {"time": "t_s", "temperature": "temperature_C"}
+
+
+def unfed(effects: Iterable[Effect], commands: Commands) -> tuple[str, ...]:
+    """A sentence for each of some effects that is left out for want of times or temperatures."""
+    return tuple(
+        f"{effect.name} is left out: it needs the {need} of every command "
+        f"(Commands.{need}, or column {column} of a file), and there is none"
+        for effect in effects
+        for need, column in _COLUMNS.items()
+        if need in effect.needs and getattr(commands, need) is None and not _absent(effect)
+    )
+
+
+def _absent(effect: Effect) -> bool:
+    """Whether an effect's values are those at which it is none."""
+    own = [f for f in fields(effect) if "null" in f.metadata and not f.metadata["shape"]]
+    values = [(getattr(effect, f.name), f.metadata["null"]) for f in own]
+    return all(value is None or bool(np.all(value == null)) for value, null in values)

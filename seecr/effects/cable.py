@@ -8,9 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from seecr.description.robot import Robot
-from seecr.effects.base import Effect, OfRobot, mean_length, of_length, parameter
+from seecr.effects.base import Effect, OfRobot, Total, mean_length, of_length, parameter
 from seecr.effects.setup import Setup
-from seecr.effects.totals import Total
 from seecr.pose import Array
 
 

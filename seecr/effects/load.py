@@ -9,9 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from seecr.description.robot import Robot
-from seecr.effects.base import Effect, OfRobot, parameter
+from seecr.effects.base import Effect, OfRobot, Total, parameter
 from seecr.effects.setup import Setup
-from seecr.effects.totals import Total
 from seecr.pose import Array, quat_from_rotvec, quat_rotate
 
 # No platform is lighter than this part of what its file says, nor has its centre of mass this

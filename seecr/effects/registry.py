@@ -27,11 +27,10 @@ from seecr.effects.cable import (
     Stiffness,
     WinchSideLength,
 )
-from seecr.effects.checked import check_class
-from seecr.effects.geometry import AnchorPointError, ExitPointError, PulleyRadius
+from seecr.effects.edits import check_class
+from seecr.effects.geometry import AnchorPointError, ExitPointError, FrameCompliance, PulleyRadius
 from seecr.effects.load import CentreOfMass, ExternalWrench, GravityTilt, PlatformMass
 from seecr.effects.sensing import TensionScale, TrackerFrame, TrackerScale, TrackerTarget
-from seecr.effects.structure import FrameCompliance
 from seecr.errors import InputError
 
 BUILT_IN: tuple[type[Effect], ...] = (

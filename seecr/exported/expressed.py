@@ -10,7 +10,7 @@ import numpy as np
 from seecr.commands import Commands
 from seecr.description.robot import Robot
 from seecr.effects import Effect
-from seecr.effects.checked import edit_setup
+from seecr.effects.edits import edit_setup
 from seecr.effects.setup import QUANTITIES, History, plain_setup
 from seecr.prediction.experiment import senses
 

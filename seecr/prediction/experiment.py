@@ -13,12 +13,10 @@ from seecr.commands import Commands, Path, waypoints_of
 from seecr.compiled.columns import CONVERGED, ITERATIONS, SINGULAR, STALLED, STRAIN, TENSION
 from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
-from seecr.effects.base import Effect, Readings
-from seecr.effects.checked import edit_readings
-from seecr.effects.edits import Edits
+from seecr.effects.base import Effect, Readings, unfed
+from seecr.effects.edits import Edits, edit_readings
 from seecr.effects.setup import Setup, plain_setup
 from seecr.effects.terms import Term
-from seecr.effects.unfed import unfed
 from seecr.pose import Array
 from seecr.result import COORDINATES, Record, Result, named, rows_of
 from seecr.statics import batch

@@ -18,7 +18,7 @@ import numpy as np
 from seecr.compiled.columns import STRAIN
 from seecr.description.joints import motion_columns
 from seecr.effects.base import Effect, Readings
-from seecr.effects.checked import is_built_in
+from seecr.effects.edits import is_built_in
 from seecr.effects.terms import Terms
 from seecr.parallel import run_parts
 from seecr.pose import Array

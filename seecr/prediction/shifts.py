@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.effects.base import Effect, Layout
-from seecr.effects.checked import is_built_in
+from seecr.effects.edits import is_built_in
 from seecr.effects.setup import QUANTITIES, History, Setup
 from seecr.effects.terms import Term, Terms
 from seecr.pose import Array

@@ -16,8 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from seecr.effects.base import Layout
-from seecr.effects.limits import beyond
+from seecr.effects.base import Layout, beyond
 from seecr.errors import InputFileError
 from seecr.pose import LARGEST
 

@@ -13,7 +13,7 @@ import tomlkit
 from seecr.counted import plural, some
 from seecr.effects import Knowledge, Own, Term, Values, layout_of
 from seecr.effects.base import Layout
-from seecr.effects.own_values import KINDS
+from seecr.effects.terms import KINDS
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.prediction.cells.cell import Where, cell_of

@@ -14,7 +14,7 @@ from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import Provenance, calibrated, renewed, save_model, with_fit
 from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import catalogue, layout_of
-from seecr.effects.limits import range_of
+from seecr.effects.base import range_of
 from seecr.errors import InputFileError
 from seecr.prediction.experiment import predict
 from seecr.prediction.model import load_model, new_model

@@ -12,7 +12,7 @@ from effect_cases import experiment_of
 
 from seecr.effects import Effect
 from seecr.effects.base import Readings
-from seecr.effects.checked import edit_readings, edit_setup, is_built_in
+from seecr.effects.edits import edit_readings, edit_setup, is_built_in
 from seecr.effects.load import PlatformMass
 from seecr.effects.setup import Setup, plain_setup
 from seecr.errors import InputError

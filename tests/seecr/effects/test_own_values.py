@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import seecr
-from seecr.effects.own_values import Apart, Own, apart
+from seecr.effects.terms import Apart, Own, apart
 
 BASE = seecr.layout_of("cable_length_offset", "demobot_cogiro")
 DAYS = apart(BASE, "file", ("monday", "tuesday"), BASE.null + 0.001)

@@ -8,8 +8,8 @@ from rectangle import RECTANGLE
 
 from seecr.commands import Commands
 from seecr.effects import layout_of
+from seecr.effects.geometry import FrameCompliance
 from seecr.effects.setup import Setup, plain_setup
-from seecr.effects.structure import FrameCompliance
 
 
 def edited(*effects: FrameCompliance) -> Setup:

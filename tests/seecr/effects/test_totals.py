@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from seecr.effects.totals import Total
+from seecr.effects.base import Total
 
 
 def test_a_number_is_possible_between_its_limits_and_not_at_them() -> None:

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 import seecr
 from seecr.cli import main
-from seecr.effects.unfed import unfed
+from seecr.effects.base import unfed
 
 ROBOT = seecr.load_robot("planar_vertical")
 WARM = seecr.Term.of(ROBOT, "thermal_expansion", expansion_1_per_K=1e-4)

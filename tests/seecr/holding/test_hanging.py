@@ -11,8 +11,7 @@ from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.effects.cable import CableWeight
-from seecr.effects.geometry import PulleyRadius
-from seecr.effects.structure import FrameCompliance
+from seecr.effects.geometry import FrameCompliance, PulleyRadius
 from seecr.holding.balance import balance_of, linearised_at, with_rest
 from seecr.holding.hanging import bridged_lengths, least_of_heavy, rest_for
 from seecr.holding.lengths import Held, hold, hold_again
