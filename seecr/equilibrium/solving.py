@@ -22,9 +22,8 @@ from seecr.equilibrium.search import solve_setup
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.prediction.experiment import Experiment, effects_of
-from seecr.statics.led import led
 from seecr.statics.solution import Solution
-from seecr.statics.starts import Commanded, HasCommands, commanded_poses
+from seecr.statics.starts import Commanded, HasCommands, commanded_poses, poses_from_lengths
 
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects
@@ -124,7 +123,7 @@ def solve(
             if isinstance(poses, Commands)
             else replace(commands, run=np.arange(len(commands)))
         )
-        starts = led(robot, apart)
+        starts = poses_from_lengths(robot, apart)
     pushes = np.broadcast_to(np.zeros(6) if pushed is None else pushed, (len(commands), 6))
     if follow:
         if method != "newton" or start is not None:

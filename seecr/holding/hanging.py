@@ -11,8 +11,7 @@ import numpy as np
 from seecr.compiled.columns import FRICTION, GAP, REST, UP, WEIGHT
 from seecr.parallel import in_parts
 from seecr.pose import Array
-from seecr.statics.spans import ways
-from seecr.statics.tables import Tables
+from seecr.statics.tables import Tables, ways
 
 # Least mean tension [weight of the cable], and the largest bend of a catenary, that are considered.
 _LEAST, _MOST_BENT = 0.8, 1.0

@@ -30,9 +30,8 @@ from seecr.pose_rows import changes_between
 from seecr.prediction.experiment import Experiment, Prediction, effects_of
 from seecr.result import COORDINATES, MOTION, Record, Result, named, rows_of
 from seecr.statics.solution import Solution
-from seecr.statics.spans import spanless
 from seecr.statics.starts import Commanded, commands_from
-from seecr.statics.tables import Tables, assemble, take
+from seecr.statics.tables import Tables, assemble, spanless, take
 from seecr.units import millimetres, without_rounding
 
 if TYPE_CHECKING:

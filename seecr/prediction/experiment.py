@@ -20,9 +20,8 @@ from seecr.effects.terms import Term
 from seecr.pose import Array
 from seecr.result import COORDINATES, Record, Result, named, rows_of
 from seecr.statics import batch
-from seecr.statics.led import led
 from seecr.statics.solution import Solution, certify
-from seecr.statics.starts import Commanded, answered, commands_from, start_of
+from seecr.statics.starts import Commanded, answered, commands_from, poses_from_lengths, start_of
 from seecr.statics.tables import Tables, assemble, relengthened, take
 
 if TYPE_CHECKING:
@@ -290,7 +289,7 @@ class Experiment:
     def _first(self) -> Array | None:
         """Poses (n, 7) at which searches start if lengths are commanded; computed once."""
         if not self._led:
-            self._led.append(led(self.robot, self.commands))
+            self._led.append(poses_from_lengths(self.robot, self.commands))
         return self._led[0]
 
     def walk(

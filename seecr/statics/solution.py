@@ -13,8 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from seecr.compiled.columns import (
     CABLE_LAW,
+    CENTRE_OF_MASS,
     CONVERGED,
     FALLING,
+    FORCE_OF_WEIGHT,
     ITERATIONS,
     REST,
     SINGULAR,
@@ -25,18 +27,49 @@ from seecr.compiled.columns import (
     UNSTABLE,
 )
 from seecr.counted import between, counted, rows_words
+from seecr.description.joints import motion_columns, values_of_pose
 from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.parallel import in_parts
-from seecr.pose import Array, pose_difference
+from seecr.pose import Array, pose_difference, quat_rotate, quat_to_matrix
 from seecr.pose_rows import rotation_vectors
 from seecr.result import COORDINATES, Record, Result, named, rows_of
 from seecr.statics import batch
-from seecr.statics.inertia import mass_matrices
-from seecr.statics.spans import spanless
 from seecr.statics.starts import start_of
-from seecr.statics.tables import Tables, take
+from seecr.statics.tables import Tables, spanless, take
 from seecr.units import joules, millimetres
+
+# The platform's mass matrix in the coordinates of its stiffness.
+
+
+def mass_matrices(robot: Robot, tables: Tables, poses: Array) -> Array:
+    """Mass matrices (n, d, d) of the platform at poses (n, 7).
+
+    For a free platform by translation of its origin and rotation, base frame [kg, kg m; kg m,
+    kg m^2]; else by its joints. Mass and centre of mass are those of the rows, with effects and
+    known payloads. A payload counts as a point mass, and cables have no mass.
+
+    Raises:
+        InputError: the platform's inertia is not known.
+    """
+    if not np.any(robot.inertia):
+        raise InputError(f"robot {robot.name}: its inertia is not known; expected Robot.inertia")
+    g = float(np.linalg.norm(robot.gravity))
+    weight = np.linalg.norm(tables.load[:, FORCE_OF_WEIGHT : FORCE_OF_WEIGHT + 3], axis=1)
+    mass = weight / g if g > 0.0 else np.full(len(poses), robot.mass)
+    turn = quat_to_matrix(poses[:, 3:])
+    lever = quat_rotate(poses[:, 3:], tables.load[:, CENTRE_OF_MASS : CENTRE_OF_MASS + 3])
+    cross = np.cross(lever[:, None, :], np.eye(3)).swapaxes(1, 2)
+    out = np.zeros((len(poses), 6, 6))
+    out[:, :3, :3] = mass[:, None, None] * np.eye(3)
+    out[:, 3:, :3] = mass[:, None, None] * cross
+    out[:, :3, 3:] = out[:, 3:, :3].swapaxes(1, 2)
+    about = turn @ robot.inertia @ turn.swapaxes(1, 2)
+    out[:, 3:, 3:] = about - mass[:, None, None] * cross @ cross
+    if not robot.joints:
+        return out
+    columns = motion_columns(values_of_pose(robot, poses)[1], poses[:, :3])
+    return np.asarray(columns.swapaxes(1, 2) @ out @ columns)
 
 
 class Status(Enum):

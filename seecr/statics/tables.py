@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.compiled.columns import (
+    ANCHOR,
     CENTRE_OF_MASS,
+    EXIT,
     EXTRA,
     EXTRA_SLOPE,
     FORCE_OF_WEIGHT,
@@ -20,13 +22,14 @@ from seecr.compiled.columns import (
     N_COLUMNS,
     N_LOAD,
     OF_THE_PAST,
+    RADIUS,
     REST,
     UP,
 )
 from seecr.description.joints import values_of_pose
 from seecr.description.robot import Robot
 from seecr.effects.setup import QUANTITIES, Setup
-from seecr.pose import Array
+from seecr.pose import Array, quat_to_matrix
 
 
 @dataclass(eq=False)
@@ -190,3 +193,29 @@ def take(tables: Tables, rows: NDArray[np.integer] | slice) -> Tables:
         tables.cables[rows], tables.load[rows], tables.poses[rows], tables.screws[rows],
         tables.length, tables.scale[rows], tables.reach[rows], tables.n_dof,
     )  # fmt: skip
+
+
+# From exit points to anchor points at the poses of tables, and cables that have no way between.
+
+# A distance below this part of the robot's length is none but for rounding.
+_NONE = 1e-12
+
+
+def ways(tables: Tables) -> Array:
+    """(n, m, 3) [m] from exit points to anchor points, base frame."""
+    turn = quat_to_matrix(tables.poses[:, 3:])
+    anchors = tables.cables[..., ANCHOR : ANCHOR + 3] @ np.swapaxes(turn, 1, 2)
+    return np.asarray(tables.poses[:, None, :3] + anchors - tables.cables[..., EXIT : EXIT + 3])
+
+
+def spanless(tables: Tables) -> NDArray[np.bool_]:
+    """(n, m) whether an anchor point is at its exit point, or within its pulley.
+
+    No cable is free there: it has no direction in which it could pull.
+    """
+    way, radius = ways(tables), tables.cables[..., RADIUS]
+    rise = (way * tables.load[:, None, UP : UP + 3]).sum(axis=2)
+    far = (way**2).sum(axis=2)
+    across = np.sqrt(np.maximum(far - rise**2, 0.0))
+    # (across - radius)^2 + rise^2 <= radius^2, without its loss of digits
+    return np.asarray(far <= 2.0 * radius * across + (_NONE * tables.length) ** 2)

@@ -12,7 +12,7 @@ import seecr
 from seecr.commands import Commands
 from seecr.effects.setup import plain_setup
 from seecr.pose import Array, quat_from_rotvec, quat_rotate
-from seecr.statics.inertia import mass_matrices
+from seecr.statics.solution import mass_matrices
 from seecr.statics.tables import assemble
 
 ASIDE = np.array([0.1, -0.2, 0.3])

@@ -7,7 +7,7 @@ import seecr
 from seecr.commands import Commands
 from seecr.pose import quat_from_rotvec, quat_multiply
 from seecr.prediction.experiment import Experiment
-from seecr.statics.led import led
+from seecr.statics.starts import poses_from_lengths
 
 NAMES = ["ipanema", "cogiro_large"]
 
@@ -54,14 +54,14 @@ def test_data_with_lengths_are_predicted_where_the_runs_lead() -> None:
 
 def test_poses_lead_nowhere() -> None:
     robot = seecr.load_robot(seecr.model_path("ipanema"))
-    assert led(robot, Commands(commanded(robot))) is None
+    assert poses_from_lengths(robot, Commands(commanded(robot))) is None
 
 
 def test_where_a_search_is_to_start_is_kept() -> None:
     robot = seecr.load_robot(seecr.model_path("ipanema"))
     pose = commanded(robot)
     lengths = seecr.solve(robot, pose).rest_lengths
-    assert led(robot, Commands(pose, lengths=lengths)) is None
+    assert poses_from_lengths(robot, Commands(pose, lengths=lengths)) is None
 
 
 @pytest.mark.parametrize("name", ["planar_two_cable", "planar_vertical", "camera"])
@@ -69,7 +69,9 @@ def test_joints_and_few_cables_have_a_start_that_fits(name: str) -> None:
     robot = seecr.load_robot(seecr.model_path(name))
     at = seecr.solve(robot, robot.reference_pose[None])
     lengths = at.rest_lengths * np.linspace(0.97, 1.05, 9)[:, None]
-    first = led(robot, Commands(np.tile(robot.reference_pose, (9, 1)), lengths=lengths))
+    first = poses_from_lengths(
+        robot, Commands(np.tile(robot.reference_pose, (9, 1)), lengths=lengths)
+    )
     assert first is not None
     off = robot.nominal_lengths(first) - lengths
     assert np.all(np.abs(off) < 0.06 * lengths)
@@ -79,5 +81,5 @@ def test_joints_and_few_cables_have_a_start_that_fits(name: str) -> None:
 def test_lengths_that_nothing_fits_have_a_start_all_the_same() -> None:
     robot = seecr.load_robot(seecr.model_path("ipanema"))
     home = robot.reference_pose[None]
-    first = led(robot, Commands(home, lengths=1e-3 * robot.rest_lengths[None]))
+    first = poses_from_lengths(robot, Commands(home, lengths=1e-3 * robot.rest_lengths[None]))
     assert first is not None and np.isfinite(first).all()
