@@ -33,8 +33,8 @@ if TYPE_CHECKING:
         parameter,
     )
     from seecr.effects.setup import Setup
-    from seecr.equilibrium.multiple import equilibria
-    from seecr.equilibrium.passes import Barrier, barriers
+    from seecr.equilibrium.saddles import Barrier, barriers
+    from seecr.equilibrium.search import equilibria
     from seecr.equilibrium.solving import solve
     from seecr.errors import (
         InputError,
@@ -66,7 +66,7 @@ __version__ = "0.1.0"
 
 # Imported on first use: the compiled loop and MuJoCo take a while to load.
 _MODULES = {
-    "equilibrium.passes": ("Barrier", "barriers"),
+    "equilibrium.saddles": ("Barrier", "barriers"),
     "workspace.chances": ("held_chance", "kept_chance"),
     "commands": ("Commands", "Loads",),
     "effects": (
@@ -86,7 +86,7 @@ _MODULES = {
     "workspace.maps": ("default_axes", "with_history", "workspace_map"),
     "description.mjcf": ("load_robot", "model_names", "model_path",),
     "prediction.model": ("Model", "load_model", "new_model"),
-    "equilibrium.multiple": ("equilibria",),
+    "equilibrium.search": ("equilibria",),
     "planar": ("BarRest", "bar_equilibria", "bar_tilt", "midline_point", "solution_manifold"),
     "description.robot": ("Joint", "Robot"),
     "prediction.sensed": ("placed", "tracked"),

@@ -137,8 +137,8 @@ TRADE = {
     "seecr.units": {"millimetres"},
     "seecr.description.robot": {"ITS_A_POINT"},
     "seecr.effects.base": {"unfed"},
-    "seecr.equilibrium.strained": {"strained", "strained_rows"},
-    "seecr.equilibrium.multiple": {"elsewhere", "on_their_way"},
+    "seecr.equilibrium.solving": {"strained", "strained_rows"},
+    "seecr.equilibrium.search": {"elsewhere", "on_their_way"},
     # processes
     "seecr.compiled.compile_notice": {"tell_compiling"},
     "seecr.parallel": {"processors"},

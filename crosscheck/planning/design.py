@@ -32,7 +32,7 @@ from crosscheck.preparation.prepare import Progress
 from seecr.arguments import silent
 from seecr.counted import counted, some
 from seecr.effects import Term, Terms, layout_of
-from seecr.equilibrium.strained import strained
+from seecr.equilibrium.solving import strained
 from seecr.pose import Array
 
 _MOST_LINES = 5

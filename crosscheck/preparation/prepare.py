@@ -24,7 +24,7 @@ from crosscheck.preparation.suspect_data.stuck import stuck_doubts
 from crosscheck.preparation.suspect_data.tension_unit import tension_doubts
 from seecr.description.robot import Robot
 from seecr.effects import Terms, catalogue
-from seecr.equilibrium.strained import strained
+from seecr.equilibrium.solving import strained
 from seecr.prediction.experiment import Prediction
 
 Progress = Callable[[str, float], None]

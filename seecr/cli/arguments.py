@@ -185,7 +185,7 @@ def notes_of(
     """
     from seecr import Commands
     from seecr.effects.base import unfed
-    from seecr.equilibrium.strained import strained, strained_rows
+    from seecr.equilibrium.solving import strained, strained_rows
     from seecr.report.scalar_last import scalar_last
 
     robot = solution.robot

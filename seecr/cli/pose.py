@@ -55,7 +55,7 @@ def command(
     import numpy as np
 
     from seecr import bar_balances, barriers, equilibria, midline_points, solve, spread_of
-    from seecr.equilibrium.multiple import elsewhere, on_their_way
+    from seecr.equilibrium.search import elsewhere, on_their_way
     from seecr.files import json_text, staged, write_text
     from seecr.report.rows import SweepRows
     from seecr.report.words import (

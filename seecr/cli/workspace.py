@@ -119,7 +119,7 @@ def command(
     import numpy as np
 
     from seecr import boundary, default_axes, workspace_map
-    from seecr.equilibrium.strained import strained
+    from seecr.equilibrium.solving import strained
     from seecr.files import json_text, staged, write_text
     from seecr.report.map_slices import map_figure
     from seecr.report.maps import beyond_line, write_arrays

@@ -9,8 +9,8 @@ import numpy as np
 from seecr.compiled.columns import FORCE_OF_WEIGHT, WEIGHT
 from seecr.counted import counted, figures
 from seecr.description.robot import Joint, Robot
-from seecr.equilibrium.multiple import elsewhere
-from seecr.equilibrium.passes import NO_BARRIER, TWISTED, Barrier
+from seecr.equilibrium.saddles import NO_BARRIER, TWISTED, Barrier
+from seecr.equilibrium.search import elsewhere
 from seecr.pose import Array, pose_difference, rotvec_from_quat, rxyz_from_quat
 from seecr.prediction.uncertainty import Spread
 from seecr.statics.solution import Solution, Status

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from seecr.arguments import finite
 from seecr.commands import Commands
 from seecr.effects.edits import setup_with
-from seecr.equilibrium.coordinates import moved, step_between
+from seecr.equilibrium.following import moved, step_between
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import Array

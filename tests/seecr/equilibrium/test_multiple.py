@@ -11,8 +11,8 @@ from seecr.description.joints import pose_of_values
 from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
 from seecr.effects import Term
-from seecr.equilibrium.coordinates import moved
-from seecr.equilibrium.multiple import _spread, elsewhere, equilibria
+from seecr.equilibrium.following import moved
+from seecr.equilibrium.search import _spread, elsewhere, equilibria
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import Array, pose_difference, quat_from_rotvec, quat_multiply

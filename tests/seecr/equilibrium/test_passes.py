@@ -10,11 +10,10 @@ import pytest
 from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
 from seecr.effects import Term, effect_named, layout_of
-from seecr.equilibrium import passes
-from seecr.equilibrium.coordinates import evaluated, moved
-from seecr.equilibrium.following import _stepped
-from seecr.equilibrium.multiple import elsewhere, equilibria
-from seecr.equilibrium.passes import Barrier, barriers
+from seecr.equilibrium import saddles
+from seecr.equilibrium.following import _stepped, evaluated, moved
+from seecr.equilibrium.saddles import Barrier, barriers
+from seecr.equilibrium.search import elsewhere, equilibria
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import pose_difference, quat_from_rotvec, transform_points
@@ -103,7 +102,7 @@ def test_where_there_is_no_energy_no_way_is_looked_for(monkeypatch: pytest.Monke
     """Hundreds of rounds ended with the highest of numbers that were none."""
     _robot, _pose, own, _every, other = tilted()
     own, other = own.rows([0]), other.rows([0])  # which are changed below
-    monkeypatch.setattr(passes, "strings", pytest.fail)
+    monkeypatch.setattr(saddles, "strings", pytest.fail)
     for energy in (own, other):
         energy.energy[:] = np.nan
         (way,) = barriers(own, other)
@@ -250,7 +249,7 @@ def test_a_saddle_that_joins_other_equilibria_is_not_called_the_top(
     (way,) = barriers(own, other)
     assert way.exact
     # a saddle from which both sides lead to the first
-    monkeypatch.setattr(passes, "_sides", lambda *_: (own.pose, own.pose))
+    monkeypatch.setattr(saddles, "_sides", lambda *_: (own.pose, own.pose))
     (bound,) = barriers(own, other)
     assert not bound.exact and bound.energy >= way.energy * (1.0 - 1e-6)
     assert bound.words.startswith("twisted, at most ")

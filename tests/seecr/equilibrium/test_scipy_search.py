@@ -8,7 +8,7 @@ from effect_cases import robot_of
 
 from seecr.commands import Commands
 from seecr.effects.setup import plain_setup
-from seecr.equilibrium.scipy_search import GAVE_UP, first_guess, solve_with_scipy
+from seecr.equilibrium.search import GAVE_UP, first_guess, solve_with_scipy
 from seecr.equilibrium.solving import solve
 from seecr.statics.solution import Status
 from seecr.statics.tables import assemble

@@ -10,7 +10,7 @@ import numpy as np
 import seecr
 from seecr.description.mjcf import model_path
 from seecr.effects import Term
-from seecr.equilibrium.passes import Barrier
+from seecr.equilibrium.saddles import Barrier
 from seecr.pose import quat_from_rotvec
 from seecr.prediction.uncertainty import Spread
 from seecr.report.words import (

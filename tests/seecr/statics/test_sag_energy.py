@@ -12,9 +12,9 @@ from seecr.compiled.columns import EA, ENERGY, RADIUS, REST, WEIGHT
 from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
 from seecr.effects import Term
-from seecr.equilibrium.coordinates import evaluated, moved, step_between
-from seecr.equilibrium.multiple import equilibria
-from seecr.equilibrium.passes import barriers
+from seecr.equilibrium.following import evaluated, moved, step_between
+from seecr.equilibrium.saddles import barriers
+from seecr.equilibrium.search import equilibria
 from seecr.equilibrium.solving import solve
 from seecr.pose import Array, pose_add
 from seecr.report.words import elsewhere, other_lines

@@ -13,7 +13,7 @@ from crosscheck.fit.least_squares.state import State, evaluate
 from crosscheck.measurements.data import Measurements
 from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Terms
-from seecr.equilibrium.multiple import equilibria
+from seecr.equilibrium.search import equilibria
 from seecr.pose import Array
 
 PARALLEL = load_robot(model_path("demobot_parallel"))
