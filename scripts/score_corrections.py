@@ -27,7 +27,7 @@ from seecr.commands import Commands
 from seecr.description.mjcf import model_path
 from seecr.inverse.correction import correct
 from seecr.pose import Array
-from seecr.prediction.sensed import placed
+from seecr.prediction.experiment import placed
 
 ROBOT = "demobot_cogiro"
 TRACKER = ("tracker_frame", "tracker_target", "tracker_scale")

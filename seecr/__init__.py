@@ -47,9 +47,8 @@ if TYPE_CHECKING:
     from seecr.exported.export import Export, export
     from seecr.inverse.correction import Correction, correct
     from seecr.planar import BarRest, bar_equilibria, bar_tilt, midline_point, solution_manifold
-    from seecr.prediction.experiment import Experiment, Prediction, predict
+    from seecr.prediction.experiment import Experiment, Prediction, placed, predict, tracked
     from seecr.prediction.model import Model, load_model, new_model
-    from seecr.prediction.sensed import placed, tracked
     from seecr.prediction.sensitivity import sensitivities
     from seecr.prediction.uncertainty import Spread, spread_of
     from seecr.statics.solution import Jump, Solution, Status
@@ -78,7 +77,7 @@ _MODULES = {
         "InputError", "InputFileError", "MissingPackageError", "NoRestError", "RobotError",
         "SeecrError",
     ),
-    "prediction.experiment": ("Experiment", "Prediction", "predict"),
+    "prediction.experiment": ("Experiment", "Prediction", "predict", "placed", "tracked"),
     "exported.export": ("Export", "export"),
     "inverse.correction": ("Correction", "correct"),
     "workspace.edges": ("boundary",),
@@ -89,7 +88,6 @@ _MODULES = {
     "equilibrium.search": ("equilibria",),
     "planar": ("BarRest", "bar_equilibria", "bar_tilt", "midline_point", "solution_manifold"),
     "description.robot": ("Joint", "Robot"),
-    "prediction.sensed": ("placed", "tracked"),
     "prediction.sensitivity": ("sensitivities",),
     "effects.setup": ("Setup",),
     "statics.solution": ("Jump", "Solution", "Status"),

@@ -16,7 +16,7 @@ from seecr.effects import Term, Terms, apart, effect_named, layout_of
 from seecr.errors import InputError, InputFileError
 from seecr.files import path_of, read_text
 from seecr.made import digits_of
-from seecr.prediction.cells import number_of
+from seecr.prediction.effect_tables import number_of
 
 __all__ = ["load_diagnosed"]
 

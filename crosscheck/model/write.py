@@ -26,10 +26,9 @@ from seecr.effects.base import Layout
 from seecr.errors import InputError
 from seecr.files import written
 from seecr.pose import Array
-from seecr.prediction.cells import UNSEEN
-from seecr.prediction.data_reach import TABLE, DataReach
+from seecr.prediction.effect_tables import UNSEEN
 from seecr.prediction.experiment import predict
-from seecr.prediction.model import CALIBRATION, FIT, Model, its_model
+from seecr.prediction.model import CALIBRATION, FIT, TABLE, DataReach, Model, its_model
 from seecr.prediction.uncertainty import CORRELATION, PARAMETERS, STDERR
 
 if TYPE_CHECKING:

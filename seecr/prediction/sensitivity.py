@@ -9,25 +9,204 @@ forward along the path, and nothing is solved there either.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from seecr.compiled.columns import STRAIN
+from seecr.compiled.columns import RADIUS, STRAIN, WEIGHT
+from seecr.compiled.rates import wrench_by_ends_batch
 from seecr.description.joints import motion_columns
-from seecr.effects.base import Effect, Readings
+from seecr.effects.base import Effect, Layout, Readings
 from seecr.effects.edits import is_built_in
-from seecr.effects.terms import Terms
+from seecr.effects.setup import QUANTITIES, History, Setup
+from seecr.effects.terms import Term, Terms
 from seecr.parallel import run_parts
 from seecr.pose import Array
 from seecr.pose_rows import changes_between, moved_by
-from seecr.prediction.ends import are_by_point, wrench_by_ends, wrench_by_rest
 from seecr.prediction.experiment import Experiment, Prediction, read, senses
-from seecr.prediction.shifts import OF_SHAPE, Shift, Sides, blocks_of_cables, positions, shifted
 from seecr.statics import batch
-from seecr.statics.tables import Tables, assemble
+from seecr.statics.tables import Tables, assemble, reassembled
+
+# Sensitivities to where cables begin and end, and to their rest lengths.
+#
+# A cable's pull depends on its rest length and on where its anchor point B is as seen from its
+# exit point A. So the derivatives by A, by B and by l0 all follow from one evaluation of each
+# cable (seecr.compiled.rates): with F its force on the platform and K = -dF/dB,
+#
+#     dF = -K (dB - dA) + dF/dl0 dl0,   dM = (B - p) x dF + (dB in the platform) x F,
+#
+# where dA and dB move the points, and M is the moment about the platform's origin p.
+
+
+def are_by_point(tables: Tables) -> bool:
+    """Whether the stiffness of all cables is minus the derivative of their force.
+
+    Of heavy cables over pulleys it is the symmetric part of that.
+    """
+    heavy, over = tables.cables[..., WEIGHT] > 0.0, tables.cables[..., RADIUS] > 0.0
+    return not bool(np.any(heavy & over))
+
+
+def wrench_by_rest(rates: Array, poses: Array) -> tuple[Array, Array]:
+    """Derivatives of the wrench (n, 6, m) [N, N m] and tension (n, m) by each rest length."""
+    n, m = rates.shape[:2]
+    still = np.zeros((m, 3))
+    return wrench_by_ends(rates, poses, still, still, np.ones((n, m)))
+
+
+def wrench_by_ends(
+    rates: Array, poses: Array, exit_moves: Array, anchor_moves: Array, longer: Array
+) -> tuple[Array, Array]:
+    """Change of the wrench (n, 6, m) by each cable, and of its own tension (n, m).
+
+    Args:
+        rates: (n, m, N_RATES) of the cables at the poses (n, 7), see
+            :func:`seecr.statics.batch.rates_of_cables`.
+        exit_moves: (m, 3) how the exit points move, base axes. anchor_moves: (m, 3) the anchor
+            points, platform axes.
+        longer: (n, m) how much longer the cables become.
+    """
+    n, m = longer.shape
+    wrench, tension = np.empty((n, 6, m)), np.empty((n, m))
+    wrench_by_ends_batch(rates, poses, exit_moves, anchor_moves, longer, wrench, tension)
+    return wrench, tension
+
+
+# Terms with a parameter shifted up and down, for finite differences.
+
+# Steps of central and one-sided differences, in plausible sizes of a parameter.
+_CENTRAL, _ONE_SIDED = 1e-4, 1e-5
+
+# Quantities that affect the statics only through the rest lengths.
+_PAID_OUT = {name for name, item in QUANTITIES.items() if item.paid_out}
+# Quantities that say where cables begin and end.
+_ENDS = {"exit_points", "anchor_points"}
+# Quantities that also affect a row through the rows before it.
+_OF_HISTORY = {name for name, item in QUANTITIES.items() if item.history is not History.NONE}
+# Quantities that have no effect if no effect has a history.
+OF_SHAPE = {name for name, item in QUANTITIES.items() if item.history is History.SHAPES}
+
+
+@dataclass(frozen=True, eq=False)
+class Shift:
+    """Terms with a parameter, or several of one effect together, shifted up and down.
+
+    ``apart`` is the difference between plus and minus: one number, or one for each parameter.
+    """
+
+    plus: Terms
+    minus: Terms
+    apart: Any
+    layout: Layout
+
+    @property
+    def physical(self) -> bool:
+        """Whether the shifted effect edits the setup."""
+        return self.layout.effect.edit_setup is not Effect.edit_setup
+
+    @property
+    def sensing(self) -> bool:
+        """Whether the shifted effect edits the readings."""
+        return self.layout.effect.edit_readings is not Effect.edit_readings
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """Setups with a parameter shifted up and down, and the names of the quantities that differ."""
+
+    plus: Setup
+    minus: Setup
+    differing: frozenset[str]
+
+    @property
+    def of_history(self) -> bool:
+        """Whether the difference also affects a row through the rows before it."""
+        return not self.differing.isdisjoint(_OF_HISTORY)
+
+    @property
+    def of_lengths(self) -> bool:
+        """Whether only the cables' lengths differ."""
+        return self.differing <= _PAID_OUT and not (self.plus.laws or self.minus.laws)
+
+    @property
+    def of_ends(self) -> bool:
+        """Whether only the points differ between which cables run."""
+        return self.differing <= _ENDS and not (self.plus.laws or self.minus.laws)
+
+    def longer(self, apart: Any) -> Array:
+        """Rest lengths (n, m) of plus minus those of minus, per unit of ``apart``."""
+        return np.asarray((self.plus.rest_lengths() - self.minus.rest_lengths()) / apart)
+
+    def tables(self, base: Tables, strains: Array) -> tuple[Tables, Tables]:
+        """Tables of both sides, from ``base`` without a shift; the strains are for users' laws."""
+        both = (self.plus, self.minus)
+        if self.plus.laws or self.minus.laws:
+            ahead, behind = (assemble(one, strains).with_past(base) for one in both)
+        else:
+            ahead, behind = (reassembled(base, one, self.differing) for one in both)
+        return ahead, behind
+
+
+def shifted(terms: Terms, term: Term, k: Any, part: float | None = None) -> Shift:
+    """Shift parameter ``k`` of a term (or, with an index array, several together)."""
+    up, down = (
+        _up_and_down(term, k, part)
+        if np.ndim(k) == 0
+        else np.array([_up_and_down(term, one, part) for one in k.tolist()]).T
+    )
+
+    def with_value(numbers: Any) -> Terms:
+        vector = term.vector.copy()
+        vector[k] = numbers
+        return terms.with_term(term.with_vector(vector))
+
+    return Shift(with_value(up), with_value(down), up - down, term.layout)
+
+
+def _up_and_down(term: Term, k: int, part: float | None) -> tuple[float, float]:
+    """Values of parameter ``k`` on both sides of its own, or its own where the other is a bound."""
+    layout, value = term.layout, float(term.vector[k])
+    lower, upper = float(layout.lower[k]), float(layout.upper[k])
+    size = float(layout.scale[k])
+    # a time constant or radius counts by its relative change. The step is small, since a drum of
+    # this radius may have turned many times, but above the residual of a solved path
+    if layout.shape[k] and lower > 0.0:
+        size = value * (0.1 if part is None else 1.0)
+    step = (_CENTRAL if part is None else part) * size
+    small = (_ONE_SIDED if part is None else part) * size
+    if value - step < lower:
+        return value + small, value
+    if value + step > upper:
+        return value, value - small
+    return value + step, value - step
+
+
+def positions(terms: Terms, wanted: list[int]) -> list[tuple[Term, int]]:
+    """The term of each wanted parameter, and its index in that term."""
+    every = [(term, k) for term in terms for k in range(len(term.layout))]
+    return [every[c] for c in wanted]
+
+
+def blocks_of_cables(
+    terms: Terms, todo: Container[tuple[Term, int]]
+) -> list[tuple[Term, NDArray[np.intp]]]:
+    """Groups of parameters with one per cable, which can be shifted together.
+
+    The effect of each is told apart by the cable that it acts on. This holds for built-in effects
+    only: a user's effect may change other cables too.
+    """
+    return [
+        (term, group)
+        for term in terms
+        if is_built_in(term.layout.effect)
+        for group in term.layout.cable_by_cable
+        if all((term, k) in todo for k in group.tolist())
+    ]
+
 
 # Step of finite differences along a path, in plausible sizes of a parameter. It is small because a
 # cable that is barely taut at the equilibrium is slack close to it.

@@ -15,7 +15,7 @@ from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.effects import Terms
 from seecr.files import read_text
 from seecr.pose import Array
-from seecr.prediction.cells import UNSEEN, Where, number_of
+from seecr.prediction.effect_tables import UNSEEN, Where, number_of
 from seecr.prediction.experiment import Experiment, senses
 from seecr.prediction.model import CALIBRATION, FIT, Model, model_given
 from seecr.prediction.sensitivity import sensitivities

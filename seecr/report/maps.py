@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from seecr.counted import counted
 from seecr.files import written
 from seecr.pose import Array
-from seecr.prediction.data_reach import DataReach
+from seecr.prediction.model import DataReach
 from seecr.report.words import SAGS, direction_words
 from seecr.units import millimetres, significant
 from seecr.workspace.grid import STATUSES, Workspace

@@ -12,8 +12,7 @@ from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputFileError
-from seecr.prediction.data_reach import DataReach
-from seecr.prediction.model import Model, load_model
+from seecr.prediction.model import DataReach, Model, load_model
 
 TABLE = """
 [[effect]]

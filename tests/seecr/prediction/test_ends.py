@@ -10,10 +10,9 @@ from seecr.compiled.columns import ARM, FORCE
 from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.prediction import sensitivity
-from seecr.prediction.ends import are_by_point
 from seecr.prediction.experiment import Prediction
 from seecr.prediction.parted import forget
-from seecr.prediction.sensitivity import cable_rates, sensitivities
+from seecr.prediction.sensitivity import are_by_point, cable_rates, sensitivities
 from seecr.statics import batch
 
 ENDS = ("exit_point_error", "anchor_point_error")

@@ -16,7 +16,7 @@ from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Term
 from seecr.inverse.correction import correct
 from seecr.pose import pose_difference, quat_rotate
-from seecr.prediction.sensed import placed, tracked
+from seecr.prediction.experiment import placed, tracked
 
 NAME = "demobot_cogiro"
 

@@ -7,7 +7,7 @@ import pytest
 from effect_cases import robot_of
 
 from seecr.effects import Term, Terms
-from seecr.prediction.shifts import blocks_of_cables, positions, shifted
+from seecr.prediction.sensitivity import blocks_of_cables, positions, shifted
 
 ROBOT = robot_of("demobot_cogiro")
 TERMS = Terms(

@@ -10,7 +10,7 @@ import pytest
 
 from seecr.effects import layout_of
 from seecr.errors import InputFileError
-from seecr.prediction.cells.cell import Cell, Where, cell_of, nearest_first, number_of
+from seecr.prediction.effect_tables import Cell, Where, cell_of, nearest_first, number_of
 
 LAYOUT = layout_of("pulley_radius", "demobot_cogiro")
 TEXT = """# radius_m = 1

@@ -13,8 +13,7 @@ from seecr.description.mjcf import load_robot
 from seecr.effects import Term
 from seecr.errors import InputFileError
 from seecr.pose import Array
-from seecr.prediction.cells.cell import Where
-from seecr.prediction.cells.table import term_of
+from seecr.prediction.effect_tables import Where, term_of
 
 ROBOT = load_robot("demobot_cogiro")
 WHERE = Where(Path("m.toml"), "[[effect]]\n")
