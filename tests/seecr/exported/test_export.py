@@ -16,8 +16,7 @@ from seecr.description.robot import Robot
 from seecr.effects import Term, Terms
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError, NoRestError
-from seecr.exported.bodies import SEGMENTS
-from seecr.exported.chain import HangingCable, hanging
+from seecr.exported.bodies import SEGMENTS, HangingCable, hanging
 from seecr.exported.export import Export, export
 from seecr.pose import Array, pose_difference
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import seecr
-from seecr.exported.expressed import LIFTED_SHEAVE, PAST, SENSED, WARM, Expressed, expressed
+from seecr.exported.export import LIFTED_SHEAVE, PAST, SENSED, WARM, Expressed, expressed
 
 ROBOT = seecr.load_robot("demobot_cogiro")
 SIZES = {
