@@ -46,18 +46,29 @@ if TYPE_CHECKING:
     )
     from seecr.exported.export import Export, export
     from seecr.inverse.correction import Correction, correct
-    from seecr.planar import BarRest, bar_equilibria, bar_tilt, midline_point, solution_manifold
     from seecr.prediction.experiment import Experiment, Prediction, placed, predict, tracked
     from seecr.prediction.model import Model, load_model, new_model
     from seecr.prediction.sensitivity import sensitivities
     from seecr.prediction.uncertainty import Spread, spread_of
     from seecr.statics.solution import Jump, Solution, Status
-    from seecr.workspace.bars import BarBalance, BarManifold, bar_balances, bar_manifold
-    from seecr.workspace.chances import held_chance, kept_chance
-    from seecr.workspace.edges import boundary
+    from seecr.workspace.bars import (
+        BarBalance,
+        BarManifold,
+        Midlines,
+        bar_balances,
+        bar_manifold,
+        midline_points,
+    )
     from seecr.workspace.grid import Workspace
     from seecr.workspace.maps import default_axes, with_history, workspace_map
-    from seecr.workspace.midlines import Midlines, midline_points
+    from seecr.workspace.margins import boundary, held_chance, kept_chance
+    from seecr.workspace.planar import (
+        BarRest,
+        bar_equilibria,
+        bar_tilt,
+        midline_point,
+        solution_manifold,
+    )
     from seecr.workspace.spans import SlackSpan, slack_spans
     from seecr.workspace.zones import Zone, feasible, slack_zones, tension_margin
 
@@ -66,7 +77,7 @@ __version__ = "0.1.0"
 # Imported on first use: the compiled loop and MuJoCo take a while to load.
 _MODULES = {
     "equilibrium.saddles": ("Barrier", "barriers"),
-    "workspace.chances": ("held_chance", "kept_chance"),
+    "workspace.margins": ("held_chance", "kept_chance", "boundary"),
     "commands": ("Commands", "Loads",),
     "effects": (
         "Effect", "Knowledge", "Readings", "Term", "Terms", "catalogue", "effect_named",
@@ -80,20 +91,18 @@ _MODULES = {
     "prediction.experiment": ("Experiment", "Prediction", "predict", "placed", "tracked"),
     "exported.export": ("Export", "export"),
     "inverse.correction": ("Correction", "correct"),
-    "workspace.edges": ("boundary",),
     "workspace.grid": ("Workspace",),
     "workspace.maps": ("default_axes", "with_history", "workspace_map"),
     "description.mjcf": ("load_robot", "model_names", "model_path",),
     "prediction.model": ("Model", "load_model", "new_model"),
     "equilibrium.search": ("equilibria",),
-    "planar": ("BarRest", "bar_equilibria", "bar_tilt", "midline_point", "solution_manifold"),
+    "workspace.planar": ("BarRest", "bar_equilibria", "bar_tilt", "midline_point", "solution_manifold"),
     "description.robot": ("Joint", "Robot"),
     "prediction.sensitivity": ("sensitivities",),
     "effects.setup": ("Setup",),
     "statics.solution": ("Jump", "Solution", "Status"),
     "prediction.uncertainty": ("Spread", "spread_of"),
-    "workspace.bars": ("BarBalance", "BarManifold", "bar_balances", "bar_manifold"),
-    "workspace.midlines": ("Midlines", "midline_points"),
+    "workspace.bars": ("BarBalance", "BarManifold", "bar_balances", "bar_manifold", "Midlines", "midline_points"),
     "workspace.spans": ("SlackSpan", "slack_spans"),
     "workspace.zones": ("Zone", "feasible", "slack_zones", "tension_margin"),
 }  # fmt: skip

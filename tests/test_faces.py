@@ -125,7 +125,7 @@ TRADE = {
     "seecr.description.fingerprint": {"fingerprint"},
     # what people type: files of commands and readings (in Python crosscheck.load_commands), numbers
     "seecr.columns.commands": {"read_commands"},
-    "seecr.workspace.extent": {"own_directions"},
+    "seecr.workspace.grid": {"own_directions"},
     "seecr.columns.reach": {"ABSURD"},
     "seecr.description.mjcf": {"CABLES"},
     "seecr.pose": {"NORM_TOLERANCE"},

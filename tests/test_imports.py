@@ -23,7 +23,7 @@ FLOORS = {
     "seecr.files": 1, "seecr.made": 1, "seecr.pose": 1,
     "seecr.curves": 2, "seecr.units": 2, "seecr.arguments": 2, "seecr.result": 2,
     "seecr.pose_rows": 2,
-    "seecr.planar": 3, "seecr.description": 3,
+    "seecr.workspace.planar": 3, "seecr.description": 3,
     "seecr.commands": 4,
     "seecr.columns": 5, "seecr.effects": 5,
     "seecr.statics": 6,

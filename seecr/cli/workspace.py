@@ -124,7 +124,7 @@ def command(
     from seecr.report.map_slices import map_figure
     from seecr.report.maps import beyond_line, write_arrays
     from seecr.report.scalar_last import scalar_last
-    from seecr.workspace.extent import own_directions
+    from seecr.workspace.grid import own_directions
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)

@@ -16,9 +16,7 @@ from seecr.pose import Array
 from seecr.recording import colours, layout
 from seecr.recording.scene import LEGEND, ROOT, Scene, write_scale
 from seecr.recording.stream import POSE, Recording, opening, place_index
-from seecr.workspace.extent import directions_words
-from seecr.workspace.grid import Workspace
-from seecr.workspace.slices import across_of, colour_end, evenly_picked
+from seecr.workspace.grid import Workspace, across_of, colour_end, directions_words, evenly_picked
 
 __all__ = ["HIDDEN", "Elastic"]
 

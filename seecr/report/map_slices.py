@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.report.drawing import COLOURS, figure
-from seecr.workspace.extent import directions_words
-from seecr.workspace.grid import Workspace
-from seecr.workspace.slices import across_of, colour_end
+from seecr.workspace.grid import Workspace, across_of, colour_end, directions_words
 
 __all__ = ["map_figure"]
 

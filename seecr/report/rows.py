@@ -15,8 +15,7 @@ from seecr.prediction.uncertainty import Spread
 from seecr.report.commanded import load_columns
 from seecr.result import COORDINATES, Record
 from seecr.statics.solution import Solution
-from seecr.workspace.bars import BarManifold
-from seecr.workspace.midlines import midline_points
+from seecr.workspace.bars import BarManifold, midline_points
 
 __all__ = ["SweepRows"]
 

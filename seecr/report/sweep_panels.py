@@ -17,8 +17,7 @@ from seecr.pose import Array, pose_difference
 from seecr.prediction.uncertainty import Spread
 from seecr.report.drawing import COLOURS, figure
 from seecr.statics.solution import Solution
-from seecr.workspace.bars import BarManifold
-from seecr.workspace.midlines import Midlines, midline_points
+from seecr.workspace.bars import BarManifold, Midlines, midline_points
 from seecr.workspace.spans import SlackSpan
 
 __all__ = ["sweep_figure"]

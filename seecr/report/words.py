@@ -16,8 +16,7 @@ from seecr.prediction.uncertainty import Spread
 from seecr.statics.solution import Solution, Status
 from seecr.statics.tables import Tables
 from seecr.units import joules, millimetres, short, significant, with_error
-from seecr.workspace.bars import BarBalance
-from seecr.workspace.midlines import midline_points
+from seecr.workspace.bars import BarBalance, midline_points
 from seecr.workspace.spans import SlackSpan
 
 __all__ = [

@@ -7,12 +7,17 @@ from typing import TYPE_CHECKING
 from seecr.lazy import lazily
 
 if TYPE_CHECKING:
-    from seecr.workspace.bars import BarBalance, BarManifold, bar_balances, bar_manifold
-    from seecr.workspace.chances import held_chance, kept_chance
-    from seecr.workspace.edges import boundary
+    from seecr.workspace.bars import (
+        BarBalance,
+        BarManifold,
+        Midlines,
+        bar_balances,
+        bar_manifold,
+        midline_points,
+    )
     from seecr.workspace.grid import Workspace
     from seecr.workspace.maps import default_axes, workspace_map
-    from seecr.workspace.midlines import Midlines, midline_points
+    from seecr.workspace.margins import boundary, held_chance, kept_chance
     from seecr.workspace.spans import SlackSpan, slack_spans
     from seecr.workspace.zones import Zone, feasible, slack_zones, tension_margin
 
@@ -38,12 +43,17 @@ __all__ = [
 ]
 
 _MODULES = {
-    "bars": ("BarBalance", "BarManifold", "bar_balances", "bar_manifold"),
-    "chances": ("held_chance", "kept_chance"),
-    "edges": ("boundary",),
+    "bars": (
+        "BarBalance",
+        "BarManifold",
+        "bar_balances",
+        "bar_manifold",
+        "Midlines",
+        "midline_points",
+    ),
+    "margins": ("held_chance", "kept_chance", "boundary"),
     "grid": ("Workspace",),
     "maps": ("default_axes", "workspace_map"),
-    "midlines": ("Midlines", "midline_points"),
     "spans": ("SlackSpan", "slack_spans"),
     "zones": ("Zone", "feasible", "slack_zones", "tension_margin"),
 }

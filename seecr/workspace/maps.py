@@ -23,15 +23,16 @@ from seecr.pose import NORM_TOLERANCE, Array
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.prediction.model import GivenEffects
 from seecr.statics.starts import commanded_poses
-from seecr.workspace.chances import asked_chance, check_chance
-from seecr.workspace.extent import (
+from seecr.workspace.grid import (
+    NEVER,
+    Workspace,
+    codes_of,
     grid_ends,
     own_directions,
     refuse_other_joints,
     refuse_unreached,
 )
-from seecr.workspace.grid import NEVER, Workspace, codes_of
-from seecr.workspace.margins import margins_at, read_once
+from seecr.workspace.margins import asked_chance, check_chance, margins_at, read_once
 
 Progress = Callable[[int], None]
 """Called with the number of poses done since the last call."""

@@ -11,9 +11,9 @@ from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
-from seecr.planar import bar_equilibria, bar_tilt, midline_point, solution_manifold
 from seecr.pose import transform_points
 from seecr.statics.solution import Solution, Status
+from seecr.workspace.planar import bar_equilibria, bar_tilt, midline_point, solution_manifold
 from seecr.workspace.zones import feasible, slack_zones
 
 EXITS = np.array([[0.0, 0.5], [1.0, 0.5]])

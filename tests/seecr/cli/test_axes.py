@@ -11,7 +11,7 @@ from turned import turned
 from seecr.cli.arguments import axes_of
 from seecr.description.mjcf import load_robot
 from seecr.errors import InputError
-from seecr.workspace.extent import own_directions
+from seecr.workspace.grid import own_directions
 
 
 def test_a_grid_far_from_the_origin_is_checked_along_its_own_axes() -> None:

@@ -18,9 +18,9 @@ from seecr.cli.arguments import robot_at
 from seecr.columns.commands import read_commands
 from seecr.description.mjcf import load_robot, model_path
 from seecr.equilibrium.solving import solve
-from seecr.planar import midline_point
 from seecr.pose import transform_points
 from seecr.report.scalar_last import scalar_last
+from seecr.workspace.planar import midline_point
 
 PLACE = ["0.17", "0.25", "0.1"]
 # A figure and a recording take most of the time of a command: where nobody looks at them, none.

@@ -24,10 +24,10 @@ from seecr.description.robot import Joint, Robot
 from seecr.effects.load import ExternalWrench
 from seecr.holding.balance import balance_of, straight_balance
 from seecr.inverse.nearest.turned import Turned, turned_in_place
-from seecr.planar import bar_tilt
 from seecr.pose import Array, pose_difference, quat_rotate, rxyz_from_quat
 from seecr.prediction.experiment import Experiment
 from seecr.statics.tables import Tables, assemble
+from seecr.workspace.planar import bar_tilt
 
 # Less than twice the mean of the tensions: this limit is the nearer one.
 HIGH = 3.0

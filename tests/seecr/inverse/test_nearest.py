@@ -17,9 +17,9 @@ from seecr.inverse.nearest.motion import PlatformMotion
 from seecr.inverse.nearest.problem import Curved, Reaching, Spots
 from seecr.inverse.nearest.screen import spread
 from seecr.inverse.nearest.seeds import Candidates
-from seecr.planar import bar_equilibria
 from seecr.pose import pose_difference, transform_points
 from seecr.prediction.model import load_model
+from seecr.workspace.planar import bar_equilibria
 from seecr.workspace.zones import balance_equations
 
 

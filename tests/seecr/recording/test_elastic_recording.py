@@ -18,9 +18,8 @@ from seecr.recording.elastic import Elastic
 from seecr.recording.workspace import write_map_recording
 from seecr.report import map_slices
 from seecr.statics.solution import Status
-from seecr.workspace.grid import NEVER, Workspace
+from seecr.workspace.grid import NEVER, Workspace, colour_end, evenly_picked
 from seecr.workspace.maps import workspace_map
-from seecr.workspace.slices import colour_end, evenly_picked
 
 PARALLEL = load_robot(model_path("demobot_parallel"))
 VERTICAL = load_robot(model_path("planar_vertical"))

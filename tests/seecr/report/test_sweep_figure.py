@@ -21,8 +21,7 @@ from seecr.equilibrium.solving import solve
 from seecr.prediction.uncertainty import Spread, spread_of
 from seecr.report.sweep_panels import sweep_figure
 from seecr.statics.solution import Jump, Solution
-from seecr.workspace.bars import bar_manifold
-from seecr.workspace.midlines import midline_points
+from seecr.workspace.bars import bar_manifold, midline_points
 from seecr.workspace.spans import slack_spans
 
 pytestmark = pytest.mark.slow

@@ -12,9 +12,9 @@ from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
-from seecr.planar import bar_equilibria, bar_tilt
 from seecr.pose import transform_points
 from seecr.workspace.bars import bar_balances, bar_manifold
+from seecr.workspace.planar import bar_equilibria, bar_tilt
 from seecr.workspace.zones import balance_equations
 
 BAR = load_robot(model_path("planar_two_cable"))

@@ -21,11 +21,9 @@ from seecr.prediction.model import Model, load_model
 from seecr.report.corrections import chance_lines
 from seecr.report.maps import likely_lines, write_arrays
 from seecr.statics.solution import Solution
-from seecr.workspace import chances
-from seecr.workspace.chances import held_chance, kept_chance
-from seecr.workspace.edges import boundary
+from seecr.workspace import margins
 from seecr.workspace.maps import workspace_map
-from seecr.workspace.margins import margins_at
+from seecr.workspace.margins import boundary, held_chance, kept_chance, margins_at
 from seecr.workspace.zones import margins_with, tension_margin
 
 
@@ -87,12 +85,12 @@ def test_poses_far_from_the_limit_are_decided_by_few_models(
         tried[np.isin(poses[:, 0], at[:, 0])] += 1
         return margins_at(robot, at, *rest, **how)
 
-    monkeypatch.setattr(chances, "margins_at", counting)
+    monkeypatch.setattr(margins, "margins_at", counting)
     few = held_chance(ROBOT, poses, model, lowest=0.02)
     assert few is not None
     assert np.all(tried[(few > 0.0) & (few < 1.0)] == 256)
     assert tried.min() == 4
-    monkeypatch.setattr(chances, "_STAGES", ((256, 0.0),))
+    monkeypatch.setattr(margins, "_STAGES", ((256, 0.0),))
     every = held_chance(ROBOT, poses, model, lowest=0.02)
     assert every is not None
     np.testing.assert_allclose(few, every, atol=0.005)
@@ -106,13 +104,13 @@ def test_full_searches_are_made_where_there_is_hope(monkeypatch: pytest.MonkeyPa
         asked.append((len(at), thorough))
         return np.where(at[:, 0] < (1.5 if thorough else 0.5), 1.0, -np.inf)
 
-    monkeypatch.setattr(chances, "margins_at", margins)
+    monkeypatch.setattr(margins, "margins_at", margins)
     robot: Any = SimpleNamespace(n_cables=2, n_dof=3)
     places = np.zeros((3, 7))
     places[:, 0] = [0.0, 1.0, 2.0]
     for hopeful, found in ((np.ones(3, bool), [1.0, 1.0, -np.inf]), (places[:, 0] < 1, [1.0])):
         asked.clear()
-        out = chances._margins(robot, places, (0.0, 1.0, None), (), hopeful)
+        out = margins._margins(robot, places, (0.0, 1.0, None), (), hopeful)
         assert out[: len(found)].tolist() == found
         assert asked == [(3, False), *([(2, True)] if hopeful.all() else [])]
 
@@ -121,7 +119,7 @@ def test_two_cables_hold_a_position_as_often_as_the_mass_allows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In the middle of two cables the tension is proportional to the mass, whatever else."""
-    monkeypatch.setattr(chances, "_STAGES", ((4, 15.0), (64, 0.0)))
+    monkeypatch.setattr(margins, "_STAGES", ((4, 15.0), (64, 0.0)))
     two = load_robot(model_path("planar_two_cable"))
     (tmp_path / "model.toml").write_text(
         'format = 1\n[[effect]]\nname = "platform_mass"\n[effect.parameters]\n'
@@ -254,7 +252,7 @@ offset_m = { value = 0.0, stderr = 1e-4 }
     mixed = np.random.default_rng(2).normal(size=(p, 2 * p))
     covariance = mixed @ mixed.T * error / np.linalg.norm(mixed, axis=1)
     covariance = covariance * (error / np.linalg.norm(mixed, axis=1))[:, None]
-    draws = chances._drawn(terms, covariance, 4096)
+    draws = margins._drawn(terms, covariance, 4096)
     free = np.isneginf(terms.lower)  # others are put on their bounds
     assert free.sum() > 3 and np.ptp(np.log10(error[free])) > 7.0
     expected = covariance[np.ix_(free, free)] / error[free] / error[free][:, None]

@@ -10,7 +10,7 @@ from turned import turned
 
 from seecr.description.mjcf import load_robot
 from seecr.errors import InputError
-from seecr.workspace.extent import grid_ends, own_directions
+from seecr.workspace.grid import grid_ends, own_directions
 from seecr.workspace.maps import default_axes, workspace_map
 
 COGIRO = replace(load_robot("demobot_cogiro"), floor=None)

@@ -26,15 +26,15 @@ from seecr.errors import InputError
 from seecr.inverse import correction
 from seecr.inverse.correction import correct, margins_in_place
 from seecr.inverse.nearest.turned import Turned
-from seecr.planar import bar_tilt
 from seecr.pose import quat_from_rotvec
 from seecr.recording.workspace import write_map_recording
 from seecr.report.map_slices import map_figure
 from seecr.report.maps import edge_line, softest_line, write_arrays
 from seecr.workspace import maps
-from seecr.workspace.edges import boundary
 from seecr.workspace.grid import Workspace
 from seecr.workspace.maps import default_axes, workspace_map
+from seecr.workspace.margins import boundary
+from seecr.workspace.planar import bar_tilt
 from seecr.workspace.zones import balance_equations, feasible, margins_from, tension_margin
 
 NAMES = ["demobot_cogiro", "demobot_parallel", "demobot_off_centre", "planar_vertical"]

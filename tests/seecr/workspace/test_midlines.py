@@ -9,9 +9,9 @@ import pytest
 
 from seecr.description.mjcf import load_robot, model_path
 from seecr.equilibrium.solving import solve
-from seecr.planar import midline_point
 from seecr.pose import transform_points
-from seecr.workspace.midlines import midline_points
+from seecr.workspace.bars import midline_points
+from seecr.workspace.planar import midline_point
 
 VERTICAL = load_robot(model_path("planar_vertical"))
 HORIZONTAL = load_robot(model_path("planar_horizontal"))

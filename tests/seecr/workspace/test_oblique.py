@@ -13,9 +13,9 @@ from turned import turned
 from seecr.description.mjcf import load_robot
 from seecr.report.map_slices import map_figure
 from seecr.report.maps import write_arrays
-from seecr.workspace.edges import boundary
 from seecr.workspace.grid import Workspace
 from seecr.workspace.maps import default_axes, workspace_map
+from seecr.workspace.margins import boundary
 
 PLANE = replace(load_robot("planar_vertical"), floor=None)
 # About the vertical: the plane stays upright, so that w is z.
