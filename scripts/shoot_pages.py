@@ -21,7 +21,7 @@ from crosscheck.planning import make_plan
 from crosscheck.report import write_page
 from crosscheck.twin.make import Twin, make_twin
 from seecr.description.mjcf import model_path
-from seecr.made import Made
+from seecr.files import Made
 
 WIDTHS = (1280, 390)
 FEW = ("stiffness", "platform_mass", "pulley_radius", "exit_point_error", "tracker_frame")

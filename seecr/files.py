@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import hashlib
 import json
 import math
 import os
@@ -19,18 +20,22 @@ import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
+from datetime import date
 from enum import Enum
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from seecr import __version__
 from seecr.errors import InputError, InputFileError
 
 __all__ = [
+    "Made",
     "Toml",
     "check_replaces",
     "check_writable",
+    "digits_of",
     "json_text",
     "no_text",
     "plain",
@@ -43,6 +48,7 @@ __all__ = [
     "write_texts",
     "written",
 ]
+
 
 _BEGINNINGS = (
     (b"\x89PNG", "a PNG picture"),
@@ -349,3 +355,56 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+# Provenance of a result: version, command, day, and hashes of the files read.
+
+# Digits of a SHA-256: enough to tell files apart.
+_DIGITS = 16
+
+
+def digits_of(file: Path) -> str:
+    """The first digits of a file's SHA-256."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()[:_DIGITS]
+
+
+@dataclass(frozen=True)
+class Made:
+    """The provenance of a result.
+
+    Attributes:
+        version: of the software. command: as it was typed. date: the day.
+        files: by name, the first digits of the SHA-256 of each file that was read.
+    """
+
+    version: str
+    command: str
+    date: str
+    files: Mapping[str, str]
+
+    @classmethod
+    def now(cls, command: str, files: Iterable[Path | None]) -> Made:
+        """Today's provenance, with files and the TOML beside each; missing ones are left out."""
+        given = [file for file in files if file is not None]
+        beside = [file.with_suffix(".toml") for file in given]
+        read = [file for file in dict.fromkeys([*given, *beside]) if file.is_file()]
+        names = [file.name for file in read]
+        hashes = {
+            # files with the same name are named with their folders
+            str(file) if names.count(file.name) > 1 else file.name: digits_of(file)
+            for file in read
+        }
+        return cls(__version__, command, date.today().isoformat(), hashes)
+
+    @property
+    def words(self) -> str:
+        """Command, date and files in one line."""
+        files = ", ".join(f"{name} {digits}" for name, digits in self.files.items())
+        return " · ".join(part for part in (self.command, self.date, files) if part)
+
+    def as_json(self) -> dict[str, Any]:
+        """``made`` in every result."""
+        return {
+            "version": self.version, "command": self.command, "date": self.date,
+            "sha256": dict(self.files),
+        }  # fmt: skip

@@ -112,6 +112,7 @@ TRADE = {
         "with_toml",
         "write_text",
         "write_texts",
+        "Made",
     },
     "crosscheck.model.place": {"check_place"},
     "crosscheck.importing": {"check_case", "write_case"},
@@ -121,7 +122,6 @@ TRADE = {
     "crosscheck.twin": {"FILES"},
     "seecr.exported.export": {"wrote"},
     # what results were made of
-    "seecr.made": {"Made"},
     "seecr.description.fingerprint": {"fingerprint"},
     # what people type: files of commands and readings (in Python crosscheck.load_commands), numbers
     "seecr.columns.commands": {"read_commands"},

@@ -20,9 +20,9 @@ from sources import ROOT, imports, imports_of, modules, name_of, tree_of
 FLOORS = {
     "seecr.errors": 0, "seecr.compiled": 0, "seecr.parallel": 0, "seecr.lazy": 0,
     "seecr.counted": 0,
-    "seecr.files": 1, "seecr.made": 1, "seecr.pose": 1,
+    "seecr.files": 1, "seecr.files": 1, "seecr.pose": 1,
     "seecr.curves": 2, "seecr.units": 2, "seecr.arguments": 2, "seecr.result": 2,
-    "seecr.pose_rows": 2,
+    "seecr.pose": 2,
     "seecr.workspace.planar": 3, "seecr.description": 3,
     "seecr.commands": 4,
     "seecr.columns": 5, "seecr.effects": 5,

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from crosscheck import Addition, Calibrated
     from seecr import Model
     from seecr.description.robot import Robot
-    from seecr.made import Made
+    from seecr.files import Made
 
 
 def model_or_new(path: Path, robot: Robot) -> Model:

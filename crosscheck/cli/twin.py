@@ -16,7 +16,7 @@ from seecr.cli.options import FILE, WholeNumber, json_option, made_by, out_optio
 
 if TYPE_CHECKING:
     from crosscheck import Twin
-    from seecr.made import Made
+    from seecr.files import Made
 
 
 @click.command(

@@ -34,8 +34,7 @@ from seecr.columns.csv import table_text
 from seecr.counted import counted
 from seecr.description.robot import Robot
 from seecr.errors import InputError, InputFileError
-from seecr.files import check_replaces, json_text, staged, write_text
-from seecr.made import Made
+from seecr.files import Made, check_replaces, json_text, staged, write_text
 from seecr.pose import Array
 from seecr.result import Record, Result
 

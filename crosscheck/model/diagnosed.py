@@ -14,8 +14,7 @@ from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects import Term, Terms, apart, effect_named, layout_of
 from seecr.errors import InputError, InputFileError
-from seecr.files import path_of, read_text
-from seecr.made import digits_of
+from seecr.files import digits_of, path_of, read_text
 from seecr.prediction.effect_tables import number_of
 
 __all__ = ["load_diagnosed"]

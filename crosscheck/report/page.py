@@ -10,7 +10,7 @@ from crosscheck.fit.least_squares.problem import Problem, kinds_read
 from crosscheck.report.glossary import with_glossary
 from seecr import __version__
 from seecr.counted import counted
-from seecr.made import Made
+from seecr.files import Made
 from seecr.units import short
 
 

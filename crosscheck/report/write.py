@@ -11,8 +11,7 @@ from crosscheck.report.comparison import comparison_context
 from crosscheck.report.diagnosis import diagnosis_context
 from crosscheck.report.page import page_of
 from crosscheck.report.plan import plan_context
-from seecr.files import write_text
-from seecr.made import Made
+from seecr.files import Made, write_text
 
 
 def write_page(

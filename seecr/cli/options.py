@@ -17,7 +17,7 @@ from seecr.cli.following import STDIN
 from seecr.cli.group import ARGUMENTS
 
 if TYPE_CHECKING:
-    from seecr.made import Made
+    from seecr.files import Made
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -119,7 +119,7 @@ seed_option = click.option(
 
 def made_by(*files: Path | None) -> Made:
     """How the command that is running came to its result, from these files."""
-    from seecr.made import Made
+    from seecr.files import Made
 
     ctx = click.get_current_context()
     words = [ctx.find_root().info_name or "seecr", *ctx.meta.get(ARGUMENTS, [])]

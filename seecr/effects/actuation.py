@@ -12,8 +12,7 @@ from seecr.commands import Commands
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect, Total, mean_length, of_length, parameter
 from seecr.effects.setup import Setup
-from seecr.pose import Array
-from seecr.pose_rows import moved_by
+from seecr.pose import Array, moved_by
 
 # Largest radius of a drum, as a part of the mean cable length. Drums of a quarter of it, which turn
 # half a turn in the data, imitated a platform that bends.

@@ -9,8 +9,7 @@ import numpy as np
 
 from seecr.effects.base import Effect, Readings, of_length, parameter
 from seecr.effects.setup import Setup
-from seecr.pose import Array, quat_from_rotvec
-from seecr.pose_rows import products, rotated
+from seecr.pose import Array, products, quat_from_rotvec, rotated
 
 
 @dataclass(frozen=True, eq=False)

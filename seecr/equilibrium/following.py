@@ -21,8 +21,7 @@ from seecr.compiled.columns import CONVERGED, SINGULAR
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot
 from seecr.effects.setup import Setup
-from seecr.pose import Array
-from seecr.pose_rows import changes_between, moved_by
+from seecr.pose import Array, changes_between, moved_by
 from seecr.statics import batch
 from seecr.statics.batch import under_moment
 from seecr.statics.solution import Jump, Solution, certify

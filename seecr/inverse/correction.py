@@ -25,8 +25,7 @@ from seecr.holding.unheld import why_not_held, without_span
 from seecr.inverse.history import REACHED, lengths_with_history
 from seecr.inverse.nearest import Nearest, Reaching, nearest, poses_in_place
 from seecr.inverse.told import told_lengths
-from seecr.pose import Array
-from seecr.pose_rows import changes_between
+from seecr.pose import Array, changes_between
 from seecr.prediction.experiment import Experiment, Prediction, effects_of
 from seecr.result import COORDINATES, MOTION, Record, Result, named, rows_of
 from seecr.statics.solution import Solution

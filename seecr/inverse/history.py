@@ -18,8 +18,7 @@ from seecr.effects.base import Effect
 from seecr.holding.lengths import Held, hold_again
 from seecr.inverse.aitken import damped, to_their_limit
 from seecr.inverse.told import told_lengths
-from seecr.pose import Array
-from seecr.pose_rows import changes_between
+from seecr.pose import Array, changes_between
 from seecr.prediction.experiment import Experiment, Prediction
 
 REACHED = 1e-6

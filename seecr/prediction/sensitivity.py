@@ -25,8 +25,7 @@ from seecr.effects.edits import is_built_in
 from seecr.effects.setup import QUANTITIES, History, Setup
 from seecr.effects.terms import Term, Terms
 from seecr.parallel import run_parts
-from seecr.pose import Array
-from seecr.pose_rows import changes_between, moved_by
+from seecr.pose import Array, changes_between, moved_by
 from seecr.prediction.experiment import Experiment, Prediction, read, senses
 from seecr.statics import batch
 from seecr.statics.tables import Tables, assemble, reassembled

@@ -36,8 +36,7 @@ from seecr.compiled.newton import FINE, STIFF, solve_batch
 from seecr.compiled.platform import add_skew, evaluate_batch
 from seecr.compiled.rates import change_at_rest, change_of_each_cable
 from seecr.parallel import in_parts, run_parts
-from seecr.pose import Array, quat_conjugate
-from seecr.pose_rows import deviated, products
+from seecr.pose import Array, deviated, products, quat_conjugate
 from seecr.statics.tables import Tables, take
 
 

@@ -31,8 +31,7 @@ from seecr.description.joints import motion_columns, values_of_pose
 from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.parallel import in_parts
-from seecr.pose import Array, pose_difference, quat_rotate, quat_to_matrix
-from seecr.pose_rows import rotation_vectors
+from seecr.pose import Array, pose_difference, quat_rotate, quat_to_matrix, rotation_vectors
 from seecr.result import COORDINATES, Record, Result, named, rows_of
 from seecr.statics import batch
 from seecr.statics.starts import start_of

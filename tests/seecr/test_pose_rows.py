@@ -9,20 +9,18 @@ import pytest
 
 from seecr.pose import (
     Array,
-    pose_add,
-    pose_difference,
-    quat_from_rotvec,
-    quat_multiply,
-    quat_rotate,
-    rotvec_from_quat,
-)
-from seecr.pose_rows import (
     changes_between,
     deviated,
     moved_by,
+    pose_add,
+    pose_difference,
     products,
+    quat_from_rotvec,
+    quat_multiply,
+    quat_rotate,
     rotated,
     rotation_vectors,
+    rotvec_from_quat,
 )
 
 # Rotations by all sizes [rad], about the bound of the series and a half turn too.

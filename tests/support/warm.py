@@ -10,7 +10,7 @@ from seecr.holding.balance import straight_balance
 from seecr.holding.distribution import distribute
 from seecr.holding.inside import can_balance, innermost
 from seecr.inverse.nearest.turned import turned_in_place
-from seecr.pose_rows import changes_between, moved_by, rotated
+from seecr.pose import changes_between, moved_by, rotated
 from seecr.prediction.experiment import Experiment
 from seecr.prediction.sensitivity import sensitivities
 from seecr.statics.tables import assemble

@@ -23,8 +23,7 @@ from seecr.description.joints import locked
 from seecr.description.robot import Robot
 from seecr.effects import catalogue
 from seecr.effects.base import Readings
-from seecr.pose import Array, quat_conjugate, rxyz_from_quat
-from seecr.pose_rows import products, rotation_vectors
+from seecr.pose import Array, products, quat_conjugate, rotation_vectors, rxyz_from_quat
 from seecr.prediction.experiment import Experiment, Prediction
 from seecr.prediction.parted import Parted, rates_by_length
 from seecr.units import in_unit

@@ -16,7 +16,7 @@ from crosscheck.model.write import provenance_of
 from seecr.description.robot import Robot
 from seecr.effects import Terms
 from seecr.errors import InputFileError
-from seecr.made import Made
+from seecr.files import Made
 from seecr.pose import quat_from_rxyz
 
 CMD = "run,t_s,cmd_x_m,cmd_y_m,cmd_z_m"

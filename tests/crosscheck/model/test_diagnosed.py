@@ -16,8 +16,7 @@ from seecr.description.fingerprint import fingerprint
 from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
 from seecr.errors import InputFileError
-from seecr.files import json_text
-from seecr.made import digits_of
+from seecr.files import digits_of, json_text
 
 ROBOT = load_robot(COGIRO)
 # It belongs to every robot: its name and parameters tell nothing.

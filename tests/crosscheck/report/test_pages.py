@@ -13,7 +13,7 @@ from written_pages import figures_of, text_of
 import crosscheck
 from crosscheck.planning.visibility import NAMED
 from crosscheck.report.write import render
-from seecr.made import Made
+from seecr.files import Made
 
 pytestmark = pytest.mark.slow
 
