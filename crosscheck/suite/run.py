@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.settle.model import ignored_note
+from crosscheck.settle.physics import ignored_note
 from crosscheck.suite.agreement import allowances, differences_of
 from crosscheck.suite.cases import Case
 from crosscheck.suite.chosen import GivenCase, chosen_cases

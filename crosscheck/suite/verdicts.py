@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.settle.relax import SettleStatus
+from crosscheck.settle.settler import SettleStatus
 from crosscheck.suite.agreement import Allowance, Differences, within
 from crosscheck.suite.gap import gap
 from seecr.equilibrium.solving import solve as seecr_solve

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.settle.relax import SettleStatus, come_to_rest
+from crosscheck.settle.settler import SettleStatus, come_to_rest
 from crosscheck.twin.descent import Descent, descend
 from crosscheck.twin.lengths import Waypoints, paid_out, waypoints_of
 from crosscheck.twin.robot import true_robot

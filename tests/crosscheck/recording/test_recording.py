@@ -16,8 +16,7 @@ from rerun.chunk import RrdReader
 from crosscheck.recording.case import write_case_recording
 from crosscheck.recording.panels import NOW, READ_ME
 from crosscheck.recording.series import Series
-from crosscheck.settle.relax import SettleStatus
-from crosscheck.settle.settler import SettlingBatch
+from crosscheck.settle.settler import SettleStatus, SettlingBatch
 from crosscheck.suite.cases import Case, user_cases
 from crosscheck.suite.poses import demobot_sweep
 from crosscheck.suite.results import CaseResult

@@ -9,7 +9,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from crosscheck.settle.model import (
+from crosscheck.settle.physics import (
+    Physics,
     change_mass_unit,
     check_cables,
     compile_model,
@@ -17,7 +18,6 @@ from crosscheck.settle.model import (
     ignored_note,
     platform_of,
 )
-from crosscheck.settle.physics import Physics
 from seecr.description.mjcf import load_robot, model_names, model_path, quiet_mujoco
 from seecr.errors import InputFileError, RobotError
 

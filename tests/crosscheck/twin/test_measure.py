@@ -11,7 +11,7 @@ import pytest
 from effect_cases import experiment_of
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.settle.relax import SettleStatus, come_to_rest
+from crosscheck.settle.settler import SettleStatus, come_to_rest
 from crosscheck.suite.effects import effect_cases, run_effect
 from crosscheck.twin.chain import hang
 from crosscheck.twin.descent import descend
