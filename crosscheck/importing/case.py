@@ -25,10 +25,8 @@ from crosscheck.importing.join import commanded, joined
 from crosscheck.importing.logged import Logged
 from crosscheck.importing.strays import without_strays
 from crosscheck.importing.take import READERS, Take, take_of
-from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.measurements.read import load_commands
-from crosscheck.measurements.stated import LEAST
-from crosscheck.measurements.together import together
+from crosscheck.measurements.data import LEAST, Measurements, Sigma
+from crosscheck.measurements.read import load_commands, together
 from crosscheck.measurements.write import write_measurements
 from seecr.columns.csv import table_text
 from seecr.counted import counted

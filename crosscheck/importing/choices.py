@@ -13,7 +13,7 @@ from crosscheck.given import numbers_of
 from crosscheck.importing.dwells import REST_FOR
 from crosscheck.importing.markers import read_shape
 from crosscheck.importing.vicon import ROTATIONS
-from crosscheck.measurements.stated import parse_quantity
+from crosscheck.measurements.data import parse_quantity
 from seecr.description.robot import Robot
 from seecr.pose import Array
 

@@ -7,7 +7,10 @@ are NaN. :mod:`crosscheck.measurements.read` reads them from files.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Mapping
+import difflib
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import datetime
 from pathlib import Path
@@ -16,14 +19,148 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from crosscheck.errors import CrosscheckError
 from crosscheck.given import check_above_zero
-from crosscheck.measurements.named import named_columns
-from crosscheck.measurements.stated import parsed
 from seecr.commands import Commands, Loads
 from seecr.counted import counted, plural, some
 from seecr.description.robot import Robot
 from seecr.pose import Array
-from seecr.result import Record, Result, rows_of
+from seecr.result import COORDINATES, Record, Result, rows_of
+from seecr.units import UNITS
+
+# Measurements as the columns of a file, by name and in SI units.
+
+
+def named_columns(data: Measurements) -> Iterator[tuple[str, list[Any]]]:
+    """Names and values (n,) of all columns with content; None if not read."""
+    yield "run", data.run.tolist()
+    cables = range(1, data.n_cables + 1)
+    yield from _columns(["t_s"], data.t_s)
+    yield from _columns([f"cmd_{c}" for c in COORDINATES], data.command_pose)
+    yield from _columns([f"length_{i}_m" for i in cables], data.command_lengths)
+    if data.wanted is not None:
+        stated = np.asarray(np.isfinite(data.wanted).any(axis=0))
+        yield from _columns([f"want_{c}" for c in COORDINATES], data.wanted, stated)
+    yield from _columns([f"meas_{c}_m" for c in "xyz"], data.position, data.position_mask)
+    yield from _columns([f"meas_q{c}" for c in "wxyz"], data.quat_wxyz)
+    yield from _columns([f"meas_r{c}_rad" for c in "xyz"], data.angles_rad, data.angle_mask)
+    yield from _columns([f"tension_{i}_N" for i in cables], data.tensions, data.tension_mask)
+    yield from _columns(["temperature_C"], data.temperature_C)
+    if data.loads is not None:
+        yield from _load_columns(data.loads)
+
+
+def _load_columns(loads: Loads) -> Iterator[tuple[str, list[Any]]]:
+    """The columns of payload and wrench with content."""
+    if np.any(loads.mass):
+        yield from _columns(["payload_kg"], loads.mass)
+        if np.isfinite(loads.centre).any():
+            yield from _columns([f"payload_{c}_m" for c in "xyz"], loads.centre)
+    wrench = [*(f"force_{c}_N" for c in "xyz"), *(f"moment_{c}_Nm" for c in "xyz")]
+    acts = np.array([bool(column.any()) for column in loads.wrench.T])
+    yield from _columns(wrench, loads.wrench, acts)
+
+
+def _columns(
+    names: list[str], values: Array | None, mask: NDArray[np.bool_] | None = None
+) -> Iterator[tuple[str, list[Any]]]:
+    """Columns (n,) or (n, k) with their names, without those that the mask (k,) excludes."""
+    if values is None:
+        return
+    for k, name in enumerate(names):
+        if mask is None or mask[k]:
+            column = values if values.ndim == 1 else values[:, k]
+            yield name, [None if v != v else v for v in column.tolist()]
+
+
+# Quantities as people type them: `0.5mm`, and the noise of readings: `position=0.1mm`.
+
+SI = {"position": "m", "orientation": "rad", "tension": "N", "length": "m"}
+"""The SI unit of each kind of reading, and of commanded lengths."""
+
+EXAMPLE = {"position": "0.5mm", "orientation": "0.2deg", "tension": "1N", "length": "0.2mm"}
+"""What a person may type for each of them."""
+
+# In SI; beyond them squares, which fits and noise are made of, are lost in rounding.
+LEAST, MOST = 1e-15, 1e15
+# Of noise: beside less, what effects do is so large that rounding leaves nothing of the rest.
+LEAST_NOISE = 1e-9
+
+_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
+
+
+def parse_quantity(label: str, kind: str, text: str, least: float = LEAST) -> float:
+    """A positive number with its unit, in SI.
+
+    Args:
+        label: the option or key, to say where.
+        kind: one of :data:`SI`.
+        text: such as ``0.5mm``.
+        least: in SI; less is none.
+
+    Raises:
+        CrosscheckError: no number above zero with a unit of that kind.
+    """
+    return parse_kind(label, (kind,), text, least)[1]
+
+
+def parse_kind(
+    label: str, kinds: Sequence[str], text: str, least: float = LEAST
+) -> tuple[str, float]:
+    """A positive number with the unit of one of some kinds: which kind, and the number in SI.
+
+    Raises:
+        CrosscheckError: no number above zero with a unit of those kinds.
+    """
+    units = {
+        name: (kind, unit)
+        for kind in kinds for unit in UNITS if unit.si == SI[kind]
+        for name in (unit.suffix, *unit.also)
+    }  # fmt: skip
+    examples = " or ".join(EXAMPLE[kind] for kind in kinds)
+    words = f"{label}: expected a number with its unit ({', '.join(units)}) such as {examples}"
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        raise CrosscheckError(f"{words}, got {text!r}")
+    value, name = float(match.group(1)), match.group(2)
+    if name not in units:
+        got = f"unit {name!r}" if name else "no unit"
+        raise CrosscheckError(f"{words}, got {got} in {text!r}")
+    if not (value > 0 and math.isfinite(value)):
+        raise CrosscheckError(f"{label}: expected more than zero, got {text!r}")
+    kind, unit = units[name]
+    if not least < unit.to_si(value) < MOST:
+        raise CrosscheckError(f"{label}: expected a size that can be measured, got {text!r}")
+    return kind, unit.to_si(value)
+
+
+def parsed(texts: Iterable[str]) -> dict[str, float]:
+    """Noise in SI by fields of :class:`crosscheck.Sigma`, such as ``tension_N``.
+
+    Args:
+        texts: each a kind of reading and a quantity, such as ``"tension=0.5N"``.
+
+    Raises:
+        CrosscheckError: an unknown kind, no quantity, one in another unit, or two for one kind.
+    """
+    values: dict[str, float] = {}
+    for text in texts:
+        kind, equals, quantity = text.partition("=")
+        kind = kind.strip()
+        if not equals or kind not in SI:
+            near = difflib.get_close_matches(kind, SI, n=len(SI), cutoff=0.0)
+            raise CrosscheckError(
+                f"--sigma {text}: expected KIND=QUANTITY such as position=0.1mm, KIND one of "
+                f"{', '.join(near)} (nearest first)"
+            )
+        key = f"{kind}_{SI[kind]}"
+        if key in values:
+            raise CrosscheckError(
+                f"--sigma {text}: expected one for the {kind}, got two; leave one out"
+            )
+        values[key] = parse_quantity(f"--sigma {kind}", kind, quantity, LEAST_NOISE)
+    return values
+
 
 Mask = NDArray[np.bool_]
 Names = NDArray[np.str_]

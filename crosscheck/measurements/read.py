@@ -6,21 +6,29 @@ here on.
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from crosscheck.errors import CrosscheckError
 from crosscheck.given import GivenRobot, robot_of
-from crosscheck.measurements.beside import SOURCES, Beside, read_beside
-from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.measurements.data import (
+    EXAMPLE,
+    LEAST_NOISE,
+    MOST,
+    Measurements,
+    Names,
+    Sigma,
+    parse_quantity,
+)
 from crosscheck.measurements.dwells import averaged_dwells
-from crosscheck.measurements.notice import notice
-from crosscheck.measurements.together import together
-from seecr.columns.commands import began, known_loads, runs, temperatures, times
+from crosscheck.measurements.notice import notice, twice
+from seecr.columns.commands import CHOICES, began, choice, known_loads, runs, temperatures, times
 from seecr.columns.csv import read_table
 from seecr.columns.known import POSITION, Columns, know_columns
 from seecr.columns.poses import (
@@ -29,13 +37,305 @@ from seecr.columns.poses import (
     measured_orientation,
     wanted_poses,
 )
-from seecr.commands import Commands
+from seecr.commands import Commands, Loads
 from seecr.counted import counted
-from seecr.errors import InputError
-from seecr.files import path_of
+from seecr.effects import catalogue
+from seecr.errors import InputError, InputFileError
+from seecr.files import Toml, path_of, read_toml
+from seecr.pose import Array, rxyz_from_quat
 
 if TYPE_CHECKING:
     from seecr.description.robot import Robot
+
+
+# The TOML beside a file of measurements: noise, meaning of lengths, start of runs.
+
+_SIGMAS = tuple(item.name for item in fields(Sigma))
+# Where stated noise comes from, the default first.
+SOURCES = ("stated", "dwell_scatter", "revisited")
+
+
+@dataclass(frozen=True)
+class Beside:
+    """The content of the TOML.
+
+    Attributes:
+        sigma: stated noise. source: where it comes from, one of :data:`SOURCES`.
+        told: ``lengths = "told"``: lengths are told lengths.
+        stands: ``start = "first_row"``: runs start at their first row.
+        free: names of effects that every fit of these data includes.
+    """
+
+    sigma: Sigma = field(default_factory=Sigma)
+    source: str = SOURCES[0]
+    told: bool = False
+    stands: bool = False
+    free: tuple[str, ...] = ()
+
+
+def read_beside(path: Path) -> Beside:
+    """Read the TOML.
+
+    Raises:
+        InputFileError: a missing or broken TOML, an unknown key, a value that is not a positive
+            quantity, or a value that its key does not allow.
+    """
+    toml = read_toml(path, "expected a TOML file with a table [sigma]")
+    _check_names(toml)
+    table = toml.content.get("sigma", {})
+    if not isinstance(table, dict):
+        raise toml.error("sigma must be a table, [sigma]", "sigma")
+    said = {key: choice(toml, key) for key in CHOICES}
+    source = _source(toml, table)
+    values = {key: _sigma(toml, key, value) for key, value in table.items() if key != "source"}
+    return Beside(
+        Sigma(**values),
+        source,
+        said["lengths"] == "told",
+        said["start"] == "first_row",
+        _free(toml),
+    )
+
+
+def _check_names(toml: Toml) -> None:
+    """Refuse misspelt keys; other names are the user's own."""
+    known = ["sigma", "free", *CHOICES]
+    for name in toml.content:
+        if name in _SIGMAS:
+            raise toml.error(f"{name} is outside the table [sigma]; put it into that table", name)
+        near = difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.7)
+        if name not in known and near:
+            shown = "[{}]" if near[0] == "sigma" else "{}"
+            what = "table" if near[0] == "sigma" else "key"
+            text = f"unknown {what} {shown.format(name)}; expected {shown.format(near[0])}"
+            raise toml.error(text, name)
+
+
+def _source(toml: Toml, table: dict[str, object]) -> str:
+    source = table.get("source", SOURCES[0])
+    if source not in SOURCES:
+        words = " or ".join(f'"{word}"' for word in SOURCES)
+        raise toml.error(f"source must be {words}, got {source!r:.60}", "source")
+    return str(source)
+
+
+def _free(toml: Toml) -> tuple[str, ...]:
+    names = toml.content.get("free", [])
+    sensing = [name for name, effect in catalogue().items() if effect.place == "sensing"]
+    if not isinstance(names, list) or not all(name in sensing for name in names):
+        text = f'free must be a list of some of {", ".join(sensing)}, such as ["tracker_frame"]'
+        raise toml.error(f"{text}, got {names!r}", "free")
+    return tuple(dict.fromkeys(names))
+
+
+def _sigma(toml: Toml, key: str, value: object) -> float:
+    if key not in _SIGMAS:
+        # Nearest first, so that the likely one is read first.
+        keys = (*_SIGMAS, "source")
+        likeness = {k: difflib.SequenceMatcher(None, key, k).ratio() for k in keys}
+        known = ", ".join(sorted(keys, key=lambda k: -likeness[k]))
+        raise toml.error(f"unknown key {key} in [sigma]; known are {known}", key)
+    kind, _, unit = key.rpartition("_")
+    if isinstance(value, str):
+        try:
+            return parse_quantity(key, kind, value, LEAST_NOISE)
+        except CrosscheckError as error:
+            raise toml.error(str(error), key) from None
+    # not yet a float, which cannot hold a whole number of hundreds of digits
+    number = value if isinstance(value, int | float) and value is not True else 0.0
+    if not LEAST_NOISE < number < MOST:
+        size = f" between {LEAST_NOISE:g} and {MOST:g}" if number > 0.0 else ""
+        text = f'{key} must be a positive number [{unit}]{size} or a text such as "{EXAMPLE[kind]}"'
+        raise toml.error(f"{text}, got {value!r:.60}; leave it out if it is not known", key)
+    return float(number)
+
+
+# Several files of one robot as one: days, payloads, trackers set up anew.
+
+# Relative noise of lengths in files that state none, if others do: practically zero.
+_EXACT = 1e-6
+
+
+def together(parts: Sequence[Measurements]) -> Measurements:
+    """The measurements of several files, with separate runs, clocks and noise.
+
+    Args:
+        parts: each as read from its file.
+
+    Raises:
+        InputFileError: a file given twice, or commands of another kind than in the first.
+    """
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    _check_alike(parts)
+    names = _short_names([part.path for part in parts])
+    sigma, ratio, said = _noise(parts, names)
+    pairs = zip(parts, names, strict=True)
+    notes = [f"{name}: {note}" for part, name in pairs for note in part.notes]
+    t_s, lost_times = _of_all("t_s", [part.t_s for part in parts], names)
+    free = _free_per_file(parts)
+    warmth, lost_warmth = _of_all("temperature_C", [part.temperature_C for part in parts], names)
+    quat, angles = _orientations(parts)
+    whole = Measurements(
+        path=Path(" + ".join(names)),
+        n_cables=first.n_cables,
+        run=_runs(parts, names),
+        t_s=t_s,
+        command_pose=_stack([part.command_pose for part in parts]),
+        command_lengths=_stack([part.command_lengths for part in parts]),
+        told=first.told,
+        wanted=_wanted(parts),
+        position=np.concatenate([part.position for part in parts]),
+        quat_wxyz=quat,
+        angles_rad=angles,
+        tensions=np.concatenate([part.tensions for part in parts]),
+        temperature_C=warmth,
+        loads=_loads(parts),
+        stands=np.concatenate([part.stands for part in parts]),
+        free=tuple(free),
+        free_in=free,
+        sigma=sigma,
+        sigma_source=_common_source(parts),
+        sigma_ratio=ratio,
+        files=tuple(names),
+        origins=tuple(_short_names([part.path.resolve() for part in parts], 2)),
+        file=np.repeat(np.arange(len(parts)), [part.n_rows for part in parts]),
+        line=np.concatenate([part.line for part in parts]),
+        unused_columns=tuple(dict.fromkeys(name for part in parts for name in part.unused_columns)),
+        notes=(*notes, *said, *lost_times, *lost_warmth),
+    )
+    # repetitions within a file are in its own notes already
+    own = any(twice(part) for part in parts)
+    return whole if own else whole.with_notes(twice(whole))
+
+
+def _free_per_file(parts: Sequence[Measurements]) -> dict[str, tuple[int, ...]]:
+    """The files that leave each effect free; each file has values of its own."""
+    names = dict.fromkeys(name for part in parts for name in part.free)
+    return {name: tuple(k for k, part in enumerate(parts) if name in part.free) for name in names}
+
+
+def _check_alike(parts: Sequence[Measurements]) -> None:
+    first, seen = parts[0], set()
+    for part in parts:
+        place = part.path.resolve()
+        if place in seen:
+            raise InputFileError.at(part.path, "is given twice; expected each file once")
+        seen.add(place)
+        if _commanded_in(part) != _commanded_in(first):
+            raise InputFileError.at(
+                part.path,
+                f"commands {_commanded_in(part)}, but {first.path} {_commanded_in(first)}; "
+                "expected files with the same kind of commands; use them one at a time",
+            )
+
+
+def _commanded_in(data: Measurements) -> str:
+    if data.command_lengths is None:
+        return "poses"
+    return "told lengths" if data.told else "absolute lengths"
+
+
+def _short_names(paths: Sequence[Path], least: int = 1) -> list[str]:
+    """Names that tell files apart, with as many folders as necessary."""
+    for depth in range(least, max(len(path.parts) for path in paths) + 1):
+        names = ["/".join(path.parts[-depth:]) for path in paths]
+        if len(set(names)) == len(names):
+            return names
+    return [str(path) for path in paths]
+
+
+def _runs(parts: Sequence[Measurements], names: Sequence[str]) -> Names:
+    pairs = zip(parts, names, strict=True)
+    return np.concatenate([np.char.add(f"{name}: ", part.run) for part, name in pairs])
+
+
+def _stack(columns: Sequence[Array | None]) -> Array | None:
+    there = [column for column in columns if column is not None]
+    return np.concatenate(there) if len(there) == len(columns) else None
+
+
+def _wanted(parts: Sequence[Measurements]) -> Array | None:
+    """Wanted poses of all files; NaN in those that state none, None if none does."""
+    if all(part.wanted is None for part in parts):
+        return None
+    blank = [np.full((part.n_rows, 7), np.nan) for part in parts]
+    pairs = zip(parts, blank, strict=True)
+    return np.concatenate([b if part.wanted is None else part.wanted for part, b in pairs])
+
+
+def _of_all(
+    what: str, columns: Sequence[Array | None], names: Sequence[str]
+) -> tuple[Array | None, list[str]]:
+    """A column of all files, or None if some file lacks it; and a note about that."""
+    without = [name for name, column in zip(names, columns, strict=True) if column is None]
+    if not without or len(without) == len(columns):
+        return _stack(columns), []
+    return None, [f"{', '.join(without)} without {what}: that of the others is not used."]
+
+
+def _orientations(parts: Sequence[Measurements]) -> tuple[Array | None, Any]:
+    """Quaternions, or angles if some file has only these."""
+    if any(part.angle_mask.any() for part in parts):
+        turned = [
+            part.angles_rad if part.quat_wxyz is None else _angles(part.quat_wxyz) for part in parts
+        ]
+        return None, np.concatenate(turned)
+    if all(part.quat_wxyz is None for part in parts):
+        return None, None
+    blank = [np.full((part.n_rows, 4), np.nan) for part in parts]
+    pairs = zip(parts, blank, strict=True)
+    return np.concatenate([b if p.quat_wxyz is None else p.quat_wxyz for p, b in pairs]), None
+
+
+def _angles(quat: Array) -> Array:
+    known = np.asarray(np.isfinite(quat).all(axis=1))
+    out = np.full((len(quat), 3), np.nan)
+    out[known] = rxyz_from_quat(quat[known])
+    return out
+
+
+def _loads(parts: Sequence[Measurements]) -> Loads | None:
+    if all(part.loads is None for part in parts):
+        return None
+    whole, *others = [part.loads or Loads.of(part.n_rows) for part in parts]
+    for other in others:
+        whole = whole.followed_by(other)
+    return whole
+
+
+def _noise(parts: Sequence[Measurements], names: Sequence[str]) -> tuple[Sigma, Array, list[str]]:
+    """Noise of the first file that states it, each row's ratio to it, and notes about gaps."""
+    kinds = [item.name for item in fields(Sigma)]
+    common: dict[str, float] = {}
+    ratios = np.ones((len(parts), len(kinds)))
+    notes = []
+    for k, kind in enumerate(kinds):
+        own = [getattr(part.sigma, kind) for part in parts]
+        stated = [i for i, value in enumerate(own) if value is not None]
+        if not stated:
+            continue
+        common[kind] = own[stated[0]]
+        otherwise = _EXACT if kind == "length_m" else 1.0
+        ratios[:, k] = [otherwise if v is None else v / common[kind] for v in own]
+        without = [names[i] for i in range(len(parts)) if i not in stated]
+        if without:
+            notes.append(_taken_over(kind, without, names[stated[0]]))
+    return Sigma(**common), np.repeat(ratios, [part.n_rows for part in parts], axis=0), notes
+
+
+def _common_source(parts: Sequence[Measurements]) -> str:
+    """A lower bound in any file makes the common noise one."""
+    found = [part.sigma_source for part in parts if part.sigma.stated]
+    return "dwell_scatter" if "dwell_scatter" in found else next(iter(found), "stated")
+
+
+def _taken_over(kind: str, without: Sequence[str], other: str) -> str:
+    if kind == "length_m":
+        return f"{', '.join(without)} without {kind}: these lengths are taken as exact."
+    return f"{', '.join(without)} without {kind}: that of {other} is used."
+
 
 GivenData: TypeAlias = Measurements | str | Path | Sequence[str | Path]
 """Measurements, their file, or several files of one robot."""

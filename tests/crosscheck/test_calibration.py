@@ -19,7 +19,7 @@ from crosscheck.inference.fit import Data, Metric, without_rows
 from crosscheck.inference.held_out import blocks_of, hold_out
 from crosscheck.inference.search import Search
 from crosscheck.measurements.data import Measurements
-from crosscheck.measurements.together import together
+from crosscheck.measurements.read import together
 from crosscheck.preparation.prepare import prepare
 from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Terms

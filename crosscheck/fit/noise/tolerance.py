@@ -16,8 +16,7 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.fit.least_squares.problem import KINDS, Problem, Rms
 from crosscheck.fit.words import rms_words
 from crosscheck.given import check_above_zero
-from crosscheck.measurements.data import Sigma
-from crosscheck.measurements.stated import SI, parse_kind
+from crosscheck.measurements.data import SI, Sigma, parse_kind
 
 __all__ = ["HALF_THE_NOISE", "LeftOver", "Tolerance", "doubt_of", "remainder_of"]
 

@@ -16,8 +16,7 @@ from written_pages import text_of
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.tracking import Tracking
 from crosscheck.measurements.data import Measurements
-from crosscheck.measurements.read import load_measurements
-from crosscheck.measurements.together import together
+from crosscheck.measurements.read import load_measurements, together
 from crosscheck.measurements.write import write_measurements
 from seecr.description.mjcf import load_robot
 from seecr.effects import Term

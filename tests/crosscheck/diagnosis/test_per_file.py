@@ -16,7 +16,7 @@ from crosscheck.comparison.residuals import compare
 from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.measurements.data import Measurements
-from crosscheck.measurements.together import together
+from crosscheck.measurements.read import together
 from crosscheck.model.diagnosed import load_diagnosed
 from crosscheck.model.write import save_model
 from seecr.errors import InputFileError

@@ -18,7 +18,7 @@ from crosscheck.inference.posterior import Posterior
 from crosscheck.inference.search import Search
 from crosscheck.inference.verdict import judged
 from crosscheck.measurements.data import Measurements
-from crosscheck.measurements.together import together
+from crosscheck.measurements.read import together
 from crosscheck.preparation.prepare import prepare
 from seecr.effects import ApartLayout, Terms
 

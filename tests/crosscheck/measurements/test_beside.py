@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 from measured_csv import POSE
 
-from crosscheck.measurements.beside import Beside, read_beside
 from crosscheck.measurements.data import Sigma
-from crosscheck.measurements.read import load_commands, load_measurements
+from crosscheck.measurements.read import Beside, load_commands, load_measurements, read_beside
 from seecr.errors import InputFileError
 
 

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from crosscheck.measurements.data import Measurements
-from crosscheck.measurements.named import named_columns
+from crosscheck.measurements.data import Measurements, named_columns
 from seecr.commands import Loads
 
 PLAIN = Measurements(

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.measurements.stated import EXAMPLE, SI, parse_quantity
+from crosscheck.measurements.data import EXAMPLE, SI, parse_quantity
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.inference.fit import Data, fit
 from crosscheck.measurements.data import Sigma
-from crosscheck.measurements.together import together
+from crosscheck.measurements.read import together
 from crosscheck.planning.adding import MORE_POSES, Adding
 from crosscheck.planning.choosing import choose_poses
 from crosscheck.planning.design import make_plan

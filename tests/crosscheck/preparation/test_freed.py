@@ -12,7 +12,7 @@ from made_diagnoses import SLOW
 
 import crosscheck
 from crosscheck.measurements.data import Sigma
-from crosscheck.measurements.together import together
+from crosscheck.measurements.read import together
 from crosscheck.measurements.write import write_measurements
 from crosscheck.preparation.prepare import prepare
 from seecr.effects import Terms

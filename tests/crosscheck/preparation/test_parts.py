@@ -14,7 +14,7 @@ import crosscheck
 import seecr
 from crosscheck.cli import main
 from crosscheck.inference.held_out import blocks_of
-from crosscheck.measurements.together import together
+from crosscheck.measurements.read import together
 from crosscheck.measurements.write import write_measurements
 from crosscheck.preparation.parts import laid_out
 from crosscheck.preparation.prepare import prepare

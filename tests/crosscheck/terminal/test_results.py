@@ -19,7 +19,7 @@ from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.words import shown
-from crosscheck.measurements.together import together
+from crosscheck.measurements.read import together
 from crosscheck.report.tables import candidate_rows
 from crosscheck.terminal.addition import print_addition, why_not
 from crosscheck.terminal.calibration import print_calibration

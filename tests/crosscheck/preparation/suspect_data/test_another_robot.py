@@ -11,8 +11,7 @@ from made_data import measured, refused, run, soft_cogiro, soft_xml
 
 import crosscheck
 from crosscheck.measurements.data import Sigma
-from crosscheck.measurements.read import load_commands, load_measurements
-from crosscheck.measurements.together import together
+from crosscheck.measurements.read import load_commands, load_measurements, together
 from crosscheck.measurements.write import write_measurements
 from crosscheck.preparation.prepare import prepare
 from seecr.description.mjcf import load_robot, model_path

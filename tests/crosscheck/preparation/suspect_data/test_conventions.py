@@ -15,7 +15,7 @@ import crosscheck
 from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.reasons import Unfit
 from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.measurements.together import together
+from crosscheck.measurements.read import together
 from crosscheck.measurements.write import write_measurements
 from crosscheck.preparation.prepare import prepare
 from crosscheck.preparation.suspect_data.conventions import Convention, misread_orientations

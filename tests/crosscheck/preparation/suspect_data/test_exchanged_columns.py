@@ -13,8 +13,7 @@ from made_data import measured, soft_cogiro, term
 
 import crosscheck
 from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.measurements.read import load_measurements
-from crosscheck.measurements.together import together
+from crosscheck.measurements.read import load_measurements, together
 from crosscheck.preparation.prepare import prepare
 from crosscheck.preparation.suspect_data.exchanged_columns import exchanges, misfits
 from seecr.description.mjcf import load_robot

@@ -13,7 +13,7 @@ from made_data import measured, soft_cogiro, term
 
 import crosscheck
 from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.measurements.together import together
+from crosscheck.measurements.read import together
 from crosscheck.preparation.prepare import prepare
 from crosscheck.preparation.suspect_data.pulls import Pulls
 from crosscheck.preparation.suspect_data.tension_unit import unit_of
