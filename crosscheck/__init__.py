@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from crosscheck.measurements.data import Measurements, Sigma
     from crosscheck.measurements.read import load_commands, load_measurements
     from crosscheck.measurements.write import write_measurements
-    from crosscheck.model.diagnosed import load_diagnosed
+    from crosscheck.model.fitted import load_diagnosed
     from crosscheck.model.write import save_model
     from crosscheck.planning.choosing import choose_poses
     from crosscheck.planning.design import make_plan
@@ -62,7 +62,7 @@ _MODULES = {
     "measurements.data": ("Measurements", "Sigma"),
     "measurements.read": ("load_commands", "load_measurements"),
     "measurements.write": ("write_measurements",),
-    "model.diagnosed": ("load_diagnosed",),
+    "model.fitted": ("load_diagnosed",),
     "model.write": ("save_model",),
     "planning.choosing": ("choose_poses",),
     "planning.design": ("make_plan",),

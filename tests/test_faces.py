@@ -114,7 +114,7 @@ TRADE = {
         "write_texts",
         "Made",
     },
-    "crosscheck.model.place": {"check_place"},
+    "crosscheck.model.write": {"check_place"},
     "crosscheck.importing": {"check_case", "write_case"},
     "crosscheck.planning.write": {"NAME", "box_of", "check_own", "sometimes_written"},
     "crosscheck.suite.worst_pose": {"FILE_NAME"},

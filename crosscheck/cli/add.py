@@ -74,7 +74,7 @@ def command(
     equilibrium or a fit that does not converge.
     """
     from crosscheck import Sigma, add_effect, add_effects, load_diagnosed, load_measurements
-    from crosscheck.model.place import check_place
+    from crosscheck.model.write import check_place
     from seecr import effect_named, load_robot
 
     _check_not_both(words, all_from)

@@ -62,7 +62,7 @@ def command(
     2 bad input, 3 rows without an equilibrium or a fit that does not converge.
     """
     from crosscheck import Sigma, calibrate, load_measurements
-    from crosscheck.model.place import check_place
+    from crosscheck.model.write import check_place
     from crosscheck.terminal import print_calibration
     from seecr import load_robot
 

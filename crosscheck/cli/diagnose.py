@@ -76,7 +76,7 @@ def command(
     input, 3 rows without an equilibrium.
     """
     from crosscheck import DiagnosisVerdict, Sigma, Tolerance, diagnose, load_measurements
-    from crosscheck.model.place import check_place
+    from crosscheck.model.write import check_place
     from crosscheck.report import write_page
     from seecr import load_model, load_robot, new_model, with_history
     from seecr.description.fingerprint import fingerprint

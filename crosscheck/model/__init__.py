@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from crosscheck.model.diagnosed import load_diagnosed
-from crosscheck.model.place import check_place
+from crosscheck.model.fitted import load_diagnosed
 from crosscheck.model.write import (
     Provenance,
     calibrated,
+    check_place,
     provenance_of,
     renewed,
     save_model,

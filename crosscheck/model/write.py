@@ -12,29 +12,156 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tomlkit
-from tomlkit.items import InlineTable
+from tomlkit.items import Comment, InlineTable, Table
 
 from crosscheck.model.fitted import Fitted
-from crosscheck.model.own import Kept, kept, without_parts
-from crosscheck.model.place import check_place
-from crosscheck.model.remarks import with_remarks
 from seecr import __version__
 from seecr.description.fingerprint import fingerprint
 from seecr.description.robot import Robot
-from seecr.effects import Knowledge, Terms
+from seecr.effects import ApartLayout, Knowledge, Own, Term, Terms, Values
 from seecr.effects.base import Layout
 from seecr.errors import InputError
-from seecr.files import written
+from seecr.files import check_writable, written
 from seecr.pose import Array
 from seecr.prediction.effect_tables import UNSEEN
 from seecr.prediction.experiment import predict
-from seecr.prediction.model import CALIBRATION, FIT, TABLE, DataReach, Model, its_model
+from seecr.prediction.model import (
+    CALIBRATION,
+    FIT,
+    TABLE,
+    DataReach,
+    Model,
+    its_model,
+    read_document,
+)
 from seecr.prediction.uncertainty import CORRELATION, PARAMETERS, STDERR
 
 if TYPE_CHECKING:
     from tomlkit import TOMLDocument
 
     from crosscheck.measurements.data import Measurements
+
+
+# Fitted values of each file or run, as a model keeps them: by name, with what is usual.
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """An effect as a model keeps it.
+
+    Attributes:
+        usual: its values for other files or runs, together with those of the known ones.
+        parts: newly fitted values by the model's names of files or runs.
+    """
+
+    usual: Fitted
+    parts: Mapping[str, Fitted]
+
+
+def kept(one: Fitted, before: Term | None) -> Kept:
+    """What a model keeps of a fit.
+
+    For an unknown file or run the mean of the known ones is expected, with a standard error from
+    their differences and uncertainties; if only one is known, with a plausible size.
+
+    Args:
+        one: the effect as fitted.
+        before: the same in the model before, if it was there.
+    """
+    term, layout = one.term, one.term.layout
+    if not isinstance(layout, ApartLayout):
+        return Kept(one, {})
+    values = dict(term.own.values) if term.own is not None else {}
+    parts = {}
+    for name in layout.parts:
+        written = next((w for w in values if name == w or name.endswith(f"/{w}")), name)
+        parts[written] = _part(one, layout, name)
+        fitted = parts[written]
+        values[written] = Values(fitted.term.vector, fitted.stderr, fitted.term.knowledge)
+    vector, stderr = _usual(layout, values)
+    knowledge = Knowledge.nothing(len(layout.base)) if before is None else before.knowledge
+    vector = np.where(knowledge.fixed | knowledge.measured, layout.rest, vector)
+    usual = Term(layout.base, vector, knowledge, Own(layout.kind, values))
+    return Kept(Fitted(usual, stderr, np.zeros(len(vector), dtype=bool)), parts)
+
+
+def _part(one: Fitted, layout: ApartLayout, name: str) -> Fitted:
+    where, known = layout.part(name), one.term.knowledge
+    knowledge = Knowledge(known.fixed[where], known.value[where], known.stderr[where])
+    term = Term(layout.base, one.term.vector[where], knowledge)
+    return Fitted(term, one.stderr[where], one.at_bound[where])
+
+
+def _usual(layout: ApartLayout, values: Mapping[str, Values]) -> tuple[Array, Array]:
+    """Mean of the values and how much a further one may differ, (p,) each."""
+    every = np.array([one.vector for one in values.values()])
+    if len(every) < 2:
+        return every[0], layout.base.scale.copy()
+    own = np.array([np.where(np.isfinite(one.stderr), one.stderr, 0.0) for one in values.values()])
+    return every.mean(axis=0), np.hypot(every.std(axis=0, ddof=1), np.sqrt((own**2).mean(axis=0)))
+
+
+def without_parts(fitted: Sequence[Fitted], covariance: Array) -> tuple[list[Fitted], Array]:
+    """The effects that are the same everywhere, and their covariance."""
+    same = np.array([not isinstance(one.term.layout, ApartLayout) for one in fitted], dtype=bool)
+    own = np.repeat(same, [len(one.term.layout) for one in fitted])
+    return (
+        [one for one, yes in zip(fitted, same, strict=True) if yes],
+        covariance[np.ix_(own, own)],
+    )
+
+
+# Where a model may be written.
+
+_EXPECTED = "expected the name of a new file, or a model to be replaced"
+
+
+def check_place(path: Path) -> None:
+    """Check that a model can be written there, before the work that it is for.
+
+    Raises:
+        InputFileError: nothing can be written there, or the file there is not a model: a robot or
+            measurements named by mistake may be the only copies.
+    """
+    check_writable(path)
+    if path.exists():
+        read_document(path, _EXPECTED)
+
+
+# Comments that people wrote into tables which a fit writes anew.
+
+
+def with_remarks(fresh: Any, old: Any) -> Any:
+    """A fresh table with the comments that the old one had: at its beginning, and behind keys.
+
+    Args:
+        fresh: the table that replaces another.
+        old: the other; None if there was none.
+    """
+    if not isinstance(old, Table):
+        return fresh
+    table = tomlkit.table()
+    table.trivia.indent = fresh.trivia.indent
+    for line in (_lines_of(fresh) | _lines_of(old)).values():
+        table.add(line)
+    for key, value in fresh.items():
+        if key not in old or isinstance(value, Table):
+            table[key] = with_remarks(value, old.get(key))
+            continue
+        table[key] = value
+        if old[key].trivia.comment:
+            table[key].comment(old[key].trivia.comment)
+    return table
+
+
+def _lines_of(table: Table) -> dict[str, Comment]:
+    """The comments on lines of their own, by their text."""
+    return {
+        item.as_string().strip(): item
+        for key, item in table.value.body
+        if key is None and isinstance(item, Comment)
+    }
+
 
 Rms = Mapping[str, float | None]
 _ERRORS = ("before", "after", "held_out")

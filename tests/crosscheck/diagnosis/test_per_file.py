@@ -17,7 +17,7 @@ from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.read import together
-from crosscheck.model.diagnosed import load_diagnosed
+from crosscheck.model.fitted import load_diagnosed
 from crosscheck.model.write import save_model
 from seecr.errors import InputFileError
 from seecr.prediction.model import load_model

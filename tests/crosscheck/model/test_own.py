@@ -7,7 +7,7 @@ import pytest
 
 import seecr
 from crosscheck.model.fitted import Fitted
-from crosscheck.model.own import kept, without_parts
+from crosscheck.model.write import kept, without_parts
 from seecr.effects import Knowledge, Own, Term, Values, apart
 
 BASE = seecr.layout_of("pulley_radius", "demobot_cogiro")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from crosscheck.model.place import check_place
+from crosscheck.model.write import check_place
 from seecr.errors import InputFileError
 from seecr.prediction.model import new_model
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomlkit
 
-from crosscheck.model.remarks import with_remarks
+from crosscheck.model.write import with_remarks
 
 OLD = """[fit]
 # on a Monday
