@@ -8,22 +8,25 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.given import GivenRobot, copy_robot, file_of, numbers_of, robot_of
 from crosscheck.importing.align import (
+    LEFT,
+    MOST,
     Frames,
     as_they_are,
     by_points,
     off_commands,
     place_of_target,
+    size_of_cloud,
     to_commands,
     with_target,
 )
 from crosscheck.importing.choices import ImportChoices
 from crosscheck.importing.join import commanded, joined
-from crosscheck.importing.logged import Logged
-from crosscheck.importing.strays import without_strays
+from crosscheck.importing.logs import Logged
 from crosscheck.importing.take import READERS, Take, take_of
 from crosscheck.measurements.data import LEAST, Measurements, Sigma
 from crosscheck.measurements.read import load_commands, together
@@ -35,6 +38,77 @@ from seecr.errors import InputError, InputFileError
 from seecr.files import Made, check_replaces, json_text, staged, write_text
 from seecr.pose import Array
 from seecr.result import Record, Result
+
+# Leaves out dwells at which the platform was where it had been, and not where it was commanded.
+#
+# A run that crashes ends with a platform that does not move any more, whatever is commanded.
+
+# A dwell is not far from its command unless it is so many times as far as most.
+_USUAL = 10.0
+# It did not follow its command if it moved by less than this part of what was asked.
+_FOLLOWED = 0.2
+
+
+def without_strays(
+    robot: Robot, takes: Sequence[Take], frames: Frames
+) -> tuple[list[Take], list[str]]:
+    """The recordings without dwells that did not follow their commands, and notes on them.
+
+    Such a dwell is far from its command, by the measure by which frames cannot be aligned, much
+    farther than most, and the platform has hardly moved since the dwell before, though it was told
+    to. If more than a few of a recording are, it is no matter of single dwells: all stay.
+    """
+    told = [_told(robot, take) for take in takes]
+    off = [_off(take, frames, own) for take, own in zip(takes, told, strict=True)]
+    usual = float(np.median(np.concatenate(off)))
+    limit = max(LEFT * size_of_cloud(np.concatenate(told)), _USUAL * usual)
+    out, notes = list[Take](), list[str]()
+    for take, own, commands in zip(takes, off, told, strict=True):
+        far = (own > limit) & _stood_still(take, commands)
+        if 0 < far.sum() <= (1.0 - MOST) * len(far) + 1e-9:
+            notes.append(_note(take, far, own, usual))
+            take = _without(take, far)
+        out.append(take)
+    return out, notes
+
+
+def _stood_still(take: Take, told: Array) -> NDArray[np.bool_]:
+    """(n,) whether the platform has hardly moved since the dwell before, though it was told to."""
+    place = take.dwells.position[take.used]
+    moved, asked = (np.linalg.norm(np.diff(p, axis=0), axis=1) for p in (place, told))
+    return np.concatenate([[False], moved < _FOLLOWED * asked])
+
+
+def _told(robot: Robot, take: Take) -> Array:
+    """Commanded positions (n, 3) [m] of the dwells that are used."""
+    rows = take.held.log.rows(take.held.row[take.number >= 0])
+    return commanded(robot, rows)[:, :3]
+
+
+def _off(take: Take, frames: Frames, told: Array) -> Array:
+    """Distances (n,) [m] of the dwells that are used from where they are told to be (n, 3)."""
+    quat = take.dwells.quat_wxyz
+    place, _turned = frames.poses(
+        take.dwells.position[take.used], None if quat is None else quat[take.used]
+    )
+    return np.asarray(np.linalg.norm(place - told, axis=1))
+
+
+def _without(take: Take, far: NDArray[np.bool_]) -> Take:
+    number = take.number.copy()
+    number[np.flatnonzero(number >= 0)[far]] = -1
+    return replace(take, number=number)
+
+
+def _note(take: Take, far: NDArray[np.bool_], off: Array, usual: float) -> str:
+    dwells, gone = take.dwells, take.used[far]
+    lines = ", ".join(str(int(line)) for line in take.stream.line[dwells.start[gone]])
+    return (
+        f"{take.stream.path.name}: {counted(len(gone), 'dwell')} left out, from line {lines} on: "
+        f"up to {1e3 * float(np.max(off[far])):.4g} mm from where it is commanded, other dwells "
+        f"{1e3 * usual:.3g} mm; did the platform stop moving, or do the clocks disagree (--clock)?"
+    )
+
 
 # Samples that scatter by less than this part of the least change between them show the last digit
 # written and no noise. From q / 2 on, the mean of numbers rounded to q is off by 0.002 q at most:

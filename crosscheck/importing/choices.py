@@ -10,9 +10,9 @@ from typing import Any
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.given import numbers_of
+from crosscheck.importing.capture import ROTATIONS
 from crosscheck.importing.dwells import REST_FOR
-from crosscheck.importing.markers import read_shape
-from crosscheck.importing.vicon import ROTATIONS
+from crosscheck.importing.poses import read_shape
 from crosscheck.measurements.data import parse_quantity
 from seecr.description.robot import Robot
 from seecr.pose import Array
@@ -35,7 +35,7 @@ class ImportChoices:
         target: (3,) [m] of the body's origin in the platform's frame, with parallel axes.
         up: axis that points up in the file, "y" or "z"; the program's own by default.
         unit: of lengths, if a log's names have none.
-        rotation: meaning of three numbers, :data:`crosscheck.importing.vicon.ROTATIONS`.
+        rotation: meaning of three numbers, :data:`crosscheck.importing.capture.ROTATIONS`.
         rest_for: [s]. rest_speed: [m/s]. clock: [s], the tracker's minus the commands'; estimated
             by default.
     """

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from crosscheck.importing.logged import Stream
+from crosscheck.importing.logs import Stream
 from crosscheck.measurements.dwells import mean_error, mean_rotation
 from seecr.counted import counted
 from seecr.pose import Array

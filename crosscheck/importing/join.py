@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.importing.dwells import Dwells
-from crosscheck.importing.logged import Stream
+from crosscheck.importing.logs import Stream
 from crosscheck.measurements.data import Measurements
 from seecr.counted import counted
 from seecr.description.robot import Robot

@@ -11,19 +11,196 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
+from crosscheck.importing.align import size_of_cloud
+from crosscheck.importing.capture import read_motive, read_vicon
 from crosscheck.importing.choices import ImportChoices
-from crosscheck.importing.clock import Clock, find_clock
-from crosscheck.importing.dwells import Dwells, find_dwells
-from crosscheck.importing.join import HeldCommands, commanded, held_commands, matched
-from crosscheck.importing.logged import Logged, Stream
-from crosscheck.importing.markers import body_of_markers
-from crosscheck.importing.motive import read_motive
-from crosscheck.importing.poses import read_poses
-from crosscheck.importing.still import refuse_still
-from crosscheck.importing.vicon import read_vicon
+from crosscheck.importing.dwells import LEAST, Dwells, find_dwells, sample_noise
+from crosscheck.importing.join import HeldCommands, commanded, held_commands, matched, owners
+from crosscheck.importing.logs import Logged, Stream
+from crosscheck.importing.poses import body_of_markers, read_poses
 from crosscheck.measurements.data import Measurements
-from seecr.counted import between, counted
+from seecr.counted import between, counted, some
 from seecr.description.robot import Robot
+from seecr.pose import Array
+
+# Refuses a recorded body that stands still while the robot is commanded to move: a wrong one.
+
+# A body moves if it is farther from its middle than this many times its noise, or than rounding
+# [m]. It should, if commands are so many times as far from theirs.
+_NOISE, _ROUNDED, _COMMANDED = 6.0, 1e-9, 10.0
+_MOST_NAMED = 12
+
+
+def refuse_still(stream: Stream, export: Logged, log: Measurements, choices: ImportChoices) -> None:
+    """Refuse a body that never moves, such as one on the robot's frame.
+
+    Raises:
+        InputFileError: it does not move, and the commands do.
+    """
+    seen = stream.position[stream.seen]
+    if len(seen) < LEAST:  # which is refused for that
+        return
+    moved = size_of_cloud(seen)
+    if moved > max(_NOISE * sample_noise(stream), _ROUNDED) or not _told_to_move(log, moved):
+        return
+    others = [name for name in export.bodies if name != choices.body]
+    there = f" The file also has {some(others, _MOST_NAMED)}." if others else ""
+    within = f"{1e3 * moved:.2g}" if moved > _ROUNDED else "0"
+    raise stream.error(
+        f"{_named(choices)} never moves: it stays within {within} mm (rms), while the "
+        f"commands of {log.path.name} move the platform; expected the body on the platform: is it "
+        f"another one (--body)?{there}"
+    )
+
+
+def _told_to_move(log: Measurements, moved: float) -> bool:
+    """Whether commands move the platform by much more than ``moved`` [m]."""
+    least = _COMMANDED * max(moved, _ROUNDED)
+    if log.command_pose is not None:
+        return size_of_cloud(log.command_pose[:, :3]) > least
+    return bool(np.any(np.ptp(np.asarray(log.command_lengths), axis=0) > least))
+
+
+def _named(choices: ImportChoices) -> str:
+    if choices.markers:
+        return f"the body of {', '.join(choices.markers)}"
+    return f"the body {choices.body}" if choices.body else "the body"
+
+
+# Offset between the tracker's clock and that of the commands, found from the resting poses.
+#
+# Two programs that log at the same time seldom share a clock. The distance between two resting
+# poses is the same in any frame: with the right offset the tracked distances are those between
+# commands.
+
+# Least number of rests that show a pattern.
+_LEAST = 4
+# Number of offsets tried: those at which most commands begin as the platform leaves a rest.
+_MOST = 40
+# Distances that are off by this part of their usual size still match. An offset is accepted if all
+# others are worse by this factor, and no offset is preferred unless it is worse by as much.
+_ALIKE, _CLEAR = 0.2, 1.5
+# If the clocks match as they are, moves must begin late or early by times that differ by less than
+# this part of the shift, for most commands, to say what the shift is.
+_STEADY, _BULK = 0.25, 0.75
+
+
+@dataclass(frozen=True)
+class Clock:
+    """An offset between two clocks.
+
+    Attributes:
+        shift: [s] tracker's clock minus commands'.
+        said: how it was found; empty if the clocks agree or nothing can be inferred.
+    """
+
+    shift: float
+    said: tuple[str, ...] = ()
+
+
+def find_clock(held: HeldCommands, told: Array, rests: Dwells, least: float = 0.0) -> Clock:
+    """The offset that matches the rests with the commands.
+
+    A small offset leaves most rests with their commands, and so does a robot that begins to move
+    late, or slowly. Readings do not tell which it is: that is said, and the offset is left alone.
+
+    Args:
+        held: by the clock of the commands. told: (k, 3) [m] where they should bring the platform.
+        rests: of the whole stream, not cut where commands begin.
+        least: [s] offsets smaller than this do not matter.
+    """
+    assert held.begin_s is not None and held.end_s is not None
+    if min(len(held.row), len(rests)) < _LEAST:
+        return Clock(0.0)
+    shifts = _likely(held.begin_s, rests.end_s)
+    whose = [owners(held.shifted(shift), rests) for shift in shifts]
+    off = np.array([_off(told, rests.position, number) for number in whose])
+    best = int(np.argmin(off))
+    if off[0] <= _CLEAR * off[best]:
+        best = 0
+    others = [o for o, number in zip(off, whose, strict=True) if _other(number, whose[best])]
+    if off[best] >= _ALIKE or off[best] * _CLEAR >= min(others, default=np.inf):
+        return Clock(0.0)
+    late = _late(held.end_s, rests, whose[best])
+    if best == 0 and len(late) == 0:
+        return Clock(0.0)
+    shift, n = float(np.median(late)) if len(late) else float(shifts[best]), len(late)
+    if best == 0:
+        unsteady = float(np.quantile(np.abs(late - shift), _BULK)) > _STEADY * abs(shift)
+        small = abs(shift) < max(least, 1e-9)
+        return Clock(0.0, () if small or unsteady else (_late_words(shift),))
+    sign = "more" if shift > 0.0 else "less"
+    return Clock(
+        shift,
+        (
+            f"the tracker's clock shows {abs(shift):.3f} s {sign} than that of the commands, "
+            f"estimated from {_from_what(n)} (--clock {shift:.3f})",
+        ),
+    )
+
+
+def _from_what(moves: int) -> str:
+    if not moves:
+        return "where the platform rests"
+    return f"{counted(moves, 'command')} at which the platform starts to move"
+
+
+def _late_words(shift: float) -> str:
+    when = "after" if shift > 0.0 else "before"
+    return (
+        f"moves begin about {abs(shift):.3f} s {when} they are commanded; if that is the clocks "
+        f"and not the robot, give --clock {shift:.3f}"
+    )
+
+
+def _likely(begin: Array, end: Array) -> Array:
+    """Offsets [s], zero first, at which many commands begin as a rest ends."""
+    every = np.sort((end[None, :] - begin[1:, None]).ravel())
+    gap = 0.25 * float(np.min(np.diff(begin)))
+    votes = np.searchsorted(every, every + gap) - np.searchsorted(every, every - gap)
+    found: list[float] = [0.0]
+    for k in np.argsort(-votes, kind="stable"):
+        if all(abs(every[k] - other) > gap for other in found[1:]):
+            found.append(float(every[k]))
+        if len(found) > _MOST:
+            break
+    return np.array(found)
+
+
+def _off(told: Array, place: Array, number: NDArray[np.int64]) -> float:
+    """Relative error of the distances between rests, compared with those between commands.
+
+    Missing rests count as if their distances were zero.
+    """
+    there = number >= 0
+    every = min(len(told), len(place))
+    if there.sum() < _LEAST:
+        return np.inf
+    wanted, got = _distances(told[there]), _distances(place[number[there]])
+    usual = float(np.mean(_distances(told) ** 2))
+    n = int(there.sum())
+    lacking = max(every**2 - n**2, 0) * usual
+    return float(np.sqrt((np.sum((wanted - got) ** 2) + lacking) / (max(every, n) ** 2 * usual)))
+
+
+def _distances(points: Array) -> Array:
+    return np.asarray(np.linalg.norm(points[:, None] - points[None], axis=-1))
+
+
+def _other(number: NDArray[np.int64], best: NDArray[np.int64]) -> bool:
+    """Whether rests belong to other commands, not only one more or less at an end."""
+    both = (number >= 0) & (best >= 0)
+    return bool(np.any(number[both] != best[both]) or 2 * both.sum() < (best >= 0).sum())
+
+
+def _late(end: Array, rests: Dwells, number: NDArray[np.int64]) -> Array:
+    """Times [s] from the end of each held command to that of its rest, if another one follows.
+
+    A command ends with the next set point, which may only be passed on the way to the next rest.
+    """
+    k = np.flatnonzero((number[:-1] >= 0) & (number[1:] >= 0))
+    return np.asarray(rests.end_s[number[k]] - end[k])
+
 
 READERS: Mapping[str, Callable[[Path, ImportChoices], Logged]] = {
     "motive": lambda path, choices: read_motive(path),

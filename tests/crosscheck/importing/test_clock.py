@@ -12,10 +12,10 @@ import pytest
 from made_data import run, soft_cogiro, soft_xml
 
 from crosscheck.importing import ImportChoices, import_case
-from crosscheck.importing.clock import find_clock
 from crosscheck.importing.dwells import find_dwells
 from crosscheck.importing.join import HeldCommands
-from crosscheck.importing.logged import Stream
+from crosscheck.importing.logs import Stream
+from crosscheck.importing.take import find_clock
 from seecr.errors import SeecrError
 
 ROBOT = soft_cogiro()

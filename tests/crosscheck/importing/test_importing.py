@@ -17,8 +17,8 @@ import crosscheck
 from crosscheck.importing import import_case
 from crosscheck.importing.choices import ImportChoices
 from crosscheck.importing.dwells import find_dwells
-from crosscheck.importing.logged import Logged, Stream
-from crosscheck.importing.markers import aligning, body_of_markers
+from crosscheck.importing.logs import Logged, Stream
+from crosscheck.importing.poses import aligning, body_of_markers
 from crosscheck.measurements.dwells import mean_error
 from seecr.errors import InputError, InputFileError
 from seecr.pose import quat_rotate, rotvec_from_quat

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck.importing.motive import read_motive
+from crosscheck.importing.capture import read_motive
 from seecr.errors import InputFileError
 
 _BODY, _MARKER = 7, 3

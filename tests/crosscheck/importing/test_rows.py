@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck.importing.rows import Block, FileRows, unit_quaternions
+from crosscheck.importing.logs import Block, FileRows, unit_quaternions
 from seecr.errors import InputFileError
 
 

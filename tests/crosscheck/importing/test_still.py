@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from crosscheck.importing.choices import ImportChoices
 from crosscheck.importing.dwells import find_dwells, sample_noise
-from crosscheck.importing.logged import Logged, Stream
-from crosscheck.importing.still import refuse_still
+from crosscheck.importing.logs import Logged, Stream
+from crosscheck.importing.take import refuse_still
 from crosscheck.measurements.data import Measurements
 from seecr.errors import InputFileError
 

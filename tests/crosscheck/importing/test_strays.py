@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 from made_data import soft_cogiro
 
-from crosscheck.importing import import_case, strays
-from crosscheck.importing.case import Imported
+from crosscheck.importing import case, import_case
+from crosscheck.importing.case import Imported, without_strays
 from crosscheck.importing.join import joined
-from crosscheck.importing.strays import without_strays
 
 ROBOT = soft_cogiro()
 MADE = made_of.recording(ROBOT)
@@ -86,11 +85,11 @@ def test_only_few_dwells_much_farther_than_most_are_left_out(
     told = np.zeros((5, 3))
     told[:, 0] = np.arange(5) * 2.0
     far = np.array(off)
-    monkeypatch.setattr(strays, "_told", lambda *_given: told)
-    monkeypatch.setattr(strays, "_off", lambda *_given: far)
-    monkeypatch.setattr(strays, "_stood_still", lambda *_given: far == far.max())
-    monkeypatch.setattr(strays, "_note", lambda *_given: "left out")
-    monkeypatch.setattr(strays, "_without", lambda _take, some: int(some.sum()))
+    monkeypatch.setattr(case, "_told", lambda *_given: told)
+    monkeypatch.setattr(case, "_off", lambda *_given: far)
+    monkeypatch.setattr(case, "_stood_still", lambda *_given: far == far.max())
+    monkeypatch.setattr(case, "_note", lambda *_given: "left out")
+    monkeypatch.setattr(case, "_without", lambda _take, some: int(some.sum()))
     takes, notes = without_strays(ROBOT, cast(Any, ["a take"]), cast(Any, None))
     assert takes == ([gone] if gone else ["a take"]) and len(notes) == (gone > 0)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from crosscheck.importing.vicon import read_vicon, rotations
+from crosscheck.importing.capture import read_vicon, rotations
 from seecr.errors import InputFileError
 
 EXPORT = """Segments
