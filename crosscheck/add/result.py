@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.comparison.coloured import Coloured
+from crosscheck.comparison.noise import Coloured
 from crosscheck.fit.least_squares.problem import Rms
 from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.fit.words import fitted_lines, fitted_records, rms_words

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from crosscheck.add.result import Addition
-from crosscheck.comparison.coloured import coloured_noise
+from crosscheck.comparison.noise import coloured_noise
 from crosscheck.fit.effects.contradictions import contradictions
 from crosscheck.fit.effects.nothing import distance_from_nothing, is_nothing
 from crosscheck.fit.least_squares.problem import Rms, rms_by_kind

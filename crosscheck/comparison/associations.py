@@ -16,16 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from crosscheck.comparison.cable_space import cable_errors, independent_part
 from crosscheck.comparison.quantities import (
     Abscissa,
     QuantityKind,
+    Travel,
+    cable_errors,
     channels,
     in_time,
+    independent_part,
     of_cables,
     of_rows,
+    travel,
 )
-from crosscheck.comparison.travel import Travel, travel
 from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.fit.noise.whiteness import as_table
 from seecr.counted import between

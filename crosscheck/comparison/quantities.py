@@ -12,13 +12,212 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 
-from crosscheck.comparison.cable_space import cable_lengths
-from crosscheck.comparison.periodogram import periodogram
-from crosscheck.comparison.travel import AXES, STILL, Travel
-from crosscheck.fit.least_squares.problem import Problem
-from seecr.pose import Array, rotvec_from_quat
+from crosscheck.fit.least_squares.problem import ORIENTATION, POSITION, Problem
+from crosscheck.measurements.data import Names
+from seecr.pose import Array, pose_difference, quat_rotate, rotvec_from_quat
 from seecr.prediction.experiment import Prediction
+
+# The periodogram of readings at uneven times, in a time that grows with their number.
+#
+# Sums of sines and cosines come from the fast Fourier transform of readings that are spread onto
+# an even grid: Press and Rybicki, The Astrophysical Journal 338, 277 (1989). SciPy's `lombscargle`
+# allocates a matrix of readings by frequencies, which for 15,000 rows is 16 GB.
+
+# Cells of the grid in the shortest period. A reading is spread to the two cells next to it, which
+# costs the shortest period two percent of its power, and longer ones less.
+_CELLS = 16
+
+
+def periodogram(t_s: Array, values: Array, step_Hz: float, count: int) -> Array:
+    """Lomb-Scargle periodogram at ``step_Hz``, 2 ``step_Hz`` ... ``count`` ``step_Hz``.
+
+    Args:
+        t_s: (n,) times [s]. values: (n,) values with mean zero.
+        step_Hz: step of the frequencies, at most the inverse of the span of the times.
+        count: number of frequencies.
+
+    Returns:
+        (count,) power, in the normalisation of :func:`scipy.signal.lombscargle`.
+    """
+    size = fft.next_fast_len(_CELLS * count, real=True)
+    place = (t_s - t_s.min()) * step_Hz * size
+    once = _sums(place, values, size)[1 : count + 1]
+    twice = _sums(place, np.ones(len(values)), size)[2 : 2 * count + 1 : 2]
+    # sines and cosines are orthogonal relative to a time that is half the angle of the sum at twice
+    # the frequency
+    turned = once * np.exp(-0.5j * np.angle(twice))
+    half, off = 0.5 * len(values), 0.5 * np.abs(twice)
+    cosines, sines = half + off, np.maximum(half - off, 1e-9 * half)
+    return np.asarray(0.5 * (turned.real**2 / cosines + turned.imag**2 / sines))
+
+
+def _sums(place: Array, values: Array, size: int) -> Array:
+    """Sums of values times exp(-i w t) at multiples of the frequency step."""
+    below = np.floor(place).astype(np.int64)
+    above = place - below
+    grid = np.bincount(below % size, values * (1.0 - above), size)
+    grid += np.bincount((below + 1) % size, values * above, size)
+    return np.asarray(fft.rfft(grid))
+
+
+# Pose errors converted to errors of cable length, which often show the kind of effect at a glance.
+#
+# The length error of each cable that would explain a pose error (dt, dw) is dl_i = -u_i . (dt + dw
+# x R b_i), with u_i from the anchor to the exit point. A constant error hints at an offset, one
+# proportional to length at a gain, a sine at a drum out of round, and one that changes sign with
+# the motion at friction or backlash.
+
+
+def cable_errors(problem: Problem, raw: Array, prediction: Prediction) -> tuple[Array, Array]:
+    """Errors of cable length and their noise, each (n, m) [m].
+
+    Args:
+        problem: the data.
+        raw: (n, 6 + m) residuals; rows without a complete pose give NaN.
+        prediction: prediction of the model.
+    """
+    unit, arm = _cables(problem, prediction)
+    turned = np.cross(raw[:, None, ORIENTATION], arm)
+    errors = -np.sum(unit * (raw[:, None, POSITION] + turned), axis=-1)
+    lever = np.linalg.norm(np.cross(arm, unit), axis=-1)
+    sigma, ratio = problem.sigma, problem.data.sigma_ratio
+    turn = (sigma.orientation_rad or 0.0) * ratio[:, 1:2] * lever
+    noise = np.hypot((sigma.position_m or 0.0) * ratio[:, :1], turn)
+    if problem.uses_angles:
+        # differences of Euler angles are not a rotation vector
+        errors = np.full_like(errors, np.nan)
+    return np.where(problem.use[:, None], errors, np.nan), noise
+
+
+def cable_lengths(problem: Problem, prediction: Prediction) -> Array:
+    """Straight lengths (n, m) [m] of the cables at the predicted poses."""
+    return problem.robot.nominal_lengths(prediction.pose)
+
+
+def independent_part(problem: Problem, prediction: Prediction) -> float:
+    """Fraction of the m errors of cable length whose noise is independent: they share one pose.
+
+    The number of independent errors is m^2/tr(C^2) with the correlations C. That is m if they are
+    independent, and the number of groups if they are identical within groups.
+    """
+    unit, arm = _cables(problem, prediction)
+    sigma = problem.sigma
+    columns = np.concatenate(
+        [
+            (sigma.position_m or 0.0) * unit,
+            (sigma.orientation_rad or 0.0) * np.cross(arm, unit),
+        ],
+        axis=-1,
+    )
+    columns /= np.maximum(np.linalg.norm(columns, axis=-1, keepdims=True), 1e-300)
+    m = columns.shape[1]
+    together = np.einsum("nik,njk->nij", columns, columns)
+    return float(np.mean(m / np.sum(together**2, axis=(1, 2))))
+
+
+def _cables(problem: Problem, prediction: Prediction) -> tuple[Array, Array]:
+    """Unit vectors to the exit points and arms R b_i, (n, m, 3)."""
+    robot, pose = problem.robot, prediction.pose
+    arm = quat_rotate(pose[:, None, 3:], robot.anchor_points[None])
+    reach = robot.exit_points - pose[:, None, :3] - arm
+    return reach / np.linalg.norm(reach, axis=-1, keepdims=True), arm
+
+
+# The commanded motion of the platform to each row, and the region of the workspace of each row.
+
+AXES = ("x", "y", "z", "rx", "ry", "rz")
+STILL = "still"
+# An axis is not divided if the commands spread along it by less than this part of the widest one.
+_FLAT = 0.05
+# Speeds this near to each other, relative to their size, are one; coarse times may ask for more.
+_SAME_SPEED, _MOST_COARSE = 1e-9, 1e-3
+# A position this near to the middle of an axis, relative to the spread, is on it.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Travel:
+    """Commanded motion to each row, from the row before or, in a new run, from the reference pose.
+
+    A run that starts at its first row has no motion to that.
+
+    Attributes:
+        pose: (n, 7) commanded poses; if lengths are commanded, the predicted ones.
+        step: (n, 6) displacement [m] and rotation vector [rad].
+        direction: (n,) sign and axis of the largest component of the step, rotations multiplied by
+            the robot's length; "still" if nothing moves.
+        speed: (n,) [m/s], rotations multiplied by the robot's length; NaN for the first row of a
+            run and without times. Those that differ by rounding alone are equal.
+    """
+
+    pose: Array
+    step: Array
+    direction: Names
+    speed: Array
+
+
+def travel(problem: Problem, prediction: Prediction) -> Travel:
+    """The commanded motion, never the measured one."""
+    commands = problem.experiment.commands
+    pose = commands.pose if commands.lengths is None else prediction.pose
+    step = pose_difference(pose, commands.before(pose, problem.robot.reference_pose))
+    weighed = step * np.repeat([1.0, problem.robot.length], 3)
+    axis = np.argmax(np.abs(weighed), axis=1)
+    most = weighed[np.arange(len(step)), axis]
+    words = [("+" if v > 0 else "-") + AXES[k] for k, v in zip(axis, most, strict=True)]
+    moves = np.abs(most) > 1e-6 * problem.robot.length
+    direction = np.where(moves, np.array(words), STILL)
+    speed = np.full(len(pose), np.nan)
+    time = problem.data.t_s
+    if time is not None:
+        apart = np.concatenate([[0.0], np.diff(time)])
+        known = ~commands.starts & (apart > 0)
+        speed[known] = _levelled(
+            np.linalg.norm(weighed[known], axis=1) / apart[known], _rounding(time, apart[known])
+        )
+    return Travel(pose, step, direction, speed)
+
+
+def _rounding(time: Array, apart: Array) -> float:
+    """What speeds may differ by, relative to their size: times since 1970 are coarse."""
+    coarse = 4.0 * np.spacing(np.abs(time).max())
+    return float(np.clip(coarse / apart.min(initial=np.inf), _SAME_SPEED, _MOST_COARSE))
+
+
+def _levelled(speed: Array, rounding: float) -> Array:
+    """Speeds (n,), each group of those that differ by rounding as the smallest of them."""
+    order = np.argsort(speed)
+    rising = speed[order]
+    begins = np.diff(rising, prepend=-1.0) > rounding * rising
+    out = np.empty_like(speed)
+    out[order] = rising[begins][np.cumsum(begins) - 1]
+    return out
+
+
+def regions_of(problem: Problem, pose: Array) -> Names:
+    """The region of each row, (n,): halves along each axis that is used, such as
+    "x below 0.4 m, z from 0.15 m".
+
+    Args:
+        problem: the data.
+        pose: (n, 7) commanded poses.
+    """
+    place = pose[:, :3]
+    used = place[problem.use] if problem.use.any() else place
+    low, high = used.min(axis=0), used.max(axis=0)
+    spread = high - low
+    words: list[list[str]] = [[] for _ in place]
+    for k, axis in enumerate("xyz"):
+        if spread[k] <= _FLAT * spread.max() or spread[k] == 0:
+            continue
+        middle = 0.5 * (low[k] + high[k])
+        edge = middle - _ROUNDING * spread[k]
+        for row, value in zip(words, place[:, k], strict=True):
+            row.append(f"{axis} {'below' if value < edge else 'from'} {middle:.3g} m")
+    return np.array([", ".join(row) or "everywhere" for row in words], dtype=np.str_)
+
 
 EVERYWHERE = "nothing: it is the same everywhere"
 """Name of the quantity that does not change from row to row."""

@@ -8,12 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.comparison.associations import associations
-from crosscheck.comparison.coloured import coloured_noise
-from crosscheck.comparison.outliers import rows_far_off
-from crosscheck.comparison.quantities import channels
-from crosscheck.comparison.result import Comparison, Coordinate, Group, UnsolvedRow, WorstRow
-from crosscheck.comparison.tracking import tracking
-from crosscheck.comparison.travel import Travel, regions_of, travel
+from crosscheck.comparison.noise import coloured_noise, rows_far_off
+from crosscheck.comparison.quantities import Travel, channels, regions_of, travel
+from crosscheck.comparison.result import (
+    Comparison,
+    Coordinate,
+    Group,
+    UnsolvedRow,
+    WorstRow,
+    tracking,
+)
 from crosscheck.fit.effects.contradictions import contradictions
 from crosscheck.fit.least_squares.problem import Problem, Rms, kinds_read, rms_by_kind
 from crosscheck.fit.least_squares.state import State, evaluate

@@ -6,6 +6,7 @@ Errors are measured minus predicted: position [m] and rotation vector [rad] in t
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,19 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.comparison.associations import Association
-from crosscheck.comparison.coloured import Coloured
-from crosscheck.comparison.quantities import channels
-from crosscheck.comparison.sentence import (
-    coloured_sentence,
-    error_size_words,
-    misfit_sentence,
-    noise_sentence,
-)
-from crosscheck.comparison.tracking import Tracking
-from crosscheck.comparison.travel import Travel
+from crosscheck.comparison.noise import Coloured
+from crosscheck.comparison.quantities import QuantityKind, Travel, channels
 from crosscheck.fit.least_squares.problem import (
     BY_NAME,
     KINDS,
+    Kind,
     Problem,
     Rms,
     kinds_read,
@@ -35,12 +29,225 @@ from crosscheck.fit.least_squares.state import State
 from crosscheck.fit.noise.unstated import errors_are_noise
 from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.fit.reasons import Refusal
+from crosscheck.measurements.data import Measurements
 from seecr.counted import counted
+from seecr.description.joints import locked
 from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.result import Record, Result, named, rows_of
 from seecr.statics.solution import Status
-from seecr.units import short
+from seecr.units import in_unit, short
+
+# What a comparison concludes, in one sentence.
+#
+# Residuals look random only if neighbours are not correlated and they depend on nothing that was
+# tested. They may then be noise that was stated somewhat too small, but hardly many times too
+# small.
+
+# Noise is hardly so many times what is stated. A kind of reading is at its noise up to _AT_NOISE
+# times it, if another is far off.
+_HARDLY, _AT_NOISE = 3.0, 1.5
+
+
+def noise_sentence(white: Whiteness, known_as: str, associations: Sequence[Association]) -> str:
+    """That white residuals are noise, and what they depend on all the same.
+
+    Args:
+        white: tests of the residuals. known_as: how the noise is known, "stated" or "estimated".
+        associations: what the residuals are associated with, the strongest first.
+    """
+    goes = _goes_with(associations)
+    but = f", but {goes}" if goes else ""
+    times = f"{white.scale:.2f} times the {known_as} noise"
+    return f"Model and data agree: the residuals are noise ({times}){but}."
+
+
+def coloured_sentence(noise: str, is_open: bool) -> str:
+    """That residuals are autocorrelated noise or noise with outliers, or may be.
+
+    Args:
+        noise: its size and correlation in words. is_open: whether its size was not stated, so that
+            something that the model misses would look the same.
+    """
+    if not is_open:
+        return f"Model and data agree: the residuals are noise ({noise})."
+    return (
+        f"The residuals may be noise ({noise}), but as its size was not stated, they may as well "
+        "be something that the model misses and that varies as smoothly: state the noise."
+    )
+
+
+def misfit_sentence(
+    white: Whiteness,
+    times: Mapping[str, float],
+    known_as: str,
+    associations: Sequence[Association],
+) -> str:
+    """That residuals are no noise of the stated size, and what they look like.
+
+    Args:
+        white: tests of the residuals. times: their rms over the noise, by kind of reading.
+        known_as: how the noise is known, "stated" or "estimated".
+        associations: what the residuals are associated with, the strongest first.
+    """
+    size, goes = error_size_words(white.scale, times), _goes_with(associations)
+    end = f"; {goes}" if goes else ""
+    if white.structured:
+        return f"The model misses something: {size} and correlated between neighbouring rows{end}."
+    if goes:
+        return f"The model misses something: {size}{end}."
+    most = max(times.values())
+    if most <= _HARDLY:
+        return (
+            f"The residuals look random, but {size}: either it is {known_as} too small, or many "
+            "small effects are missing."
+        )
+    return (
+        f"The model misses something, or the noise is {known_as} {most:.3g} times too small: "
+        f"{size}, and depend on nothing that was tested."
+    )
+
+
+def error_size_words(scale: float, times: Mapping[str, float]) -> str:
+    """How large errors are; which kinds of reading, if others are at their noise."""
+    far = {kind: value for kind, value in times.items() if value > _AT_NOISE}
+    near = [kind for kind in times if kind not in far]
+    if not (far and near):
+        return f"the errors are {scale:.3g} times the noise"
+    own = " and ".join(far)
+    sizes = " and ".join(f"{value:.3g}" for value in far.values())
+    return (
+        f"the errors of {own} are {sizes} times the noise (those of {' and '.join(near)} are noise)"
+    )
+
+
+def _goes_with(associations: Sequence[Association]) -> str:
+    """What the errors depend on most, as a clause; "" if on nothing that was tested."""
+    strongest = next((a for a in associations if a.significant), None)
+    if strongest is None:
+        return ""
+    share = f"{100 * strongest.share:.0f} %"
+    if strongest.kind is QuantityKind.EVERYWHERE:
+        return f"{share} of their mean square is a constant offset"
+    return f"{strongest.against} explains {share} of their variance"
+
+
+# How far the platform is from where it was wanted, whatever a model predicts: tracking errors.
+
+# The kinds of readings that have a wanted value, with the columns of a wanted pose.
+_PARTS = (("position", slice(0, 3)), ("orientation", slice(3, 7)))
+
+
+@dataclass(frozen=True)
+class Away:
+    """Distances of one kind, such as of positions.
+
+    Attributes:
+        kind: "position" or "orientation". unit: unit of the numbers. rows: number of rows.
+        rms, max: root mean square and largest of the rows' distances: lengths of whole vectors.
+        row, line: where the largest is, counted from 0, and in its file.
+    """
+
+    kind: str
+    unit: str
+    rows: int
+    rms: float
+    max: float
+    row: int
+    line: int
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """How far readings are from the wanted poses.
+
+    Attributes:
+        wanted: whether these are stated (columns ``want_*``); else they are the commanded poses.
+        through_tracker: whether the model's tracker does not read poses as they are. Readings are
+            then compared with what it would read at the wanted poses.
+        away: distances by kind.
+    """
+
+    wanted: bool
+    through_tracker: bool
+    away: tuple[Away, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """As in ``comparison.json``: null for a kind that was not read or not wanted."""
+        by_kind = {one.kind: one for one in self.away}
+        return {
+            "from": "wanted" if self.wanted else "commanded",
+            "through_tracker": self.through_tracker,
+            **{kind: by_kind.get(kind) for kind, _columns in _PARTS},
+        }
+
+    @property
+    def title(self) -> str:
+        """What the distances are of, in words."""
+        words = "off the wanted poses" if self.wanted else "off the commanded poses"
+        return f"{words}, read through the model's tracker" if self.through_tracker else words
+
+    def words(self, data: Measurements) -> str:
+        """The distances in one line, with the places of the largest in the data."""
+        parts = []
+        for one in self.away:
+            factor, unit = in_unit(one.unit)
+            rms, most = short(factor * one.rms), short(factor * one.max)
+            parts.append(
+                f"{one.kind} {rms} {unit} rms, {most} {unit} at most (line {data.place(one.row)})"
+            )
+        return f"{self.title}: {'; '.join(parts)}"
+
+
+def tracking(problem: Problem, state: State) -> Tracking | None:
+    """How far the readings of a problem are from the wanted poses, else from the commanded ones.
+
+    All rows count, also those for which the model has no equilibrium. Directions that the joints
+    lock do not count: no command moves the platform there. The model matters only for what its
+    tracker reads.
+
+    Returns:
+        the distances; None if no reading has a wanted value.
+    """
+    data = problem.data
+    poses = data.command_pose if data.wanted is None else data.wanted
+    if poses is None:
+        return None
+    there = np.asarray(np.isfinite(poses))
+    whole = np.where(there, poses, problem.robot.reference_pose)
+    seen = problem.experiment.readings_at(state.terms.effects, whole)
+    as_they_are = (whole[:, :3], whole[:, 3:])
+    through = not all(map(np.array_equal, (seen.position, seen.quat_wxyz), as_they_are))
+    raw, moves = problem.residuals(seen), ~locked(problem.robot)
+    away = []
+    for name, columns in _PARTS:
+        kind = BY_NAME[name]
+        given = there[:, columns]
+        if name == "orientation":  # of a quaternion no part is wanted by itself
+            given = np.repeat(np.all(given, axis=1, keepdims=True), 3, axis=1)
+        both = given & problem.measured[:, kind.columns] & moves[kind.columns]
+        one = _away(problem, kind, np.where(both, raw[:, kind.columns], np.nan))
+        away += [] if one is None else [one]
+    return Tracking(data.wanted is not None, through, tuple(away)) if away else None
+
+
+def _away(problem: Problem, kind: Kind, off: Array) -> Away | None:
+    """The distances of errors (n, 3) of one kind, NaN where nothing was read or wanted."""
+    rows = np.flatnonzero(np.isfinite(off).any(axis=1))
+    if len(rows) == 0:
+        return None
+    sizes = np.linalg.norm(np.nan_to_num(off[rows]), axis=1)
+    top = int(np.argmax(sizes))
+    row = int(rows[top])
+    return Away(
+        kind=kind.name,
+        unit=kind.si,
+        rows=len(rows),
+        rms=float(np.sqrt(np.mean(sizes**2))),
+        max=float(sizes[top]),
+        row=row,
+        line=int(problem.data.line[row]),
+    )
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,7 @@ from matplotlib.axis import Axis
 from matplotlib.collections import LineCollection
 from matplotlib.ticker import MaxNLocator
 
-from crosscheck.comparison.cable_space import cable_errors, cable_lengths
-from crosscheck.comparison.quantities import channels
-from crosscheck.comparison.travel import travel
+from crosscheck.comparison.quantities import cable_errors, cable_lengths, channels, travel
 from crosscheck.diagnosis.path import Drawn
 from crosscheck.fit.least_squares.problem import KINDS, TENSION, Problem
 from crosscheck.report.drawing import (

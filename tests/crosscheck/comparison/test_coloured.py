@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured
 
-from crosscheck.comparison.coloured import Coloured
+from crosscheck.comparison.noise import Coloured
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
 from crosscheck.measurements.data import Measurements, Sigma

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from crosscheck.comparison.periodogram import periodogram
+from crosscheck.comparison.quantities import periodogram
 
 SPAN = 100.0
 

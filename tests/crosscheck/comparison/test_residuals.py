@@ -10,11 +10,9 @@ from made_data import SIGMA, measured, soft_cogiro, term
 from scipy import stats
 
 from crosscheck.comparison.associations import SIGNIFICANT, _labelled, _p
-from crosscheck.comparison.cable_space import cable_errors, independent_part
 from crosscheck.comparison.limits import Limits, exceeded, load_limits, parse_limit
-from crosscheck.comparison.quantities import EVERYWHERE
+from crosscheck.comparison.quantities import EVERYWHERE, STILL, cable_errors, independent_part
 from crosscheck.comparison.residuals import compare
-from crosscheck.comparison.travel import STILL
 from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.data import Sigma
 from seecr.description.mjcf import load_robot, model_path

@@ -9,10 +9,10 @@ import pytest
 from made_data import SIGMA, measured, soft_cogiro
 
 from crosscheck.comparison.associations import Association
-from crosscheck.comparison.coloured import _too_small
+from crosscheck.comparison.noise import _too_small
 from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.comparison.residuals import compare
-from crosscheck.comparison.sentence import error_size_words, misfit_sentence, noise_sentence
+from crosscheck.comparison.result import error_size_words, misfit_sentence, noise_sentence
 from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.measurements.data import Sigma
 from seecr.pose import quat_from_rotvec, quat_multiply, rotvec_from_quat

@@ -14,7 +14,7 @@ from measured_csv import PLANAR, mjcf
 from written_pages import text_of
 
 from crosscheck.comparison.residuals import compare
-from crosscheck.comparison.tracking import Tracking
+from crosscheck.comparison.result import Tracking
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.read import load_measurements, together
 from crosscheck.measurements.write import write_measurements

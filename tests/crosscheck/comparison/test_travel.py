@@ -8,9 +8,18 @@ import numpy as np
 import pytest
 from made_data import measured, soft_cogiro
 
-from crosscheck.comparison.cable_space import cable_errors, cable_lengths, independent_part
-from crosscheck.comparison.quantities import QuantityKind, in_time, of_cables, of_rows
-from crosscheck.comparison.travel import STILL, regions_of, travel
+from crosscheck.comparison.quantities import (
+    STILL,
+    QuantityKind,
+    cable_errors,
+    cable_lengths,
+    in_time,
+    independent_part,
+    of_cables,
+    of_rows,
+    regions_of,
+    travel,
+)
 from crosscheck.fit.least_squares.problem import Problem
 from seecr.effects import Terms
 from seecr.prediction.experiment import Prediction
