@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from crosscheck.measurements.write import write_measurements
     from crosscheck.model.fitted import load_diagnosed
     from crosscheck.model.write import save_model
-    from crosscheck.planning.choosing import choose_poses
-    from crosscheck.planning.design import make_plan
+    from crosscheck.planning.design import choose_poses, make_plan
     from crosscheck.planning.result import Plan
     from crosscheck.planning.write import write_plan
     from crosscheck.suite.cases import Case, shipped_cases, user_cases
@@ -64,8 +63,7 @@ _MODULES = {
     "measurements.write": ("write_measurements",),
     "model.fitted": ("load_diagnosed",),
     "model.write": ("save_model",),
-    "planning.choosing": ("choose_poses",),
-    "planning.design": ("make_plan",),
+    "planning.design": ("choose_poses", "make_plan",),
     "planning.result": ("Plan",),
     "planning.write": ("write_plan",),
     "suite.cases": ("Case", "shipped_cases", "user_cases"),

@@ -13,11 +13,10 @@ from crosscheck.diagnosis.path import ModelPath
 from crosscheck.diagnosis.result import MissingEffect
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.inference.fields import Varying
-from crosscheck.planning.adding import Extension
-from crosscheck.planning.extensions import extensions
-from crosscheck.planning.planned import Planned, Reads
+from crosscheck.planning.places import extensions
+from crosscheck.planning.planned import Extension, Planned, Reads
 from crosscheck.planning.proposer import Gain, Suggestion, telling_apart
-from crosscheck.planning.words import signal_words
+from crosscheck.planning.result import signal_words
 from seecr.description.robot import Robot
 from seecr.effects import Term, catalogue
 from seecr.pose import Array, rotvec_from_quat

@@ -30,7 +30,7 @@ from crosscheck.inference.priors import LIMITED, MOST_OF_IT, WIDTHS
 from crosscheck.inference.search import Search
 from crosscheck.inference.verdict import judged
 from crosscheck.measurements.read import GivenData, measurements_of
-from crosscheck.planning.sight import Sight, sight_of
+from crosscheck.planning.result import Sight, sight_of
 from crosscheck.preparation.prepare import Prepared, Progress, noise_floor, prepare
 from crosscheck.preparation.thinned import thinned
 from seecr.arguments import silent

@@ -37,7 +37,7 @@ from crosscheck.inference.noise import outliers
 from crosscheck.inference.priors import SURE
 from crosscheck.inference.search import Search
 from crosscheck.inference.verdict import Judgement
-from crosscheck.planning.sight import Sight
+from crosscheck.planning.result import Sight
 from crosscheck.preparation.prepare import noise_floor
 from seecr.effects import effect_named
 from seecr.pose import Array

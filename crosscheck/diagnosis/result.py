@@ -17,7 +17,7 @@ from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Refusal
 from crosscheck.fit.words import rms_words, value_lines, value_records
 from crosscheck.inference.fields import Varying
-from crosscheck.planning.sight import Sight
+from crosscheck.planning.result import Sight
 from seecr.effects import ApartLayout, Layout, Term, Terms
 from seecr.files import plain
 from seecr.pose import Array

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from crosscheck.planning.choosing import choose_poses
-from crosscheck.planning.design import make_plan
+from crosscheck.planning.design import choose_poses, make_plan
 from crosscheck.planning.result import Plan
 from crosscheck.planning.write import write_plan
 

@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+from crosscheck.errors import CrosscheckError
 from crosscheck.fit.least_squares.imitation import imitated
 from crosscheck.given import GivenRobot, robot_of
-from crosscheck.measurements.data import Sigma
+from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import GivenCommands, commands_of
-from crosscheck.planning.adding import NO_LIMITS, Limits
-from crosscheck.planning.arguments import box_given, limits_given
-from crosscheck.planning.detours import detours
-from crosscheck.planning.extensions import extensions
-from crosscheck.planning.greedy import Wanted
+from crosscheck.planning.places import (
+    detours,
+    extensions,
+    held_within,
+    taut_first,
+    tilted_grid,
+    trustworthy,
+    upright,
+    within_box,
+)
 from crosscheck.planning.planned import (
+    NO_LIMITS,
+    Limits,
     Planned,
     Reads,
     expected_sigma,
@@ -25,15 +35,69 @@ from crosscheck.planning.planned import (
     slack_at,
 )
 from crosscheck.planning.proposer import propose
-from crosscheck.planning.result import Plan, Visible
-from crosscheck.planning.sight import all_visible
-from crosscheck.planning.visibility import Signal, signals, signals_like
+from crosscheck.planning.result import Plan, Visible, all_visible
+from crosscheck.planning.visibility import (
+    EXACT,
+    Signal,
+    Wanted,
+    chosen_poses,
+    signal_left,
+    signals,
+    signals_like,
+)
 from crosscheck.preparation.prepare import Progress
-from seecr.arguments import silent
+from seecr.arguments import finite, numbers, silent, whole
 from seecr.counted import counted, some
+from seecr.description.joints import pose_of_values
+from seecr.description.robot import ITS_A_POINT, Robot
 from seecr.effects import Term, Terms, layout_of
 from seecr.equilibrium.solving import strained
+from seecr.errors import InputError
 from seecr.pose import Array
+
+# Arguments of planning from callers: limits of tensions, boxes, kinds of readings.
+
+
+def box_given(box: ArrayLike | None) -> Array | None:
+    """A box (2, 3) [m], the lowest position first, or None.
+
+    Raises:
+        InputError: something else.
+    """
+    if box is None:
+        return None
+    array = finite(box, "box")
+    if array.shape != (2, 3):
+        raise InputError(
+            f"box must be (2, 3) [m], the lowest and the highest x y z, got {array.shape}"
+        )
+    if np.any(array[0] > array[1]):
+        k = int(np.argmax(array[0] > array[1]))
+        raise InputError(
+            f"box: expected the lowest position first, got {'xyz'[k]} from {array[0, k]:g} to "
+            f"{array[1, k]:g} m"
+        )
+    return array
+
+
+def limits_given(limits: ArrayLike) -> Limits:
+    """The lowest and the highest tension [N].
+
+    Raises:
+        InputError: something else, or limits that contradict each other.
+    """
+    array = numbers(limits, "limits")
+    if array.shape != (2,):
+        raise InputError(
+            f"limits must be two numbers, the lowest and the highest tension [N], got {limits!r}"
+        )
+    low, high = array.tolist()
+    if not 0.0 <= low <= high or low == np.inf:
+        raise InputError(
+            f"limits must be 0 <= lowest <= highest [N], lowest finite, got {low:g} and {high:g}"
+        )
+    return low, high
+
 
 _MOST_LINES = 5
 
@@ -152,3 +216,175 @@ def _wanted(own: Mapping[str, Signal], effects: Mapping[str, Visible]) -> list[W
         out += [Wanted(name, other, value, v.needed) for other, value in v.confused]
         out += [Wanted(name, twin, 0.0, v.needed) for twin in v.twins]
     return out
+
+
+# Chooses poses to measure for a robot, those that tell most, and arranges them in runs.
+
+# Candidates along x, y, z; number of random ones for joints; most candidates that are evaluated.
+_GRID, _JOINT_POSES, _MOST = (6, 6, 4), 400, 240
+# Parts of the space between the exit points that are kept free at the sides and at the top, and how
+# far joints turn [rad].
+_SIDE, _TOP, _TURN = 0.15, 0.15, 0.2
+# If all exit points are above home: how far below home poses go, relative to the height above it.
+_BELOW = 0.25
+# An effect should be told from so many others, those that are most like it.
+_RIVALS = 3
+# Number of candidates that each step of the choice tries.
+_SAMPLE = 40
+# Rows of a run, and least number of runs: diagnoses hold out one after the other.
+_ROWS_A_RUN, _LEAST_RUNS = 12, 3
+
+
+def choose_poses(
+    robot: GivenRobot,
+    rows: int,
+    *,
+    sigma: Sigma | None = None,
+    reads: Collection[str] | str = (),
+    limits: Limits = NO_LIMITS,
+    box: Array | None = None,
+    progress: Progress = silent,
+) -> Measurements:
+    """Choose poses to measure: those that together show and tell apart most effects.
+
+    Args:
+        robot: a robot, or its MJCF file.
+        rows: number of poses.
+        sigma: expected noise; by default that of good sensors.
+        reads: kinds of readings there will be; see :func:`make_plan`.
+        limits: lowest and highest tension [N].
+        box: (2, 3) [m] lowest and highest position; by default inside the exit points.
+        progress: called with what is being done and the fraction that is done.
+
+    Returns:
+        Commands, in runs that go from each pose to one nearby.
+
+    Raises:
+        CrosscheckError: the robot can hold too few poses within the limits.
+        InputError: ``rows`` is not a whole number from 1 on; limits or a box of another form, or
+            reversed.
+    """
+    robot, rows = robot_of(robot), whole(rows, "rows", least=1)
+    limits, box = limits_given(limits), box_given(box)
+    progress("looking for poses", 0.0)
+    kinds = kinds_of(reads, sigma or Sigma())
+    full, _assumed = expected_sigma(robot, sigma or Sigma(), kinds)
+    tried, channels = _candidates(robot, box), Reads.of_kinds(robot.n_cables, kinds)
+    plan, found = None, 0
+    if robot.n_cables >= robot.n_dof:
+        plan = _usable(robot, held_within(robot, tried, limits), rows, full, channels, limits)
+        found = 0 if plan is None else plan.problem.data.n_rows
+    if robot.n_cables <= robot.n_dof and found < rows:  # few cables hold little, but rest nearby
+        plan = _usable(robot, tried, rows, full, channels, limits)
+        found = 0 if plan is None else plan.problem.data.n_rows
+    if plan is None or found < rows:
+        cure = "ask for fewer rows, a wider range of tensions, or another box"
+        raise CrosscheckError(
+            f"robot {robot.name} can be held at {found} of {counted(len(tried), 'pose')} that "
+            f"were tried; expected {rows} or more; {ITS_A_POINT if robot.is_point else cure}"
+        )
+    progress("sensitivities", 0.2)
+    there = signals(plan)[0]
+    nothing = {n: Signal(s.layout, s.shape, s.columns[:0]) for n, s in there.items()}
+    progress("choosing poses", 0.4)
+    chosen = chosen_poses(
+        nothing, there, plan.problem.row_of, _wanted_of_each(there), rows, _SAMPLE
+    )
+    pose = plan.problem.data.command_pose
+    assert pose is not None
+    pose = pose[sorted(chosen)]
+    pose = pose[_way(robot, pose)]
+    runs = max(_LEAST_RUNS, round(rows / _ROWS_A_RUN))
+    run = np.array([f"run {1 + k * runs // len(pose)}" for k in range(len(pose))])
+    return Measurements(
+        path=Path("poses.csv"), n_cables=robot.n_cables, run=run, command_pose=pose,
+        sigma=sigma or Sigma(),
+    )  # fmt: skip
+
+
+def _candidates(robot: Robot, box: Array | None) -> Array:
+    frame = upright(robot) if box is None else np.eye(3)
+    low, high = _room(robot, frame) if box is None else box
+    if robot.joints:
+        slides = ~robot.hinges
+        axes = np.array([joint.axis for joint in robot.joints]) @ frame
+        reach = np.where(slides, 0.5 * np.abs(axes @ (high - low)), _TURN)
+        home = robot.reference_pose[:3] @ frame
+        middle = np.where(slides, axes @ (0.5 * (low + high) - home), 0.0)
+        random = np.random.default_rng(0).uniform(-1.0, 1.0, (_JOINT_POSES, len(reach)))
+        poses = pose_of_values(robot, middle + reach * random)[0]
+        return poses if box is None else within_box(poses, box)
+    return tilted_grid(robot, low, high, _GRID, frame)
+
+
+def _room(robot: Robot, frame: Array) -> tuple[Array, Array]:
+    """A box along the axes of a frame (3, 3), the last one upwards, inside the exit points.
+
+    If these are all above home, it begins a little below home.
+    """
+    exits = robot.exit_points @ frame
+    low, high = exits.min(axis=0), exits.max(axis=0)
+    home, span = robot.reference_pose[:3] @ frame, high - low
+    inner_low, inner_high = low + _SIDE * span, high - _SIDE * span
+    below = _BELOW * (high[2] - home[2])
+    inner_high[2] = high[2] - _TOP * (high[2] - min(low[2], home[2] - below))
+    inner_low[2] = low[2] + _SIDE * span[2] if low[2] < home[2] else home[2] - below
+    return np.minimum(inner_low, home), np.maximum(inner_high, home)
+
+
+def _usable(
+    robot: Robot, poses: Array, rows: int, sigma: Sigma, reads: Reads, limits: Limits
+) -> Planned | None:
+    """The plan of those poses at which the plain robot rests, stiff and within the limits.
+
+    Where a lowest tension is asked for, those with slack cables are left out, if there are ``rows``
+    others.
+    """
+    if len(poses) == 0:
+        return None
+    every = _plan(robot, poses, sigma, reads)
+    tensions = every.base.prediction.tensions
+    good = trustworthy(every, every) if every.problem.use.any() else every.problem.use
+    good = good & (tensions <= limits[1]).all(axis=1) & (tensions >= limits[0]).all(axis=1)
+    kept = np.flatnonzero(taut_first(every, good, rows, limits))
+    if len(kept) == 0:
+        return None
+    # a selection spread over all of them, as they are in the order of the grid
+    kept = kept[np.unique(np.linspace(0, len(kept) - 1, min(_MOST, len(kept))).astype(int))]
+    return _plan(robot, poses[kept], sigma, reads)
+
+
+def _plan(robot: Robot, poses: Array, sigma: Sigma, reads: Reads) -> Planned:
+    run = np.array([f"pose {k + 1}" for k in range(len(poses))])
+    data = Measurements(
+        path=Path("poses.csv"), n_cables=robot.n_cables, run=run, command_pose=poses
+    )
+    return planned(robot, data, sigma, reads)
+
+
+def _wanted_of_each(there: dict[str, Signal]) -> list[Wanted]:
+    """Each effect that all poses together show, and the effects that are most like it."""
+    out = []
+    for name, found in all_visible(there).items():
+        if not found.visible:
+            continue
+        out.append(Wanted(name, "", 0.0, found.needed))
+        left = {
+            other: signal_left(there[name], signal)
+            for other, signal in there.items()
+            if other != name and other not in found.twins
+        }
+        hard = [o for o in sorted(left, key=lambda o: left[o]) if left[o] > EXACT * found.needed]
+        out += [Wanted(name, other, 0.0, found.needed) for other in hard[:_RIVALS]]
+    return out
+
+
+def _way(robot: Robot, poses: Array) -> NDArray[np.int64]:
+    """An order in which each pose is followed by the nearest one that is left."""
+    at, left, out = robot.reference_pose[:3], list(range(len(poses))), []
+    while left:
+        nearest = min(left, key=lambda k: float(np.linalg.norm(poses[k, :3] - at)))
+        left.remove(nearest)
+        out.append(nearest)
+        at = poses[nearest, :3]
+    return np.array(out)

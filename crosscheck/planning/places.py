@@ -1,19 +1,64 @@
-"""Poses that could be measured: a grid with tilts, as far as the robot can hold still there."""
+"""Poses that could be measured, and what else could be measured in addition."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.measurements.data import Measurements
-from crosscheck.planning.adding import MORE_POSES, NO_LIMITS, Adding, Extension, Limits, like
-from crosscheck.planning.planned import Planned, near_slack, slack_at
-from crosscheck.planning.upright import box_around, upright
+from crosscheck.planning.planned import (
+    MORE_POSES,
+    NO_LIMITS,
+    Adding,
+    Extension,
+    Limits,
+    Planned,
+    Reads,
+    expected_sigma,
+    like,
+    near_slack,
+    slack_at,
+    usual_cell,
+)
+from seecr.commands import Loads
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
+from seecr.units import short
 from seecr.workspace.zones import feasible
+
+# Axes in which the last one is against gravity, whichever way that is in the base frame.
+
+# About x, by half a turn.
+_OVER = np.diag([1.0, -1.0, -1.0])
+
+
+def upright(robot: Robot) -> Array:
+    """(3, 3) axes as columns, base frame: right-handed, the last one against gravity.
+
+    They are the axes of the base frame if gravity is along -z, or if there is none. Where it is
+    along another of these they are without rounding, so that poses on a box's edge stay there.
+    """
+    return _turned(robot.up) if robot.up[2] >= 0.0 else _turned(-robot.up) @ _OVER
+
+
+def _turned(up: Array) -> Array:
+    """The rotation of z onto a direction not below the horizon (Rodrigues' formula)."""
+    x, y = up[:2]
+    about = np.array([[0.0, 0.0, x], [0.0, 0.0, y], [-x, -y, 0.0]])
+    return np.asarray(np.eye(3) + about + about @ about / (1.0 + up[2]))
+
+
+def box_around(low: Array, high: Array, axes: Array) -> tuple[Array, Array]:
+    """The box along other axes (3, 3), as columns, around one along x, y, z: lowest and highest."""
+    ends = low[:, None] * axes, high[:, None] * axes
+    return np.minimum(*ends).sum(axis=0), np.maximum(*ends).sum(axis=0)
+
 
 # Candidate poses along x, y, z, and how far they extend beyond the planned region.
 _GRID, _BEYOND = (4, 3, 3), 0.25
@@ -166,3 +211,181 @@ def _jointed(plan: Planned) -> Array:
     random = np.random.default_rng(0)
     chosen = random.uniform(low - margin, high + margin, (_JOINT_POSES, len(low)))
     return np.asarray(pose_of_values(robot, chosen)[0])
+
+
+# What could be measured in addition: sensors, a payload, the way back, more poses.
+
+# A known payload, relative to the platform's mass.
+PAYLOAD = 0.25
+
+_AN_HOUR = 3600.0
+
+
+def extensions(
+    plan: Planned, limits: Limits = NO_LIMITS, box: Array | None = None
+) -> Iterator[Extension]:
+    """All that can be added to measurements that were made or planned, one after the other.
+
+    Args:
+        plan: what is read so far, with the model that predicts it.
+        limits: lowest and highest tension [N] of added poses.
+        box: (2, 3) [m] lowest and highest position of added poses.
+    """
+    ways = ~plan.problem.data.read & ~plan.unsolved
+    data = plan.problem.data.rows(plan.problem.use | ways)
+    for make in (_sensors, _payload, _way_back, _later):
+        yield from make(plan, data)
+    found = more_poses(plan, limits, box)
+    if found is not None:
+        yield found
+
+
+def _sensors(plan: Planned, data: Measurements) -> Iterator[Extension]:
+    problem, m = plan.problem, plan.problem.robot.n_cables
+    if not plan.reads.tensions.any():
+        mean = float(np.mean(plan.base.prediction.tensions[problem.use]))
+        noise = problem.sigma.tension_N or usual_cell(mean)
+        yield Extension(
+            Adding.TENSIONS,
+            f"record the cable tensions (to {noise:g} N)",
+            like(
+                plan, data, reads=Reads.whole(m, pose=False, tensions=True),
+                sigma=replace(problem.sigma, tension_N=noise),
+            ),
+        )  # fmt: skip
+    if not plan.reads.whole_pose:
+        sigma, _assumed = expected_sigma(problem.robot, problem.sigma)
+        yield Extension(
+            Adding.POSE,
+            "record the whole pose of the platform",
+            like(plan, data, reads=Reads.whole(m), sigma=sigma),
+        )
+
+
+def _payload(plan: Planned, data: Measurements) -> Iterator[Extension]:
+    robot = plan.problem.robot
+    if robot.mass > 0:
+        yield Extension(
+            Adding.PAYLOAD,
+            f"repeat the poses with a known extra {short(PAYLOAD * robot.mass, 2)} kg at the "
+            "centre of mass (payload_kg)",
+            like(plan, replace(data, loads=_heavier(data, robot, PAYLOAD * robot.mass))),
+        )
+
+
+def _heavier(data: Measurements, robot: Robot, mass: float) -> Loads:
+    """The rows' loads plus a payload [kg] at the platform's centre of mass."""
+    here = data.loads or Loads.of(data.n_rows)
+    total, centre = here.mass + mass, here.centre
+    share = np.divide(here.mass, total, out=np.zeros_like(total), where=total != 0.0)[:, None]
+    both = robot.centre_of_mass + share * (centre - robot.centre_of_mass)
+    return Loads(total, np.where(here.mass[:, None] == 0.0, np.nan, both), here.wrench)
+
+
+def _way_back(plan: Planned, data: Measurements) -> Iterator[Extension]:
+    yield Extension(
+        Adding.WAY_BACK,
+        "repeat each run in the opposite order, so that poses are reached from the other side",
+        like(plan, _backwards(data)),
+    )
+
+
+def _later(plan: Planned, data: Measurements) -> Iterator[Extension]:
+    """All rows again an hour later, on the clock of each file, as creep depends on the time."""
+    if data.t_s is None:
+        return
+    n = data.n_rows
+    order = np.argsort(np.tile(data.file, 2), kind="stable")
+    later, both = order >= n, data.rows(order % n)
+    shift = float(np.ptp(data.t_s)) + _AN_HOUR
+    names = np.where(later, named_again(both), both.run)
+    both = replace(both, run=names, t_s=data.t_s[order % n] + later * shift)
+    whole = like(plan, both)
+    rest = whole.problem.only(later)
+    base = evaluate(rest, plan.base.terms, whole.factor)
+    again = replace(whole, problem=rest, base=base)
+    yield Extension(Adding.LATER, "repeat the poses an hour later", again)
+
+
+def named_again(data: Measurements) -> np.ndarray:
+    return np.array([f"{name} again" for name in data.run.tolist()], dtype=np.str_)
+
+
+def _backwards(data: Measurements) -> Measurements:
+    """Each run from its last row to its first, with the same times."""
+    order = np.concatenate([np.flatnonzero(data.run == name)[::-1] for name in data.runs])
+    turned = data.rows(order)
+    return replace(turned, run=named_again(turned), t_s=data.t_s)
+
+
+# Additional plans that a user can carry out: payloads off centre, poses reached from beyond.
+
+# Distance of an off-centre payload from the centre of mass, relative to the widest horizontal
+# extent of the anchor points; distance of a way point beyond a pose, relative to the way to it.
+_ASIDE, _BEYOND_POSE = 0.25, 0.5
+
+
+def detours(plan: Planned) -> Iterator[Extension]:
+    """An off-centre payload, and each pose reached again from beyond it."""
+    data = plan.problem.data.rows(plan.problem.use)
+    yield from _aside(plan, data)
+    yield from _way_points(plan, data)
+
+
+def _aside(plan: Planned, data: Measurements) -> Iterator[Extension]:
+    """A known payload off the centre of mass."""
+    robot = plan.problem.robot
+    if robot.mass <= 0.0 or data.loads is not None or robot.joints:
+        return
+    span, n = np.ptp(robot.anchor_points[:, :2], axis=0), data.n_rows
+    place = robot.centre_of_mass + _ASIDE * float(span.max()) * np.eye(3)[int(span.argmax())]
+    mass, where = PAYLOAD * robot.mass, ", ".join(f"{v:.3g}" for v in place)
+    there = Loads(np.full(n, mass), np.tile(place, (n, 1)), np.zeros((n, 6)))
+    yield Extension(
+        Adding.PAYLOAD_ASIDE,
+        f"repeat the poses with a known extra {short(mass, 2)} kg off the centre, at ({where}) m "
+        "in the platform's frame (payload_kg, payload_x_m, payload_y_m, payload_z_m)",
+        like(plan, replace(data, loads=there, run=named_again(data))),
+    )
+
+
+def _way_points(plan: Planned, data: Measurements) -> Iterator[Extension]:
+    """Each pose again from beyond it, by a way point before each row that has readings."""
+    beyond = _beyond(plan, data)
+    if beyond is None or data.command_pose is None:
+        return
+    n = data.n_rows
+    both = data.rows(np.repeat(np.arange(n), 2))
+    stops = np.tile([False, True], n)
+    gone_through = replace(
+        both,
+        run=named_again(both),
+        t_s=None if data.t_s is None else _halfway(data.t_s),
+        command_pose=np.stack([beyond, data.command_pose], axis=1).reshape(2 * n, 7),
+        # any number marks a stop as read; the readings themselves come from the model
+        position=np.where(stops[:, None], np.zeros(3), np.nan),
+        quat_wxyz=None,
+        angles_rad=np.full((2 * n, 3), np.nan),
+        tensions=np.full((2 * n, data.n_cables), np.nan),
+    )
+    words = "repeat each pose, now approached from a way point beyond it"
+    yield Extension(Adding.WAY_POINTS, words, like(plan, gone_through))
+
+
+def _halfway(t_s: Array) -> Array:
+    """Times (2n,) [s] of each row and of a way point halfway between the row before and it."""
+    before = np.concatenate([[t_s[0] - np.diff(t_s[:2], append=t_s[0])[0]], t_s[:-1]])
+    return np.stack([np.minimum(0.5 * (before + t_s), t_s), t_s], axis=1).ravel()
+
+
+def _beyond(plan: Planned, data: Measurements) -> Array | None:
+    """Poses (n, 7) beyond each pose in the direction of travel, where these can be held."""
+    robot = plan.problem.robot
+    if data.command_pose is None or robot.joints:
+        return None
+    pose = data.command_pose
+    before = data.as_commands(robot).before(pose, robot.reference_pose)
+    beyond = pose.copy()
+    beyond[:, :3] += _BEYOND_POSE * (pose - before)[:, :3]
+    beyond = np.where(feasible(robot, beyond)[:, None], beyond, pose)
+    return None if np.array_equal(beyond, pose) else beyond

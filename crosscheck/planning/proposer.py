@@ -14,10 +14,15 @@ import numpy as np
 
 from crosscheck.fit.least_squares.state import derivatives
 from crosscheck.measurements.data import Measurements
-from crosscheck.planning.adding import MORE_POSES, Adding, Extension
-from crosscheck.planning.greedy import Wanted, chosen_poses
-from crosscheck.planning.planned import Planned, slack_at
-from crosscheck.planning.visibility import EXACT, Signal, signal_left, signals_together
+from crosscheck.planning.planned import MORE_POSES, Adding, Extension, Planned, slack_at
+from crosscheck.planning.visibility import (
+    EXACT,
+    Signal,
+    Wanted,
+    chosen_poses,
+    signal_left,
+    signals_together,
+)
 from crosscheck.preparation.prepare import Progress
 from seecr.arguments import silent
 from seecr.counted import counted
@@ -117,7 +122,7 @@ def propose(
     """What to add, each tried by itself, the most useful first.
 
     Args:
-        options: :func:`crosscheck.planning.extensions.extensions`.
+        options: :func:`crosscheck.planning.places.extensions`.
         own: signals of effects in what is read so far.
         wanted: what these do not show or tell apart.
         signals: computes the signals of the same effects in added readings.
@@ -176,7 +181,7 @@ def telling_apart(
 
     Args:
         plan: the data, with the model that has the effect.
-        options: :func:`crosscheck.planning.extensions.extensions`.
+        options: :func:`crosscheck.planning.places.extensions`.
         name: name of the effect.
         rival: the other effect.
     """

@@ -12,7 +12,7 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.given import numbers_of
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.write import write_measurements
-from crosscheck.planning.adding import Adding
+from crosscheck.planning.planned import Adding
 from crosscheck.planning.proposer import Suggestion
 from crosscheck.planning.result import Plan
 from seecr.errors import InputError, InputFileError

@@ -8,9 +8,8 @@ import numpy as np
 from markupsafe import Markup
 
 from crosscheck.planning.proposer import Suggestion
-from crosscheck.planning.result import Plan, Visible
+from crosscheck.planning.result import Plan, Visible, alike, gain_words
 from crosscheck.planning.visibility import NAMED
-from crosscheck.planning.words import alike, gain_words
 from crosscheck.report.confusion import Confusion, draw_confusion
 from crosscheck.report.drawing import AFTER, BEFORE, INK, blank, grid, image, plain_log, styled
 from crosscheck.report.page import facts, title_of

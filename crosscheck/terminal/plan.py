@@ -9,8 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from crosscheck.planning.proposer import Suggestion
-from crosscheck.planning.result import Plan
-from crosscheck.planning.words import alike, gain_words
+from crosscheck.planning.result import Plan, alike, gain_words
 from crosscheck.terminal.lines import console_for, say
 from seecr.counted import some
 

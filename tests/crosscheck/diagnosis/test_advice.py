@@ -17,7 +17,7 @@ from crosscheck.diagnosis.advice import check_of, measure_next, measured_directl
 from crosscheck.diagnosis.path import ModelPath
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.inference.fields import Varying
-from crosscheck.planning.adding import Adding
+from crosscheck.planning.planned import Adding
 from crosscheck.planning.proposer import Gain, Suggestion
 from seecr.effects import Term, catalogue, layout_of
 

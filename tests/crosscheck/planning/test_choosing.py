@@ -15,12 +15,10 @@ from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_commands
 from crosscheck.measurements.write import write_measurements
-from crosscheck.planning.adding import Adding
-from crosscheck.planning.choosing import choose_poses
-from crosscheck.planning.design import make_plan
-from crosscheck.planning.detours import detours
-from crosscheck.planning.planned import Reads, planned
-from crosscheck.planning.sight import sight_of
+from crosscheck.planning.design import choose_poses, make_plan
+from crosscheck.planning.places import detours
+from crosscheck.planning.planned import Adding, Reads, planned
+from crosscheck.planning.result import sight_of
 from crosscheck.planning.write import remark_of
 from crosscheck.preparation.prepare import prepare
 from seecr.description.mjcf import load_robot, model_path

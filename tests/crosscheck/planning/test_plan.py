@@ -15,16 +15,13 @@ from crosscheck.fit.least_squares.state import evaluate
 from crosscheck.inference.fit import Data, fit
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import together
-from crosscheck.planning.adding import MORE_POSES, Adding
-from crosscheck.planning.choosing import choose_poses
-from crosscheck.planning.design import make_plan
-from crosscheck.planning.detours import detours
-from crosscheck.planning.extensions import extensions
-from crosscheck.planning.greedy import Wanted, chosen_poses
-from crosscheck.planning.places import more_poses, taut_first
-from crosscheck.planning.planned import Reads, near_slack, planned
+from crosscheck.planning.design import choose_poses, make_plan
+from crosscheck.planning.places import detours, extensions, more_poses, taut_first
+from crosscheck.planning.planned import MORE_POSES, Adding, Reads, near_slack, planned
 from crosscheck.planning.proposer import NEEDED, telling_apart
 from crosscheck.planning.visibility import (
+    Wanted,
+    chosen_poses,
     needed,
     signal_left,
     signals,

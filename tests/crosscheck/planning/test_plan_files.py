@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from crosscheck.planning.adding import Adding
+from crosscheck.planning.planned import Adding
 from crosscheck.planning.proposer import Suggestion
 from crosscheck.planning.write import _slack_remark, sometimes_written
 

@@ -10,7 +10,7 @@ import pytest
 
 import crosscheck
 from crosscheck.measurements.data import Sigma
-from crosscheck.planning.arguments import box_given, limits_given
+from crosscheck.planning.design import box_given, limits_given
 from crosscheck.planning.planned import kinds_of
 from seecr.errors import InputError
 

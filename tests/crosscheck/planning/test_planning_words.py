@@ -9,10 +9,8 @@ import pytest
 
 from crosscheck.fit.reasons import Reason, Why
 from crosscheck.planning.proposer import Gain
-from crosscheck.planning.result import Visible
-from crosscheck.planning.sight import Sight
+from crosscheck.planning.result import Sight, Visible, alike, gain_words, signal_words
 from crosscheck.planning.visibility import Signal
-from crosscheck.planning.words import alike, gain_words, signal_words
 from seecr.effects import layout_of
 
 DRUMS = layout_of("drum_eccentricity", "demobot_cogiro")

@@ -9,8 +9,8 @@ import pytest
 from rejointed import WAYS, rejointed
 from turned import turned
 
-from crosscheck.planning.choosing import _candidates
-from crosscheck.planning.upright import box_around, upright
+from crosscheck.planning.design import _candidates
+from crosscheck.planning.places import box_around, upright
 from seecr.description.mjcf import load_robot
 
 COGIRO = load_robot("demobot_cogiro")

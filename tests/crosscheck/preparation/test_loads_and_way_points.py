@@ -14,9 +14,8 @@ from crosscheck.fit.reasons import Unfit
 from crosscheck.inference.fit import Data, fit
 from crosscheck.inference.held_out import blocks_of
 from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.planning.adding import Adding
-from crosscheck.planning.extensions import PAYLOAD, extensions
-from crosscheck.planning.planned import Reads, planned
+from crosscheck.planning.places import PAYLOAD, extensions
+from crosscheck.planning.planned import Adding, Reads, planned
 from crosscheck.preparation.prepare import prepare
 from crosscheck.twin.trajectory import trajectory
 from seecr.commands import Loads

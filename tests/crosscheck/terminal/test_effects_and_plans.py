@@ -12,7 +12,7 @@ import numpy as np
 from rich.console import Console
 
 from crosscheck.fit.reasons import Reason, Why
-from crosscheck.planning.adding import Adding
+from crosscheck.planning.planned import Adding
 from crosscheck.planning.proposer import Gain, Suggestion
 from crosscheck.planning.result import Plan, Visible
 from crosscheck.planning.visibility import Signal
