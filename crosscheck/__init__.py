@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from crosscheck.suite.run import Run, run_suite
     from crosscheck.suite.thresholds import Thresholds, load_thresholds
     from crosscheck.suite.write import write_run
-    from crosscheck.twin.answer import unseal
+    from crosscheck.twin.hidden import unseal
     from crosscheck.twin.make import Twin, make_twin
 
 # Imported when first used: SciPy, MuJoCo and the compiled loop take a while to load.
@@ -71,7 +71,7 @@ _MODULES = {
     "suite.run": ("Run", "run_suite"),
     "suite.thresholds": ("Thresholds", "load_thresholds"),
     "suite.write": ("write_run",),
-    "twin.answer": ("unseal",),
+    "twin.hidden": ("unseal",),
     "twin.make": ("Twin", "make_twin"),
 }  # fmt: skip
 _WHERE = {name: module for module, names in _MODULES.items() for name in names}

@@ -244,7 +244,7 @@ BESIDE = {
 # What the effects edit is SEECR's side of them.
 PHYSICS = {"seecr.effects.setup", "seecr.effects.edits"}
 # A trajectory is poses that the robot's joints can reach: what is commanded, no physics.
-OF_ITS_OWN = {"crosscheck.twin.trajectory": {"seecr.description.joints"}}
+OF_ITS_OWN = {"crosscheck.twin.lab": {"seecr.description.joints"}}
 
 
 def physics_taken(name: str, targets: Iterable[str]) -> set[str]:
@@ -273,11 +273,11 @@ def test_mujocos_side_takes_the_description_of_seecr_alone(folder: str) -> None:
     [
         ("crosscheck.settle.newton", "def late():\n    import seecr\n    seecr.solve()", "seecr"),
         (
-            "crosscheck.twin.trajectory",
+            "crosscheck.twin.lab",
             "from seecr.equilibrium.solving import solve",
             "seecr.equilibrium.solving seecr.equilibrium.solving.solve",
         ),
-        ("crosscheck.twin.trajectory", "from seecr.description.joints import motion_columns", ""),
+        ("crosscheck.twin.lab", "from seecr.description.joints import motion_columns", ""),
         (
             "crosscheck.twin.robot",
             "from seecr.effects import Term\nfrom seecr.effects.setup import Setup",

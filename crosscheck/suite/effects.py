@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from crosscheck.suite.gap import gap
 from crosscheck.suite.outcome import Outcome
 from crosscheck.twin.hidden import CONTAINED, choose
+from crosscheck.twin.lab import trajectory
 from crosscheck.twin.measure import measure
 from crosscheck.twin.robot import TRUE_EFFECTS
-from crosscheck.twin.trajectory import trajectory
 from seecr.commands import Commands, Loads
 from seecr.counted import counted, some
 from seecr.description.mjcf import load_robot, model_path

@@ -7,12 +7,12 @@ effects' names and parameters and the robot's numbers, but no physics.
 
 Laws that MuJoCo does not have are added cable by cable, between settlings, until MuJoCo's own
 equilibrium is consistent with them: hysteresis, creep and friction
-(:mod:`crosscheck.twin.springs`).
+(:mod:`crosscheck.twin.build`).
 """
 
 from __future__ import annotations
 
-from crosscheck.twin.answer import unseal
+from crosscheck.twin.hidden import unseal
 from crosscheck.twin.make import FILES, Twin, make_twin
 
 __all__ = ["FILES", "Twin", "make_twin", "unseal"]

@@ -18,8 +18,7 @@ from crosscheck.given import GivenRobot, copy_robot, file_of, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import GivenCommands, commands_of
 from crosscheck.measurements.write import write_measurements
-from crosscheck.twin.answer import NAME, Answer, Moves, seal
-from crosscheck.twin.hidden import choose, values_of
+from crosscheck.twin.hidden import NAME, Answer, Moves, choose, seal, values_of
 from crosscheck.twin.lab import (
     EXTENTS,
     Lab,

@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 from crosscheck.cli import main
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.write import write_measurements
-from crosscheck.twin.trajectory import trajectory
+from crosscheck.twin.lab import trajectory
 from seecr.commands import Commands, Loads
 from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot

@@ -12,7 +12,7 @@ import pytest
 
 from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.measurements.read import load_measurements
-from crosscheck.twin.answer import unseal
+from crosscheck.twin.hidden import unseal
 from crosscheck.twin.make import make_twin
 from seecr.description.mjcf import load_robot, model_path
 

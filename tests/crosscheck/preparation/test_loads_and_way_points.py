@@ -17,7 +17,7 @@ from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.planning.places import PAYLOAD, extensions
 from crosscheck.planning.planned import Adding, Reads, planned
 from crosscheck.preparation.prepare import prepare
-from crosscheck.twin.trajectory import trajectory
+from crosscheck.twin.lab import trajectory
 from seecr.commands import Loads
 from seecr.effects import Terms
 from seecr.prediction.experiment import Experiment

@@ -8,8 +8,8 @@ import pytest
 
 from crosscheck.settle.newton import minimise, neutral_stiffness, stiffness
 from crosscheck.settle.physics import Physics
+from crosscheck.twin.build import Springs
 from crosscheck.twin.robot import true_robot
-from crosscheck.twin.springs import Springs
 from crosscheck.twin.world import World
 from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import effect_named

@@ -18,11 +18,10 @@ from crosscheck.cli import main
 from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_measurements
-from crosscheck.twin.answer import NAME, Answer, Moves, seal, unseal
-from crosscheck.twin.hidden import choose, times
+from crosscheck.twin.hidden import NAME, Answer, Moves, choose, seal, times, unseal
+from crosscheck.twin.lab import trajectory
 from crosscheck.twin.make import make_twin
 from crosscheck.twin.robot import TRUE_EFFECTS
-from crosscheck.twin.trajectory import trajectory
 from seecr.commands import Commands
 from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Term, effect_named, layout_of

@@ -13,14 +13,11 @@ from effect_cases import experiment_of
 from crosscheck.errors import CrosscheckError
 from crosscheck.settle.settler import SettleStatus, come_to_rest
 from crosscheck.suite.effects import effect_cases, run_effect
-from crosscheck.twin.chain import hang
-from crosscheck.twin.descent import descend
+from crosscheck.twin.build import Springs, hang
 from crosscheck.twin.hidden import times
-from crosscheck.twin.lengths import paid_out, waypoints_of
-from crosscheck.twin.measure import measure
+from crosscheck.twin.measure import measure, paid_out, waypoints_of
 from crosscheck.twin.robot import TRUE_EFFECTS, true_robot
-from crosscheck.twin.springs import Springs
-from crosscheck.twin.world import World
+from crosscheck.twin.world import World, descend
 from seecr.commands import Commands
 from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import BUILT_IN, Effect, effect_named, parameter

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from crosscheck.twin.build import Cable, Springs
 from crosscheck.twin.robot import TrueRobot, true_robot
-from crosscheck.twin.springs import Cable, Springs
 from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import effect_named
 
