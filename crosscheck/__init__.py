@@ -36,10 +36,10 @@ if TYPE_CHECKING:
     from crosscheck.planning.design import choose_poses, make_plan
     from crosscheck.planning.result import Plan
     from crosscheck.planning.write import write_plan
+    from crosscheck.suite.agreement import Thresholds, load_thresholds
     from crosscheck.suite.cases import Case, shipped_cases, user_cases
     from crosscheck.suite.results import CaseResult
     from crosscheck.suite.run import Run, run_suite
-    from crosscheck.suite.thresholds import Thresholds, load_thresholds
     from crosscheck.suite.write import write_run
     from crosscheck.twin.hidden import unseal
     from crosscheck.twin.make import Twin, make_twin
@@ -69,7 +69,7 @@ _MODULES = {
     "suite.cases": ("Case", "shipped_cases", "user_cases"),
     "suite.results": ("CaseResult",),
     "suite.run": ("Run", "run_suite"),
-    "suite.thresholds": ("Thresholds", "load_thresholds"),
+    "suite.agreement": ("Thresholds", "load_thresholds"),
     "suite.write": ("write_run",),
     "twin.hidden": ("unseal",),
     "twin.make": ("Twin", "make_twin"),

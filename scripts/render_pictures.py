@@ -32,9 +32,9 @@ from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.recording import write_case_recording, write_diagnosis_recording
 from crosscheck.report import write_page
+from crosscheck.suite.agreement import load_thresholds
 from crosscheck.suite.cases import Case, select, shipped_cases
 from crosscheck.suite.run import run_case
-from crosscheck.suite.thresholds import load_thresholds
 from crosscheck.twin.make import make_twin
 from seecr.description.mjcf import load_robot, model_path
 from seecr.equilibrium.solving import solve

@@ -20,7 +20,7 @@ import numpy as np
 
 from crosscheck.calibration import calibrate
 from crosscheck.diagnosis.diagnose import diagnose
-from crosscheck.suite.poses import demobot_sweep
+from crosscheck.suite.cases import demobot_sweep
 from crosscheck.twin.make import make_twin
 from crosscheck.twin.measure import measure
 from seecr.commands import Commands

@@ -117,8 +117,7 @@ TRADE = {
     "crosscheck.model.write": {"check_place"},
     "crosscheck.importing": {"check_case", "write_case"},
     "crosscheck.planning.write": {"NAME", "box_of", "check_own", "sometimes_written"},
-    "crosscheck.suite.worst_pose": {"FILE_NAME"},
-    "crosscheck.suite.write": {"RESULTS"},
+    "crosscheck.suite.write": {"FILE_NAME", "RESULTS"},
     "crosscheck.twin": {"FILES"},
     "seecr.exported.export": {"wrote"},
     # what results were made of
@@ -131,7 +130,7 @@ TRADE = {
     "seecr.pose": {"NORM_TOLERANCE"},
     "seecr.statics.starts": {"commanded_poses"},
     "seecr.workspace.maps": {"evenly"},
-    "crosscheck.suite.chosen": {"every_shipped", "select", "shipped_like"},
+    "crosscheck.suite.run": {"every_shipped", "select", "shipped_like"},
     # words
     "seecr.counted": {"counted"},
     "seecr.units": {"millimetres"},

@@ -108,7 +108,7 @@ def command(
     (and nothing exceeded a threshold).
     """
     from crosscheck import load_thresholds, user_cases
-    from crosscheck.suite.chosen import every_shipped, select, shipped_like
+    from crosscheck.suite.run import every_shipped, select, shipped_like
 
     if mujoco_robot is not None and robot is None:
         raise click.UsageError("--mujoco-robot needs --robot: the MJCF that SEECR reads")
@@ -143,7 +143,7 @@ def _run(
     as_json: bool,
 ) -> int:
     from crosscheck import write_run
-    from crosscheck.suite.worst_pose import FILE_NAME
+    from crosscheck.suite.write import FILE_NAME
     from seecr.files import staged
 
     # effects alone have no worst pose

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.suite.gap import gap
-from crosscheck.suite.outcome import Outcome
+from crosscheck.suite.agreement import gap
+from crosscheck.suite.verdicts import Outcome
 from crosscheck.twin.hidden import CONTAINED, choose
 from crosscheck.twin.lab import trajectory
 from crosscheck.twin.measure import measure

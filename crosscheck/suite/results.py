@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from crosscheck.suite.agreement import QUANTITIES, Allowance, Differences, ratios
 from crosscheck.suite.cases import Case
 from crosscheck.suite.mujoco_robot import MujocoRobot
-from crosscheck.suite.outcome import Outcome
-from crosscheck.suite.verdicts import UNSOLVED, PoseFinding, Verdict
+from crosscheck.suite.verdicts import UNSOLVED, Outcome, PoseFinding, Verdict
 from seecr.counted import counted
 from seecr.description.robot import Robot
 from seecr.pose import Array

@@ -10,24 +10,26 @@ from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
+from crosscheck.given import GivenRobot
 from crosscheck.settle.physics import ignored_note
-from crosscheck.suite.agreement import allowances, differences_of
-from crosscheck.suite.cases import Case
-from crosscheck.suite.chosen import GivenCase, chosen_cases
+from crosscheck.suite.agreement import Thresholds, allowances, differences_of, load_thresholds
+from crosscheck.suite.cases import Case, select, shipped_cases, user_cases
 from crosscheck.suite.effects import (
+    GROUP,
+    PREFIX,
     EffectCase,
     EffectResult,
     effect_failures,
     effects_line,
     run_effects,
+    shipped_effect_cases,
 )
 from crosscheck.suite.mujoco_robot import MujocoRobot
-from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.results import (
     CaseResult,
     Worst,
@@ -36,18 +38,85 @@ from crosscheck.suite.results import (
     worst_of,
     worst_sentence,
 )
-from crosscheck.suite.thresholds import Thresholds, load_thresholds
-from crosscheck.suite.verdicts import FINDINGS, Answers, Verdict, held_to, judge_poses
+from crosscheck.suite.verdicts import FINDINGS, Answers, Outcome, Verdict, held_to, judge_poses
 from seecr.arguments import whole
 from seecr.counted import counted, some
-from seecr.description.mjcf import load_robot
+from seecr.description.mjcf import load_robot, model_names
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve as seecr_solve
-from seecr.errors import InputFileError
+from seecr.errors import InputError, InputFileError
 from seecr.files import json_text
 from seecr.parallel import processes, run_tasks
 from seecr.result import Record, Result
 from seecr.statics.solution import Solution
+
+# Cases as callers give them: cases, names of shipped ones, robots.
+
+GivenCase: TypeAlias = Case | EffectCase | GivenRobot
+"""A case, the name of shipped ones or a pattern such as "cogiro-*", a robot or its MJCF."""
+
+
+def chosen_cases(
+    given: GivenCase | Iterable[GivenCase] | None, seed: int
+) -> list[Case | EffectCase]:
+    """The chosen cases. A robot stands for a sweep and random poses; None for all shipped cases.
+
+    Raises:
+        CrosscheckError: a name or pattern that no shipped case has; the message names the nearest.
+        InputError: no case, one without poses, or something else.
+    """
+    shipped = every_shipped(seed)
+    if given is None:
+        return shipped
+    every = [given] if isinstance(given, GivenCase) else given
+    if not isinstance(every, Iterable):
+        raise _no_case(given)
+    found: list[Case | EffectCase] = []
+    for one in every:
+        found += [case for case in _cases_of(one, shipped, seed) if case not in found]
+    if not found:
+        raise InputError("expected at least one case to run, got none; without any all are run")
+    empty = [case.name for case in found if len(case) == 0]
+    if empty:
+        raise InputError(f"case {empty[0]} has no poses; expected at least one")
+    return found
+
+
+def every_shipped(seed: int) -> list[Case | EffectCase]:
+    """All shipped cases, and after them the effects."""
+    return [*shipped_cases(seed), *shipped_effect_cases(seed)]
+
+
+def shipped_like(
+    every: Sequence[Case | EffectCase], patterns: Sequence[str], option: str = ""
+) -> list[Case | EffectCase]:
+    """Those that match any of the patterns; the group's name stands for all its effects."""
+    return select(every, [f"{PREFIX}*" if name == GROUP else name for name in patterns], option)
+
+
+def _cases_of(
+    given: GivenCase, shipped: Sequence[Case | EffectCase], seed: int
+) -> Sequence[Case | EffectCase]:
+    if isinstance(given, Case | EffectCase):
+        return [given]
+    if isinstance(given, str) and not _is_robot(given):
+        return shipped_like(shipped, [given])
+    if isinstance(given, GivenRobot):
+        return user_cases(given, seed=seed)
+    raise _no_case(given)
+
+
+def _no_case(got: object) -> InputError:
+    return InputError(
+        "expected cases, names of shipped ones, robots or their MJCF, got " + type(got).__name__
+    )
+
+
+def _is_robot(name: str) -> bool:
+    """Whether a word is a robot's file or the name of a shipped one, and not of a case."""
+    path = Path(name)
+    return name in model_names() or path.suffix.lower() == ".xml" or path.is_file()
+
 
 FORMAT = 1
 """Version of ``results.json``; raised when a key changes its meaning or is removed."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import TYPE_CHECKING, NamedTuple
@@ -11,18 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.settle.settler import SettleStatus
-from crosscheck.suite.agreement import Allowance, Differences, within
-from crosscheck.suite.gap import gap
+from crosscheck.suite.agreement import Allowance, Differences, gap, within
 from seecr.equilibrium.solving import solve as seecr_solve
 from seecr.pose import Array
 from seecr.statics.solution import Status
 
 if TYPE_CHECKING:
     from crosscheck.settle.settler import SettlingBatch
+    from crosscheck.suite.agreement import FindingLimits
     from crosscheck.suite.cases import Case
     from crosscheck.suite.mujoco_robot import MujocoRobot
-    from crosscheck.suite.thresholds import FindingLimits
     from seecr.statics.solution import Solution
+
 
 # Residual force, relative to the load, below which a platform counts as free to move: as much as an
 # answer itself may have.
@@ -245,3 +245,25 @@ def held_to(
     elif len(free) > limits.free_elsewhere * len(case.poses):
         beyond += free
     return tuple(replace(one, beyond_limits=one in beyond) for one in findings)
+
+
+# How a case, an effect or a whole run ended.
+
+
+class Outcome(Enum):
+    """How a case or a run ended; the value is the word that people read."""
+
+    AGREE = "agree"
+    DIFFER = "DIFFER"
+    NOT_CONVERGED = "NOT CONVERGED"
+
+    @property
+    def exit_status(self) -> int:
+        """0 agree (findings within limits), 1 differ by too much, 3 a solve did not converge."""
+        return {Outcome.AGREE: 0, Outcome.DIFFER: 1, Outcome.NOT_CONVERGED: 3}[self]
+
+    @classmethod
+    def of_all(cls, outcomes: Iterable[Outcome]) -> Outcome:
+        """A difference outweighs a solve that did not converge; of none, nothing converged."""
+        found = set(outcomes) or {cls.NOT_CONVERGED}
+        return next((one for one in (cls.DIFFER, cls.NOT_CONVERGED) if one in found), cls.AGREE)

@@ -10,7 +10,6 @@ from rich.table import Table
 from rich.text import Text
 
 from crosscheck.suite.effects import effect_failures, effects_line
-from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.results import (
     QUANTITY_HEADS,
     TABLE_HEADS,
@@ -19,7 +18,7 @@ from crosscheck.suite.results import (
     widened_lines,
 )
 from crosscheck.suite.run import threshold_cells, verdict_line
-from crosscheck.suite.verdicts import FINDINGS, Verdict
+from crosscheck.suite.verdicts import FINDINGS, Outcome, Verdict
 from crosscheck.terminal.lines import console_for, say
 from seecr.counted import counted
 

@@ -17,11 +17,10 @@ from crosscheck.recording.case import write_case_recording
 from crosscheck.recording.panels import NOW, READ_ME
 from crosscheck.recording.series import Series
 from crosscheck.settle.settler import SettleStatus, SettlingBatch
-from crosscheck.suite.cases import Case, user_cases
-from crosscheck.suite.poses import demobot_sweep
+from crosscheck.suite.agreement import load_thresholds
+from crosscheck.suite.cases import Case, demobot_sweep, user_cases
 from crosscheck.suite.results import CaseResult
 from crosscheck.suite.run import Run, results_json, run_case
-from crosscheck.suite.thresholds import load_thresholds
 from crosscheck.suite.verdicts import Verdict
 from seecr.description.mjcf import load_robot, model_path
 from seecr.errors import InputFileError

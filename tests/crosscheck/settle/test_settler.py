@@ -18,7 +18,7 @@ from crosscheck.settle import newton, settler
 from crosscheck.settle import settler as settle
 from crosscheck.settle.physics import Physics
 from crosscheck.settle.settler import Settler, SettleStatus, settle_batch
-from crosscheck.suite.worst_pose import write_worst_pose_mjcf
+from crosscheck.suite.write import write_worst_pose_mjcf
 from seecr.description.mjcf import load_robot
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputFileError

@@ -10,10 +10,10 @@ import pytest
 
 import crosscheck
 import seecr
+from crosscheck.suite.agreement import load_thresholds
 from crosscheck.suite.cases import Case
-from crosscheck.suite.chosen import chosen_cases
-from crosscheck.suite.outcome import Outcome
-from crosscheck.suite.thresholds import load_thresholds
+from crosscheck.suite.run import chosen_cases
+from crosscheck.suite.verdicts import Outcome
 
 PLANAR = seecr.model_path("planar_vertical")
 

@@ -20,7 +20,7 @@ from crosscheck.suite.effects import (
     effects_line,
     shipped_effect_cases,
 )
-from crosscheck.suite.outcome import Outcome
+from crosscheck.suite.verdicts import Outcome
 from crosscheck.twin.hidden import CONTAINED
 from crosscheck.twin.robot import TRUE_EFFECTS
 from seecr.description.mjcf import model_path

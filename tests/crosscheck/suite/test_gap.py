@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from crosscheck.suite.gap import gap
+from crosscheck.suite.agreement import gap
 from seecr.pose import pose_difference, quat_from_rotvec, quat_multiply
 
 AXIS = np.array([0.48, -0.6, 0.64])

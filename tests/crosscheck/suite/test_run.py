@@ -16,19 +16,21 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.settle.settler import Settling, SettlingBatch
 from crosscheck.suite import agreement, verdicts
 from crosscheck.suite import run as suite
+from crosscheck.suite.agreement import SHIPPED, FindingLimits, load_thresholds, thresholds_toml
 from crosscheck.suite.cases import (
     Case,
+    demobot_random,
+    demobot_sweep,
+    robot_random,
+    robot_sweep,
     select,
     shipped_cases,
     user_cases,
 )
 from crosscheck.suite.mujoco_robot import MujocoRobot, screw_motion
-from crosscheck.suite.outcome import Outcome
-from crosscheck.suite.poses import demobot_random, demobot_sweep, robot_random, robot_sweep
 from crosscheck.suite.results import CaseResult, failure_lines, finding_lines, remarks, worst_of
 from crosscheck.suite.run import run_case, run_suite
-from crosscheck.suite.thresholds import SHIPPED, FindingLimits, load_thresholds, thresholds_toml
-from crosscheck.suite.verdicts import Verdict
+from crosscheck.suite.verdicts import Outcome, Verdict
 from seecr.description.mjcf import CABLES, model_path
 from seecr.errors import InputFileError
 from seecr.files import plain

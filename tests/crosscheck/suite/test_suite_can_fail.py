@@ -20,13 +20,13 @@ from crosscheck.settle.settler import Settling
 from crosscheck.suite import effects as effects_suite
 from crosscheck.suite import run as suite
 from crosscheck.suite import verdicts
+from crosscheck.suite.agreement import load_thresholds
 from crosscheck.suite.cases import Case, shipped_cases
 from crosscheck.suite.effects import EffectCase, run_effect
-from crosscheck.suite.junit import junit_xml
 from crosscheck.suite.mujoco_robot import MujocoRobot
-from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.run import Run, run_suite, verdict_line
-from crosscheck.suite.thresholds import load_thresholds
+from crosscheck.suite.verdicts import Outcome
+from crosscheck.suite.write import junit_xml
 from seecr.compiled import columns
 from seecr.description.mjcf import model_path
 from seecr.effects import catalogue

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from crosscheck.settle.settler import Settler
-from crosscheck.suite.poses import demobot_sweep
+from crosscheck.suite.cases import demobot_sweep
 from crosscheck.twin.measure import measure
 from seecr.commands import Commands
 from seecr.description.mjcf import CABLES, load_robot, model_path
