@@ -130,7 +130,8 @@ TRADE = {
     "seecr.pose": {"NORM_TOLERANCE"},
     "seecr.statics.starts": {"commanded_poses"},
     "seecr.workspace.maps": {"evenly"},
-    "crosscheck.suite.run": {"every_shipped", "select", "shipped_like"},
+    "crosscheck.suite.cases": {"select"},
+    "crosscheck.suite.run": {"every_shipped", "shipped_like"},
     # words
     "seecr.counted": {"counted"},
     "seecr.units": {"millimetres"},

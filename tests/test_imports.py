@@ -1,7 +1,7 @@
 """Imports point one way, and heavy ones wait until they are needed.
 
-The floors of both packages are one dict: what stands on a floor may import what stands on lower
-ones, and only within its own folder on its own floor. The same holds within a folder that has
+The floors of both packages are one table, read from the lowest floor up and from left to right: a
+room, a folder or file, may import what stands before it. The same holds within a folder that has
 folders of its own. Imports inside functions count; those for types alone do not.
 """
 
@@ -16,42 +16,37 @@ from pathlib import Path
 import pytest
 from sources import ROOT, imports, imports_of, modules, name_of, tree_of
 
-# A folder or file on its floor. crosscheck stands on seecr: a lower floor of the two is seecr's.
-FLOORS = {
-    "seecr.errors": 0, "seecr.compiled": 0, "seecr.parallel": 0, "seecr.lazy": 0,
-    "seecr.counted": 0,
-    "seecr.files": 1, "seecr.files": 1, "seecr.pose": 1,
-    "seecr.curves": 2, "seecr.units": 2, "seecr.arguments": 2, "seecr.result": 2,
-    "seecr.pose": 2,
-    "seecr.workspace.planar": 3, "seecr.description": 3,
-    "seecr.commands": 4,
-    "seecr.columns": 5, "seecr.effects": 5,
-    "seecr.statics": 6,
-    "seecr.prediction": 7, "seecr.holding": 7,
-    "seecr.equilibrium": 8, "seecr.inverse": 8,
-    "seecr.workspace": 9, "seecr.exported": 9,
-    "seecr.recording": 10, "seecr.report": 10,
-    "seecr.cli": 11,
-    "crosscheck.errors": 20,
-    "crosscheck.given": 21,
-    "crosscheck.settle": 22, "crosscheck.measurements": 22, "crosscheck.model": 22,
-    "crosscheck.twin": 23, "crosscheck.fit": 23,
-    "crosscheck.inference": 24, "crosscheck.suite": 24, "crosscheck.importing": 24,
-    "crosscheck.preparation": 25,
-    "crosscheck.comparison": 26, "crosscheck.planning": 26,
-    "crosscheck.calibration": 27, "crosscheck.add": 27,
-    "crosscheck.diagnosis": 28,
-    "crosscheck.terminal": 29, "crosscheck.report": 29, "crosscheck.recording": 29,
-    "crosscheck.cli": 30,
-}  # fmt: skip
+# The rooms, folders or files, floor by floor from the lowest up.
+TABLE = (
+    "seecr: errors lazy counted parallel compiled",
+    "seecr: files pose arguments curves result units",
+    "seecr: description commands columns",
+    "seecr: effects statics prediction",
+    "seecr: holding equilibrium inverse workspace exported",
+    "seecr: recording report cli",
+    "crosscheck: errors given",
+    "crosscheck: settle model measurements twin",
+    "crosscheck: fit suite importing inference preparation",
+    "crosscheck: comparison planning",
+    "crosscheck: calibration add diagnosis",
+    "crosscheck: terminal report recording cli",
+)
+# The rooms of a folder that has folders of its own.
+INNER_TABLE = ("crosscheck.fit: reasons least_squares words noise effects",)
 
-# One of these folders has folders of its own, which stand on floors in the same way.
-INNER_FLOORS = {
-    "crosscheck.fit.reasons": 0, "crosscheck.fit.least_squares": 0,
-    "crosscheck.fit.words": 1,
-    "crosscheck.fit.noise": 2,
-    "crosscheck.fit.effects": 3,
-}  # fmt: skip
+
+def rooms_of(floor: str) -> list[str]:
+    package, _, names = floor.partition(": ")
+    return [f"{package}.{name}" for name in names.split()]
+
+
+def order_of(table: Iterable[str]) -> dict[str, int]:
+    """Rooms, each with its number in reading order."""
+    return {room: k for k, room in enumerate(room for line in table for room in rooms_of(line))}
+
+
+FLOORS = {room: floor for floor, line in enumerate(TABLE) for room in rooms_of(line)}
+ORDER, INNER_ORDER = order_of(TABLE), order_of(INNER_TABLE)
 
 # Packages, whose faces stand on all floors: through them anything could import anything.
 FACES = ("seecr", "crosscheck")
@@ -74,14 +69,14 @@ def place(module: str, depth: int = 2) -> str:
 
 
 def upward(
-    name: str, targets: Iterable[str], floors: Mapping[str, int] = FLOORS, depth: int = 2
+    name: str, targets: Iterable[str], order: Mapping[str, int] = ORDER, depth: int = 2
 ) -> set[tuple[str, str]]:
-    """Imports of a module that do not point down."""
+    """Imports of a module that do not point to rooms before its own."""
     own = place(name, depth)
     some = {place(target, depth) for target in targets} - {own}
-    if own not in floors:
+    if own not in order:
         return set()
-    return {(own, other) for other in some if floors.get(other, -1) >= floors[own]}
+    return {(own, other) for other in some if order.get(other, -1) >= order[own]}
 
 
 def through_faces(tree: ast.Module) -> set[str]:
@@ -129,15 +124,15 @@ def test_an_upward_import_is_seen_also_a_lazy_one() -> None:
 
 
 def test_every_inner_folder_and_file_has_its_floor() -> None:
-    folders = {place(inner).replace(".", "/") for inner in INNER_FLOORS}
+    folders = {place(inner).replace(".", "/") for inner in INNER_ORDER}
     names = {name_of(path) for folder in folders for path in modules(folder)}
-    assert {place(name, 3) for name in names} - {""} == set(INNER_FLOORS)
+    assert {place(name, 3) for name in names} - {""} == set(INNER_ORDER)
 
 
 def test_no_import_points_upwards_within_a_folder() -> None:
-    folders = {place(inner).replace(".", "/") for inner in INNER_FLOORS}
+    folders = {place(inner).replace(".", "/") for inner in INNER_ORDER}
     files = [path for folder in folders for path in modules(folder)]
-    wrong = [upward(name_of(path), imports(path), INNER_FLOORS, 3) for path in files]
+    wrong = [upward(name_of(path), imports(path), INNER_ORDER, 3) for path in files]
     assert set().union(*wrong) == set()
 
 
@@ -145,9 +140,9 @@ def test_an_upward_import_within_a_folder_is_seen() -> None:
     lazy = "def late():\n    from crosscheck.fit.effects.nothing import is_nothing\n"
     taken = imports_of(ast.parse(lazy))
     seen = {("crosscheck.fit.noise", "crosscheck.fit.effects")}
-    assert upward("crosscheck.fit.noise.smooth", taken, INNER_FLOORS, 3) == seen
-    assert upward("crosscheck.fit.effects.possible", taken, INNER_FLOORS, 3) == set()
-    assert upward("crosscheck.preparation.freed", taken, INNER_FLOORS, 3) == set()
+    assert upward("crosscheck.fit.noise.smooth", taken, INNER_ORDER, 3) == seen
+    assert upward("crosscheck.fit.effects.possible", taken, INNER_ORDER, 3) == set()
+    assert upward("crosscheck.preparation.freed", taken, INNER_ORDER, 3) == set()
 
 
 def test_only_commands_use_the_faces() -> None:
@@ -237,12 +232,12 @@ DESCRIPTION = {
 
 
 # Beside it: what winches are told, how things are counted, that numbers are numbers, and files.
-BESIDE = {
-    "seecr.commands", "seecr.counted", "seecr.arguments",
-    "seecr.files",
+BESIDE = {"seecr.commands", "seecr.counted", "seecr.arguments", "seecr.files"}
+# What the effects edit, and the path through commands, are SEECR's side of them.
+PHYSICS = {
+    "seecr.effects.setup", "seecr.effects.edits",
+    "seecr.commands.Path", "seecr.commands.waypoints_of", "seecr.commands.turning",
 }  # fmt: skip
-# What the effects edit is SEECR's side of them.
-PHYSICS = {"seecr.effects.setup", "seecr.effects.edits"}
 # A trajectory is poses that the robot's joints can reach: what is commanded, no physics.
 OF_ITS_OWN = {"crosscheck.twin.lab": {"seecr.description.joints"}}
 
@@ -278,6 +273,11 @@ def test_mujocos_side_takes_the_description_of_seecr_alone(folder: str) -> None:
             "seecr.equilibrium.solving seecr.equilibrium.solving.solve",
         ),
         ("crosscheck.twin.lab", "from seecr.description.joints import motion_columns", ""),
+        (
+            "crosscheck.twin.measure",
+            "from seecr.commands import Commands, waypoints_of",
+            "seecr.commands.waypoints_of",
+        ),
         (
             "crosscheck.twin.robot",
             "from seecr.effects import Term\nfrom seecr.effects.setup import Setup",
@@ -320,7 +320,7 @@ def test_a_package_runs_as_its_command(package: str) -> None:
 
 def test_what_is_compiled_takes_arrays_alone() -> None:
     # what tells a user that compiling takes long is beside what is compiled
-    files = [path for path in modules("seecr/compiled") if path.stem != "telling"]
+    files = [path for path in modules("seecr/compiled") if path.stem != "compile_notice"]
     taken = {t for path in files for t in imports(path)}
     assert {t.split(".")[0] for t in taken} == {"__future__", "math", "numba", "numpy", "seecr"}
     assert {place(t) for t in taken if t.startswith("seecr")} == {"seecr.compiled"}

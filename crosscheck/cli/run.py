@@ -108,7 +108,8 @@ def command(
     (and nothing exceeded a threshold).
     """
     from crosscheck import load_thresholds, user_cases
-    from crosscheck.suite.run import every_shipped, select, shipped_like
+    from crosscheck.suite.cases import select
+    from crosscheck.suite.run import every_shipped, shipped_like
 
     if mujoco_robot is not None and robot is None:
         raise click.UsageError("--mujoco-robot needs --robot: the MJCF that SEECR reads")

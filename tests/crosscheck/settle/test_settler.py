@@ -14,7 +14,7 @@ from rejointed import WAYS, rejointed
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.recording.material import record_motion
-from crosscheck.settle import newton, settler
+from crosscheck.settle import newton
 from crosscheck.settle import settler as settle
 from crosscheck.settle.physics import Physics
 from crosscheck.settle.settler import Settler, SettleStatus, settle_batch
@@ -337,7 +337,7 @@ def test_status_fell():
 
 def test_status_diverged_leaves_no_log_behind(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(settler, "time_step", lambda physics: 1e9)
+    monkeypatch.setattr(settle, "time_step", lambda physics: 1e9)
     pose = poses_at(HOME)
     result = settler(COGIRO).settle(pose[0], nominal(COGIRO, pose)[0])
     assert result.status is SettleStatus.DIVERGED
@@ -351,8 +351,8 @@ def test_a_time_step_that_diverges_is_shortened(tmp_path, monkeypatch):
     pose = poses_at([0.3, 0.2, 0.12])
     one, rest = settler(COGIRO), nominal(COGIRO, pose)[0]
     plain = one.settle(pose[0], rest)
-    monkeypatch.setattr(settler, "time_step", lambda physics: 1e9)
-    monkeypatch.setattr(settler, "_SHORTER", 1e12)
+    monkeypatch.setattr(settle, "time_step", lambda physics: 1e9)
+    monkeypatch.setattr(settle, "_SHORTER", 1e12)
     again = one.settle(pose[0], rest)
     assert again.settled
     assert again.pose == pytest.approx(plain.pose, abs=1e-11)
