@@ -237,7 +237,7 @@ def _band_of_both(low: Array, high: Array, least: Array, most: Array) -> tuple[A
 # A run starts at the robot's reference pose (or at its first row, if the commands say so) and goes
 # straight to its first row and from row to row, in the platform's degrees of freedom. Loads change
 # at the row before, ahead of the motion. Effects with history depend on this path (see
-# seecr.compiled.history and seecr.commands.play).
+# seecr.compiled.history and `play`).
 
 # Largest motion of the command from waypoint to waypoint [robot's length], and the fewest and most
 # waypoints on the way to a row. Where a cable's tension turns between two waypoints, hysteresis and

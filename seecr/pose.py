@@ -181,9 +181,9 @@ def transform_points(poses: Array, points: Array) -> Array:
     return poses[..., None, :3] + turned
 
 
-# The functions of seecr.pose that fits call most, compiled, for rows (n, k).
+# What fits call most of these, compiled, for rows (n, k).
 #
-# They agree with those of that module to the last digits. Either argument may be one row for all;
+# They agree with the functions above to the last digits. Either argument may be one row for all;
 # rows of rows (..., k) are as good, if both have them.
 
 

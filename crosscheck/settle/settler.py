@@ -1,6 +1,6 @@
 """A cable robot brought to rest by MuJoCo: an answer that shares nothing with seecr's statics.
 
-In stage 1 (:mod:`crosscheck.settle.settler`) the platform moves from the commanded pose by its own
+In stage 1 (dynamic relaxation) the platform moves from the commanded pose by its own
 dynamics until it rests, which shows that the equilibrium is stable and reached from there. Stage 2
 (:mod:`crosscheck.settle.newton`) adds digits without leaving that equilibrium. Both are reported.
 """

@@ -312,7 +312,7 @@ def _cell_fault(cell: str, blank_is_nan: bool) -> str | None:
     )
 
 
-# The text of a CSV, as seecr.columns.csv reads it: every file of rows is written here.
+# The text of a CSV, as it is read above: every file of rows is written here.
 
 
 def table_text(columns: Mapping[str, Sequence[Any] | Array], digits: int | None = None) -> str:

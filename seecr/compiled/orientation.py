@@ -201,8 +201,8 @@ def straight_balance_batch(
 # With fewer cables than degrees of freedom, W(R) tau = -w is solved for the orientation R and the
 # tensions together (Carricato and Merlet 2013), by the method of Levenberg and Marquardt with
 # limits on the tensions: it also goes on where the linearised equations have no solution within
-# the limits. The balance is that of straight cables, seecr.compiled.orientation; a cable law is
-# needed only for the stability. Derivatives are exact for free platforms, else by finite
+# the limits. The balance is that of straight cables, as above; a cable law is needed only for the
+# stability. Derivatives are exact for free platforms, else by finite
 # differences along the few rotations, in each of which the joints keep the platform's origin.
 
 # Most steps, the residual that ends them, and the one that suffices if it gets no smaller [load].

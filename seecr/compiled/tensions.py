@@ -326,7 +326,7 @@ def least_beyond(matrix, load, low, high, tension):
 # half-plane of nu. The point of all half-planes nearest to the origin is sought by adding them one
 # by one: if the nearest so far is beyond a new one, the next is on that one's border, or there is
 # none (Seidel, Discrete and Computational Geometry 6, 1991, whose argument holds for any strictly
-# convex aim). Unlike seecr.compiled.tensions, it does not say by how much.
+# convex aim). Unlike the margin, it does not say by how much.
 
 MOST = 2
 """Most cables beyond the degrees of freedom."""

@@ -1,9 +1,9 @@
 """Barriers: the height of the lowest pass between two equilibria of one command.
 
-The path of least energy is that of :mod:`seecr.equilibrium.saddles`. Its highest point is made
-exact by following the one falling direction (Cerjan and Miller, J. Chem. Phys. 75, 1981). That may
-lead to the saddle between two other equilibria, so what it leads to is checked: it must be the
-highest point of a path from one to the other.
+The path of least energy is found by the string method (below). Its highest point is made exact by
+following the one falling direction (Cerjan and Miller, J. Chem. Phys. 75, 1981). That may lead to
+the saddle between two other equilibria, so what it leads to is checked: it must be the highest
+point of a path from one to the other.
 """
 
 from __future__ import annotations

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import optimize
 
 from seecr.arguments import whole
 from seecr.commands import Commands
@@ -125,6 +124,8 @@ def solve_with_scipy(
 
 
 def _search(method: str, residual, x0: Array, limit: int) -> tuple[bool, Array]:  # type: ignore[no-untyped-def]
+    from scipy import optimize  # takes a while to import
+
     with warnings.catch_warnings():
         # MINPACK warns about slow progress; its flag says the same, and that is what we report
         warnings.simplefilter("ignore", RuntimeWarning)
