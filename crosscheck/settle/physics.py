@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
-from seecr.description.mjcf import hindrances, not_mjcf, quiet_mujoco
+from seecr.description.mjcf import not_mjcf, quiet_mujoco, unsupported_features
 from seecr.errors import InputFileError
 from seecr.pose import Array, pose_difference
 
@@ -94,7 +94,7 @@ def check_cables(model: mujoco.MjModel, body: int, where: str) -> None:
 def ignored_in(model: mujoco.MjModel, platform: int) -> tuple[str, ...]:
     """Names of features present that would hide, shift or delay the equilibrium."""
     damped = model.dof_damping.any() or model.tendon_damping.any()
-    return (*hindrances(model, platform), *(("damping",) if damped else ()))
+    return (*unsupported_features(model, platform), *(("damping",) if damped else ()))
 
 
 def switch_off(model: mujoco.MjModel) -> None:

@@ -33,7 +33,7 @@ _CONSTRAINT, _FRICTIONLOSS, _LIMIT, _CONTACT = 1, 4, 8, 16
 _UPPER = 16
 
 
-def hindrances(model: mujoco.MjModel, platform: int) -> tuple[str, ...]:
+def unsupported_features(model: mujoco.MjModel, platform: int) -> tuple[str, ...]:
     """Names of what may hold or stop the platform beside its cables, such as "contacts".
 
     Args:
@@ -243,7 +243,7 @@ def _read(path: Path) -> Robot:
         joints=joints,
         cable_names=tuple(names),
         source=path,
-        left_out=hindrances(model, body),
+        left_out=unsupported_features(model, body),
         floor=_floor(model, reference_pose[2]),
     )
     _check_sizes(robot, _body_name(model, body), path)

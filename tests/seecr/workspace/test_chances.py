@@ -100,11 +100,11 @@ def test_full_searches_are_made_where_there_is_hope(monkeypatch: pytest.MonkeyPa
     """Two cables: one position is found by itself, one by full searches alone, one by none."""
     asked: list[tuple[int, bool]] = []
 
-    def margins(_robot: Robot, at: Array, *_rest: Any, thorough: bool = True) -> Array:
+    def margins_at(_robot: Robot, at: Array, *_rest: Any, thorough: bool = True) -> Array:
         asked.append((len(at), thorough))
         return np.where(at[:, 0] < (1.5 if thorough else 0.5), 1.0, -np.inf)
 
-    monkeypatch.setattr(margins, "margins_at", margins)
+    monkeypatch.setattr(margins, "margins_at", margins_at)
     robot: Any = SimpleNamespace(n_cables=2, n_dof=3)
     places = np.zeros((3, 7))
     places[:, 0] = [0.0, 1.0, 2.0]

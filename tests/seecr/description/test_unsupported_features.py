@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from seecr.cli import main
 from seecr.description import mjcf as module
-from seecr.description.mjcf import hindrances, load_robot, model_names, model_path
+from seecr.description.mjcf import load_robot, model_names, model_path, unsupported_features
 
 PLANAR = model_path("planar_vertical").read_text(encoding="utf-8")
 SLIDE = '<joint name="x" type="slide"'
@@ -35,7 +35,7 @@ def planar(*changes: tuple[str, str]) -> str:
 
 def found(text: str, body: str = "platform") -> tuple[str, ...]:
     model = mujoco.MjModel.from_xml_string(text)
-    return hindrances(model, model.body(body).id)
+    return unsupported_features(model, model.body(body).id)
 
 
 @pytest.mark.parametrize(

@@ -51,7 +51,7 @@ def test_numba_tells_of_what_it_compiles_and_not_of_what_it_has(
     seen: list[str] = []
     monkeypatch.setattr(compile_notice, "begins", lambda: seen.append("begins"))
     monkeypatch.setattr(compile_notice, "ends", lambda: seen.append("ends"))
-    assert jit.telling is compile_notice
+    assert jit.compile_notice is compile_notice
 
     @numba.njit  # type: ignore[misc]
     def twice(x: float) -> float:
@@ -66,18 +66,18 @@ def test_numba_tells_of_what_it_compiles_and_not_of_what_it_has(
 def test_a_program_tells_it_on_standard_error_and_python_is_left_in_peace() -> None:
     code = """
 import sys, time
-from seecr.compiled import telling
+from seecr.compiled import compile_notice
 from seecr.cli import main
 from click.testing import CliRunner
 CliRunner().invoke(main, ["--help"])
-assert telling._watch is None
+assert compile_notice._watch is None
 sys.argv = ["seecr", "--version"]
 try:
     main()
 except SystemExit:
     pass
-telling._watch._patience = 0.0
-telling.begins()
+compile_notice._watch._patience = 0.0
+compile_notice.begins()
 time.sleep(0.5)
 """
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
