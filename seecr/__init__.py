@@ -96,13 +96,17 @@ _MODULES = {
     "description.mjcf": ("load_robot", "model_names", "model_path",),
     "prediction.model": ("Model", "load_model", "new_model"),
     "equilibrium.search": ("equilibria",),
-    "workspace.planar": ("BarRest", "bar_equilibria", "bar_tilt", "midline_point", "solution_manifold"),
+    "workspace.planar": (
+        "BarRest", "bar_equilibria", "bar_tilt", "midline_point", "solution_manifold",
+    ),
     "description.robot": ("Joint", "Robot"),
     "prediction.sensitivity": ("sensitivities",),
     "effects.setup": ("Setup",),
     "statics.solution": ("Jump", "Solution", "Status"),
     "prediction.uncertainty": ("Spread", "spread_of"),
-    "workspace.bars": ("BarBalance", "BarManifold", "bar_balances", "bar_manifold", "Midlines", "midline_points"),
+    "workspace.bars": (
+        "BarBalance", "BarManifold", "Midlines", "bar_balances", "bar_manifold", "midline_points",
+    ),
     "workspace.spans": ("SlackSpan", "slack_spans"),
     "workspace.zones": ("Zone", "feasible", "slack_zones", "tension_margin"),
 }  # fmt: skip

@@ -21,9 +21,9 @@ file or run, and may be left out.
 
 ``stderr = "unseen"`` marks a parameter that the data do not determine. A model may be written by
 hand: effect names, parameters and values suffice. Knowledge from outside the data is stated with
-the parameter (:mod:`seecr.prediction.effect_tables`): ``fixed = true`` holds its value in every fit,
-``known = { value = 0.03, stderr = 0.0005 }`` counts as a reading in every fit. A key without the
-component's number or axis (``shift_m``, ``gain``) applies to all components.
+the parameter (:mod:`seecr.prediction.effect_tables`): ``fixed = true`` holds its value in every
+fit, ``known = { value = 0.03, stderr = 0.0005 }`` counts as a reading in every fit. A key without
+the component's number or axis (``shift_m``, ``gain``) applies to all components.
 """
 
 from __future__ import annotations
