@@ -25,7 +25,8 @@ from seecr.commands import Commands
 from seecr.effects import Effect, Layout, catalogue, layout_of
 from seecr.pose import Array, pose_difference
 from seecr.prediction.experiment import Experiment, read
-from seecr.report.drawing import COLOURS, figure
+from seecr.show.colours import COLOURS
+from seecr.show.figures import figure
 
 MEASURED, ABOUT = np.array([20.0, -15.0]), np.array([2.0, 3.0])
 """Tilt at the ends [deg] and deviation along z [mm], and what "about" is taken to mean."""

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from crosscheck.terminal.effects import EACH
+from crosscheck.show.effects import EACH
 from seecr.effects import BUILT_IN, PLACES, Effect
 from seecr.effects.setup import QUANTITIES, History
 

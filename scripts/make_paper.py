@@ -23,7 +23,8 @@ from seecr.description.mjcf import CABLES, load_robot, model_path
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve
 from seecr.pose import Array, transform_points
-from seecr.report.drawing import COLOURS, figure
+from seecr.show.colours import COLOURS
+from seecr.show.figures import figure
 from seecr.statics.solution import Solution
 from seecr.workspace.planar import bar_equilibria, bar_tilt, midline_point, solution_manifold
 from seecr.workspace.zones import slack_zones, tension_margin

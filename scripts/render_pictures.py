@@ -30,15 +30,16 @@ from rerun.experimental import ViewerClient
 
 from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.recording import write_case_recording, write_diagnosis_recording
-from crosscheck.report import write_page
+from crosscheck.show.case_recording import write_case_recording
+from crosscheck.show.error_recordings import write_diagnosis_recording
+from crosscheck.show.page import write_page
 from crosscheck.suite.agreement import load_thresholds
 from crosscheck.suite.cases import Case, select, shipped_cases
 from crosscheck.suite.run import run_case
 from crosscheck.twin.make import make_twin
 from seecr.description.mjcf import load_robot, model_path
 from seecr.equilibrium.solving import solve
-from seecr.report.map_slices import map_figure
+from seecr.show.map_figure import map_figure
 from seecr.workspace.grid import Workspace
 from seecr.workspace.maps import workspace_map
 

@@ -17,8 +17,8 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 
 SOLVE = """
 import seecr
-from crosscheck.report.glossary import entries
 from seecr.description.mjcf import model_path
+from crosscheck.show.glossary import entries
 
 robot = seecr.load_robot(model_path("demobot_cogiro"))
 solution = seecr.solve(robot, [[0.4, 0.25, 0.1, 1, 0, 0, 0]])

@@ -104,7 +104,7 @@ def command(
     if as_json:
         click.echo(text)
     else:
-        from crosscheck.terminal import print_addition
+        from crosscheck.show.fits import print_addition
 
         print_addition(found, model, written)
         given = Given.with_data(measured, robot, data, model, sigmas)

@@ -63,7 +63,7 @@ def command(
     """
     from crosscheck import Sigma, calibrate, load_measurements
     from crosscheck.model.write import check_place
-    from crosscheck.terminal import print_calibration
+    from crosscheck.show.fits import print_calibration
     from seecr import load_robot
 
     check_effects(only, exclude)  # a wrong name is told before any file is read

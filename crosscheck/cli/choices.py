@@ -93,7 +93,7 @@ def figures_in(folder: Path | None) -> Iterator[None]:
     if folder is None:
         yield
         return
-    from crosscheck.report import keeping
+    from crosscheck.show.figures import keeping
     from seecr.files import staged
 
     with staged(folder, "--figures") as unfinished, keeping(unfinished):

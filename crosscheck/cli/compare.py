@@ -67,7 +67,7 @@ def command(
     Exit status: 0 all well, 1 a limit exceeded, 2 bad input, 3 rows without an equilibrium.
     """
     from crosscheck import Limits, Sigma, compare, exceeded, load_limits, load_measurements
-    from crosscheck.report import write_page
+    from crosscheck.show.page import write_page
     from seecr import load_model, load_robot, with_history
     from seecr.files import json_text, staged, write_text
 
@@ -97,14 +97,14 @@ def command(
         with figures_in(figures):
             write_page(found, folder / "comparison.html", made)
             if not no_recording:
-                from crosscheck.recording import write_comparison_recording
+                from crosscheck.show.error_recordings import write_comparison_recording
 
                 write_comparison_recording(found, folder / "comparison.rrd")
         progress("all is written", 1.0)
     if as_json:
         click.echo(text)
         return status
-    from crosscheck.terminal import print_comparison
+    from crosscheck.show.comparison import print_comparison
 
     for note in own.notes if own else ():
         click.echo(f"note: {note}")

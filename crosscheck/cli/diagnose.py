@@ -77,7 +77,7 @@ def command(
     """
     from crosscheck import DiagnosisVerdict, Sigma, Tolerance, diagnose, load_measurements
     from crosscheck.model.write import check_place
-    from crosscheck.report import write_page
+    from crosscheck.show.page import write_page
     from seecr import load_model, load_robot, new_model, with_history
     from seecr.description.fingerprint import fingerprint
     from seecr.files import json_text, staged, write_text
@@ -102,14 +102,14 @@ def command(
         with figures_in(figures):
             write_page(found, folder / "diagnosis.html", made)
             if not no_recording and found.path is not None:
-                from crosscheck.recording import write_diagnosis_recording
+                from crosscheck.show.error_recordings import write_diagnosis_recording
 
                 write_diagnosis_recording(found, folder / "diagnosis.rrd")
         note = "" if model_out is None else _keep(found, model_out)
     if as_json:
         click.echo(text)
     else:
-        from crosscheck.terminal import print_diagnosis
+        from crosscheck.show.diagnosis import print_diagnosis
 
         print_diagnosis(found, out)
     if note:

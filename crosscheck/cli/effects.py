@@ -33,7 +33,7 @@ def command(name: str | None, robot: Path | None, out: Path | None, as_json: boo
     parameter for that robot is shown; diagnose and calibrate use it as the prior's standard
     deviation.
     """
-    from crosscheck.terminal import effect_record, print_effect, print_effects
+    from crosscheck.show.effects import effect_record, print_effect, print_effects
     from seecr import catalogue, effect_named, load_robot
     from seecr.files import json_text
 

@@ -109,8 +109,8 @@ def command(
         raise click.UsageError(f"expected POSES.csv or --rows N, got {got}")
     from crosscheck import Sigma, choose_poses, load_commands, make_plan, write_plan
     from crosscheck.planning.write import NAME, box_of, check_own, sometimes_written
-    from crosscheck.report import write_page
-    from crosscheck.terminal import print_plan
+    from crosscheck.show.page import write_page
+    from crosscheck.show.plan import print_plan
     from seecr import load_robot
     from seecr.files import json_text, staged, with_toml, write_text
 

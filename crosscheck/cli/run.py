@@ -175,7 +175,7 @@ def _tell(run: Run, out: Path, recordings: bool, as_json: bool) -> None:
     if as_json:
         click.echo((out / RESULTS).read_text(encoding="utf-8"), nl=False)
     else:
-        from crosscheck.terminal import print_run
+        from crosscheck.show.suite import print_run
 
         print_run(run, out)
         recorded = [result.case.name for result in run.results] if recordings else []
@@ -185,7 +185,7 @@ def _tell(run: Run, out: Path, recordings: bool, as_json: bool) -> None:
 
 def _record(result: CaseResult, folder: Path) -> str:
     """Write the recording of a case into a folder; its name."""
-    from crosscheck.recording import write_case_recording
+    from crosscheck.show.case_recording import write_case_recording
 
     name = f"{result.case.name}.rrd"
     write_case_recording(result, folder / name)

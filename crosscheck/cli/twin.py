@@ -175,7 +175,7 @@ def _noises(sigma: Mapping[str, float]) -> Iterator[str]:
 
 def _open(path: Path, as_json: bool) -> int:
     from crosscheck import unseal
-    from crosscheck.terminal import parameter_lines
+    from crosscheck.show.effects import parameter_lines
     from crosscheck.twin import FILES
     from seecr.files import json_text
 

@@ -186,7 +186,7 @@ def notes_of(
     from seecr import Commands
     from seecr.effects.base import unfed
     from seecr.equilibrium.solving import strained, strained_rows
-    from seecr.report.scalar_last import scalar_last
+    from seecr.show.pose_words import scalar_last
 
     robot = solution.robot
     much = (*strained(robot), *strained_rows(solution))

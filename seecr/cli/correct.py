@@ -109,7 +109,8 @@ def command(
     from seecr import InputFileError, correct, kept_chance
     from seecr.columns.commands import read_commands
     from seecr.files import check_replaces, json_text, staged, with_toml, write_texts
-    from seecr.report.corrections import chance_lines, corrected_csv, corrected_toml, turned_words
+    from seecr.show.batch_words import chance_lines, turned_words
+    from seecr.show.files import corrected_csv, corrected_toml
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
@@ -197,7 +198,7 @@ def _as_tracked(
     import numpy as np
 
     from seecr import InputError, placed, tracked
-    from seecr.report.corrections import joint_lines
+    from seecr.show.batch_words import joint_lines
     from seecr.units import millimetres
 
     if model is None:

@@ -57,8 +57,8 @@ def command(
     from seecr import bar_balances, barriers, equilibria, midline_points, solve, spread_of
     from seecr.equilibrium.search import elsewhere, on_their_way
     from seecr.files import json_text, staged, write_text
-    from seecr.report.rows import SweepRows
-    from seecr.report.words import (
+    from seecr.show.files import SweepRows
+    from seecr.show.pose_words import (
         at_rest,
         bar_lines,
         cable_lines,

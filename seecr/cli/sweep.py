@@ -137,10 +137,10 @@ def command(
     """
     from seecr import midline_points, spread_of
     from seecr.files import check_replaces, json_text, staged, with_toml, write_text
-    from seecr.report.commanded import toml_beside
-    from seecr.report.rows import SweepRows
-    from seecr.report.sweep_panels import sweep_figure
-    from seecr.report.words import at_rest, jump_lines, span_lines, sweep_lines
+    from seecr.show.batch_words import jump_lines, span_lines, sweep_lines
+    from seecr.show.files import SweepRows, toml_beside
+    from seecr.show.pose_words import at_rest
+    from seecr.show.sweep_figure import sweep_figure
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
@@ -191,7 +191,7 @@ def command(
             )  # fmt: skip
         if not no_recording:
             # takes a second or two to import
-            from seecr.recording.sweep import write_sweep_recording
+            from seecr.show.sweep_recording import write_sweep_recording
 
             write_sweep_recording(solution, folder / "sweep.rrd", commanded)
     if as_json:

@@ -121,9 +121,10 @@ def command(
     from seecr import boundary, default_axes, workspace_map
     from seecr.equilibrium.solving import strained
     from seecr.files import json_text, staged, write_text
-    from seecr.report.map_slices import map_figure
-    from seecr.report.maps import beyond_line, write_arrays
-    from seecr.report.scalar_last import scalar_last
+    from seecr.show.batch_words import beyond_line
+    from seecr.show.files import write_arrays
+    from seecr.show.map_figure import map_figure
+    from seecr.show.pose_words import scalar_last
     from seecr.workspace.grid import own_directions
 
     machine = robot_at(robot, cable)
@@ -167,7 +168,7 @@ def command(
             map_figure(folder / f"map.{figure}", found, edge=places, at_least=at_least)
         if not no_recording:
             # takes a second or two to import
-            from seecr.recording.workspace import write_map_recording
+            from seecr.show.map_recording import write_map_recording
 
             write_map_recording(found, folder / "map.rrd", places)
     if as_json:
@@ -208,7 +209,7 @@ def _lines(
     places: NDArray[np.float64] | None, edge: float | None,
 ) -> list[str]:  # fmt: skip
     """What is told of a map, and of its edge."""
-    from seecr.report.maps import edge_line, likely_lines, sag_lines_of, softest_line
+    from seecr.show.batch_words import edge_line, likely_lines, sag_lines_of, softest_line
 
     lines = [*found.lines(), *softest_line(found), *likely_lines(found, at_least)]
     lines += sag_lines_of(found, effects)

@@ -12,7 +12,7 @@ from made_data import case, run
 from crosscheck.cli.following import Given, after_comparison, after_diagnosis, after_fit
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.words import measured
-from crosscheck.terminal import parameter_lines
+from crosscheck.show.effects import parameter_lines
 
 ONLY = ("--only", "pulley_radius")
 

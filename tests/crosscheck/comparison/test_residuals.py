@@ -312,11 +312,12 @@ def test_tables_name_their_units() -> None:
 
     from rich.console import Console
 
-    from crosscheck.terminal.lines import rms_table
+    from crosscheck.show.blocks import rms_table
+    from crosscheck.show.terminal import show
 
     out = StringIO()
     rms = {"position_rms_m": 1e-3, "orientation_rms_rad": 1e-3, "tension_rms_N": 2.0}
-    Console(file=out, width=100).print(rms_table([("[all] rows", rms, "")]))
+    show([rms_table([("[all] rows", rms, "")])], Console(file=out, width=100))
     heads, row = out.getvalue().splitlines()[1:]
     assert heads.split() == ["rms", "error", "[mm]", "[deg]", "[N]"]
     assert row.split() == ["[all]", "rows", "1", "0.0573", "2"]

@@ -78,7 +78,7 @@ def test_compare_diagnose_add_compare(
     model, limit = tmp_path / "model.toml", ("--max-position", "0.1mm", "--no-recording")
     out = tmp_path / "out"
     with monkeypatch.context() as unpaged:
-        unpaged.setattr("crosscheck.report.write_page", lambda _found, _path, _made: None)
+        unpaged.setattr("crosscheck.show.page.write_page", lambda _found, _path, _made: None)
         assert crosscheck("compare", robot, data, "--out", out, *limit) == 1
     assert crosscheck("diagnose", robot, data, *FEW, "--out", out) == 0
     found = json.loads((out / "diagnosis.json").read_text())
@@ -88,7 +88,7 @@ def test_compare_diagnose_add_compare(
     assert (out / "diagnosis.rrd").stat().st_size > 1000
     assert crosscheck("add", "pulley_radius", robot, data, "--model", model) == 0
     assert "pulley_radius" in model.read_text()
-    monkeypatch.setattr("crosscheck.report.write_page", lambda _found, _path, _made: None)
+    monkeypatch.setattr("crosscheck.show.page.write_page", lambda _found, _path, _made: None)
     assert crosscheck("compare", robot, data, "--model", model, "--out", out, *limit) == 0
     further = (*FEW, "--model", model, "--no-recording")
     assert crosscheck("diagnose", robot, data, *further, "--out", out) == 0

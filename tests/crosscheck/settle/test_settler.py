@@ -13,11 +13,11 @@ from random_robots import write_mjcf
 from rejointed import WAYS, rejointed
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.recording.material import record_motion
 from crosscheck.settle import newton
 from crosscheck.settle import settler as settle
 from crosscheck.settle.physics import Physics
 from crosscheck.settle.settler import Settler, SettleStatus, settle_batch
+from crosscheck.show.case_recording import record_motion
 from crosscheck.suite.write import write_worst_pose_mjcf
 from seecr.description.mjcf import load_robot
 from seecr.equilibrium.solving import solve

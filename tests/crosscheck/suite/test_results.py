@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from crosscheck.show.suite import print_run
 from crosscheck.suite.agreement import load_thresholds
 from crosscheck.suite.cases import Case, demobot_sweep
 from crosscheck.suite.results import CaseResult, remarks
 from crosscheck.suite.run import Run, results_json, run_case, verdict_line
 from crosscheck.suite.verdicts import PoseFinding, Verdict
 from crosscheck.suite.write import junit_xml, summary_md, worst_pose, write_worst_pose
-from crosscheck.terminal.suite import print_run
 from seecr.description.mjcf import model_path
 from seecr.errors import SeecrError
 from seecr.files import json_text, staged

@@ -19,7 +19,7 @@ from seecr.columns.commands import read_commands
 from seecr.description.mjcf import load_robot, model_path
 from seecr.equilibrium.solving import solve
 from seecr.pose import transform_points
-from seecr.report.scalar_last import scalar_last
+from seecr.show.pose_words import scalar_last
 from seecr.workspace.planar import midline_point
 
 PLACE = ["0.17", "0.25", "0.1"]

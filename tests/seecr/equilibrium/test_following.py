@@ -15,8 +15,8 @@ from seecr.effects import Term
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import Array, pose_difference, quat_from_rotvec
-from seecr.report.rows import SweepRows
-from seecr.report.words import jump_lines
+from seecr.show.batch_words import jump_lines
+from seecr.show.files import SweepRows
 
 pytestmark = pytest.mark.slow
 

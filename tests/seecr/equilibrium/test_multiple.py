@@ -16,7 +16,7 @@ from seecr.equilibrium.search import _spread, elsewhere, equilibria
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import Array, pose_difference, quat_from_rotvec, quat_multiply
-from seecr.report.words import other_lines, softest_words
+from seecr.show.pose_words import other_lines, softest_words
 from seecr.statics.solution import Status
 
 # To one of this command's rests only few starts lead.

@@ -18,7 +18,7 @@ from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import pose_difference, quat_from_rotvec, transform_points
 from seecr.prediction.model import load_model
-from seecr.report.words import other_lines
+from seecr.show.pose_words import other_lines
 from seecr.statics.solution import Solution
 from seecr.statics.tables import take
 

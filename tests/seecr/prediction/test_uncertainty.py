@@ -15,8 +15,9 @@ from seecr.errors import InputFileError
 from seecr.files import json_text
 from seecr.pose import pose_difference
 from seecr.prediction.uncertainty import covariance_of, spread_of
-from seecr.report.rows import SweepRows
-from seecr.report.words import cable_lines, pose_lines, sweep_lines
+from seecr.show.batch_words import sweep_lines
+from seecr.show.files import SweepRows
+from seecr.show.pose_words import cable_lines, pose_lines
 from seecr.units import with_error
 
 MODEL = """format = 1

@@ -17,7 +17,7 @@ from seecr.equilibrium.saddles import barriers
 from seecr.equilibrium.search import equilibria
 from seecr.equilibrium.solving import solve
 from seecr.pose import Array, pose_add
-from seecr.report.words import elsewhere, other_lines
+from seecr.show.pose_words import elsewhere, other_lines
 from seecr.statics.solution import Solution
 from seecr.statics.tables import Tables, take
 

@@ -9,7 +9,7 @@ from rejointed import WAYS, rejointed
 from seecr import solve, workspace_map
 from seecr.description.mjcf import load_robot
 from seecr.pose import quat_from_rotvec
-from seecr.report.words import stiffness_lines
+from seecr.show.pose_words import stiffness_lines
 
 POSES = np.array([[0.05, 0.02, 0.3], [-0.1, 0.0, -0.5], [0.0, 0.08, 0.0]])
 

@@ -15,7 +15,7 @@ from seecr.description.robot import Robot
 from seecr.effects import Term
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
-from seecr.report.words import direction_words, stiffness_lines
+from seecr.show.pose_words import direction_words, stiffness_lines
 from seecr.statics.solution import Status
 
 BOB = Robot(

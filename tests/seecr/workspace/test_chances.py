@@ -18,8 +18,8 @@ from seecr.errors import InputError
 from seecr.inverse.correction import correct
 from seecr.pose import Array
 from seecr.prediction.model import Model, load_model
-from seecr.report.corrections import chance_lines
-from seecr.report.maps import likely_lines, write_arrays
+from seecr.show.batch_words import chance_lines, likely_lines
+from seecr.show.files import write_arrays
 from seecr.statics.solution import Solution
 from seecr.workspace import margins
 from seecr.workspace.maps import workspace_map

@@ -27,9 +27,10 @@ from seecr.inverse import correction
 from seecr.inverse.correction import correct, margins_in_place
 from seecr.inverse.nearest.turned import Turned
 from seecr.pose import quat_from_rotvec
-from seecr.recording.workspace import write_map_recording
-from seecr.report.map_slices import map_figure
-from seecr.report.maps import edge_line, softest_line, write_arrays
+from seecr.show.batch_words import edge_line, softest_line
+from seecr.show.files import write_arrays
+from seecr.show.map_figure import map_figure
+from seecr.show.map_recording import write_map_recording
 from seecr.workspace import maps
 from seecr.workspace.grid import Workspace
 from seecr.workspace.maps import default_axes, workspace_map

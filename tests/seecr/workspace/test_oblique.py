@@ -11,8 +11,8 @@ from kept_figures import keep_figures
 from turned import turned
 
 from seecr.description.mjcf import load_robot
-from seecr.report.map_slices import map_figure
-from seecr.report.maps import write_arrays
+from seecr.show.files import write_arrays
+from seecr.show.map_figure import map_figure
 from seecr.workspace.grid import Workspace
 from seecr.workspace.maps import default_axes, workspace_map
 from seecr.workspace.margins import boundary

@@ -1,0 +1,1 @@
+"""Results for people: on the terminal, as pages, as recordings. Nothing is computed here."""

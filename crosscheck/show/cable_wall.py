@@ -1,0 +1,273 @@
+"""The wall: residuals cable by cable against what they may follow, and what remains with effects.
+
+What kind of effect it is shows at a glance: an offset is a constant, a gain a slope with length,
+a drum a sine, creep a curve in time, friction and backlash a step with the direction of motion.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+
+from crosscheck.comparison.quantities import cable_errors, cable_lengths, channels, travel
+from crosscheck.diagnosis.path import Drawn
+from crosscheck.fit.least_squares.problem import KINDS, TENSION, Problem
+from crosscheck.show.figures import MANY, blank, dots, grid, image, styled
+from seecr.pose import Array
+from seecr.prediction.experiment import Prediction
+from seecr.show.colours import AFTER, BEFORE, INK, NOISE, TINT
+
+# More rows of panels than this are too many to look at: the worst are shown.
+_MOST_ROWS = 12
+_ROW_HEIGHT = 0.78
+# Room beside the panels, over the page's width: for names of so many letters, and for each more.
+_LEFT, _SHORT, _LETTER = 0.105, 8, 0.0072
+# Letters of a line of a name, and lines of one; a name that is longer ends in dots.
+_LINE, _MOST_LINES = 13, 3
+# No number stands so near to the end of a panel, in parts of all of them: it would touch the next
+# panel's.
+_END = 0.0175
+
+
+@dataclass(frozen=True, eq=False)
+class Wall:
+    """Residuals as rows of panels.
+
+    Attributes:
+        title: what is shown. names: (k,) of the rows of panels.
+        measured: (n, k) residuals of the model as it stood. predicted: (n, k) what the effects
+            added account for. noise: (k,) one standard deviation.
+        unit: of these. abscissae: name and values, (n,) or (n, k).
+    """
+
+    title: str
+    names: list[str]
+    measured: Array
+    predicted: Array
+    noise: Array
+    unit: str
+    abscissae: list[tuple[str, Array]]
+
+    @property
+    def left(self) -> Array:
+        """(n, k) what remains with these effects."""
+        return self.measured - self.predicted
+
+
+def walls_of(problem: Problem, before: Drawn, after: Drawn) -> list[Wall]:
+    """Cable lengths where the whole pose was read, else its readings; tensions where read."""
+    raw = before.state.raw
+    change = raw - after.state.raw
+    prediction = after.state.prediction
+    out = []
+    errors, noise = cable_errors(problem, raw, before.state.prediction)
+    predicted, _ = cable_errors(problem, change, before.state.prediction)
+    names = list(problem.robot.cable_names)
+    if np.isfinite(errors).any():
+        out.append(
+            Wall("Errors of cable length", names, 1e3 * errors, 1e3 * predicted,
+                 1e3 * np.mean(noise, axis=0), "mm", _of_cables(problem, prediction))
+        )  # fmt: skip
+    elif problem.counted[:, :6].any():
+        out.append(_of_readings(problem, raw, change, prediction))
+    if problem.counted[:, TENSION].any():
+        shown = np.where(problem.counted[:, TENSION], raw[:, TENSION], np.nan)
+        part = np.where(np.isfinite(shown), change[:, TENSION], np.nan)
+        seen = np.flatnonzero(np.isfinite(shown).any(axis=0))
+        level = np.full(len(seen), problem.sigma.tension_N or 0.0)
+        against = [
+            (name, values[:, seen] if values.ndim == 2 else values)
+            for name, values in _of_cables(problem, prediction)
+        ]
+        out.append(
+            Wall("Errors of tension", [names[k] for k in seen], shown[:, seen], part[:, seen],
+                 level, "N", against)
+        )  # fmt: skip
+    return out
+
+
+def _of_cables(problem: Problem, prediction: Prediction) -> list[tuple[str, Array]]:
+    out = [("length of the cable [m]", cable_lengths(problem, prediction))]
+    out.append(("its tension [N]", prediction.tensions))
+    out.append(("reeled in ← last move [mm] → paid out", 1e3 * length_changes(problem, prediction)))
+    return out + _time(problem)
+
+
+def _of_readings(problem: Problem, raw: Array, change: Array, prediction: Prediction) -> Wall:
+    """Where the pose was read in part: its readings against place and time."""
+    kept = [c for c in range(6) if problem.counted[:, c].any()]
+    names, _units = channels(problem)
+    factor = np.array([KINDS[0].factor] * 3 + [KINDS[1].factor] * 3)
+    sigma = np.array([problem.sigma.position_m or 0.0] * 3)
+    sigma = np.concatenate([sigma, [problem.sigma.orientation_rad or 0.0] * 3])
+    units = [KINDS[0 if c < 3 else 1].unit for c in kept]
+    shown = np.where(problem.counted[:, kept], raw[:, kept], np.nan) * factor[kept]
+    part = np.where(np.isfinite(shown), change[:, kept] * factor[kept], np.nan)
+    place = travel(problem, prediction).pose[:, :3]
+    wide = np.ptp(place[problem.use], axis=0) > 1e-6 * problem.robot.length
+    abscissae = [(f"{'xyz'[k]} [m]", place[:, k]) for k in range(3) if wide[k]]
+    rows = [names[c] for c in kept]
+    if len(set(units)) > 1:
+        rows = [f"{name} [{unit}]" for name, unit in zip(rows, units, strict=True)]
+    unit = units[0] if len(set(units)) == 1 else ""
+    level = sigma[kept] * factor[kept]
+    return Wall("Errors of the readings", rows, shown, part, level, unit,
+                (abscissae + _time(problem))[:4])  # fmt: skip
+
+
+def _time(problem: Problem) -> list[tuple[str, Array]]:
+    t_s = problem.data.t_s
+    if t_s is None or np.ptp(t_s) == 0.0:
+        return [("row", np.arange(problem.data.n_rows, dtype=float) + 1.0)]
+    return [("time [s]", t_s - t_s.min())]
+
+
+def length_changes(problem: Problem, prediction: Prediction) -> Array:
+    """Commanded change of each cable's length (n, m) [m] since the row before in its run.
+
+    NaN for the first row of a run: its long way from the reference pose would hide the others.
+    """
+    first = problem.experiment.commands.starts
+    lengths = problem.experiment.commands.lengths
+    if lengths is None:
+        lengths = problem.robot.nominal_lengths(travel(problem, prediction).pose)
+    before = np.concatenate([lengths[:1], lengths[:-1]])
+    return np.asarray(np.where(first[:, None], np.nan, lengths - before))
+
+
+def draw_wall(wall: Wall, alone: str = BEFORE) -> str:
+    """One row of panels per cable (or reading), one column per abscissa.
+
+    Args:
+        wall: residuals. alone: their colour where no effect accounts for a part of them.
+    """
+    rows = _worth_showing(wall)
+    names = [_in_lines(wall.names[k]) for k in rows]
+    widest = max(len(line) for name in names for line in name.split("\n"))
+    with styled():
+        height = _ROW_HEIGHT * len(rows) + 0.75
+        figure = blank(height, constrained=False)
+        panels = figure.subplots(
+            len(rows), len(wall.abscissae), squeeze=False,
+            gridspec_kw={
+                "left": _LEFT + _LETTER * max(widest - _SHORT, 0), "right": 0.995,
+                "bottom": 0.5 / height, "top": 1.0 - 0.25 / height,
+                "wspace": 0.07 if wall.unit else 0.16, "hspace": 0.16,
+            },
+        )  # fmt: skip
+        _share(panels, wall, rows)
+        _ticks(panels, numbered_inside=not wall.unit)
+        for place, k in enumerate(rows):
+            for axes, (_name, values) in zip(panels[place], wall.abscissae, strict=True):
+                _panel(axes, _of_row(values, k), wall, k, alone)
+            panels[place, 0].set_ylabel(
+                names[place], rotation=0, ha="right", va="center", labelpad=6
+            )
+        for axes, (name, _values) in zip(panels[-1], wall.abscissae, strict=True):
+            axes.set_xlabel(name)
+        unit = f" [{wall.unit}]" if wall.unit else ""
+        panels[0, 0].set_title(f"{wall.title}{unit}", loc="left", fontsize=8.5)
+        return image(figure, f"{wall.title} against what they may follow")
+
+
+def _in_lines(name: str) -> str:
+    """A name beside its panel in short lines: in one it would leave the page."""
+    pieces = re.findall(rf"[^\s_/.-]{{1,{_LINE - 1}}}[\s_/.-]?|[\s_/.-]", name)
+    lines = [""]
+    for piece in pieces:
+        if len(f"{lines[-1]}{piece}".rstrip()) > _LINE:
+            lines.append("")
+        lines[-1] += piece
+    lines = [line.strip() for line in lines]
+    if len(lines) > _MOST_LINES:
+        lines[_MOST_LINES - 1 :] = [f"{lines[_MOST_LINES - 1][: _LINE - 1]}…"]
+    return "\n".join(lines)
+
+
+class _Inner(MaxNLocator):
+    """Round numbers, none so near to the end of a panel that it touches those of the next."""
+
+    def __init__(self, columns: int) -> None:
+        super().__init__(nbins="auto", steps=[1, 2, 2.5, 5, 10])
+        self.room = _END * columns
+
+    def tick_values(self, vmin: float, vmax: float) -> Any:
+        """Places of ticks between two values."""
+        room = self.room * (vmax - vmin)
+        places = np.asarray(super().tick_values(vmin, vmax))
+        return places[(places > vmin + room) & (places < vmax - room)]
+
+
+def _worth_showing(wall: Wall) -> list[int]:
+    count = wall.measured.shape[1]
+    with np.errstate(invalid="ignore"):
+        size = np.nanmean(np.where(np.isfinite(wall.measured), wall.measured**2, 0.0), axis=0)
+    worst = np.argsort(-size)[:_MOST_ROWS]
+    return sorted(int(k) for k in worst) if count > _MOST_ROWS else list(range(count))
+
+
+def _of_row(values: Array, k: int) -> Array:
+    return values if values.ndim == 1 else values[:, k]
+
+
+def _share(panels: Any, wall: Wall, rows: list[int]) -> None:
+    """Limits that panels have in common.
+
+    Matplotlib's own way looks at every other panel for each thing that is drawn in one.
+    """
+    for column, (_name, values) in enumerate(wall.abscissae):
+        read = [_of_row(values, k)[np.isfinite(wall.measured[:, k])] for k in rows]
+        for axes in panels[:, column]:
+            axes.set_xlim(_limits(read, 0.04))
+    for place, k in enumerate(rows):
+        alike = rows if wall.unit else [k]
+        heights = [wall.measured[:, alike], wall.left[:, alike], 2.0 * wall.noise[alike]]
+        for axes in panels[place]:
+            axes.set_ylim(_limits([*heights, -2.0 * wall.noise[alike]], 0.05))
+
+
+def _ticks(panels: Any, *, numbered_inside: bool) -> None:
+    """Round numbers below the last row and beside the first column; faint lines across all.
+
+    Args:
+        panels: with their limits.
+        numbered_inside: whether the vertical axes of all panels have numbers, not the first alone.
+    """
+    for place, column in np.ndindex(panels.shape):
+        axes = panels[place, column]
+        axes.xaxis.set_major_locator(_Inner(panels.shape[1]))
+        axes.locator_params(axis="y", nbins=3)
+        axes.tick_params(
+            labelbottom=place == len(panels) - 1, labelleft=column == 0 or numbered_inside
+        )
+        grid(axes, "x")
+
+
+def _limits(values: list[Array], margin: float) -> tuple[float, float]:
+    """From the least to the largest finite value and a part of that beyond."""
+    every = np.concatenate([np.ravel(v) for v in values])
+    every = every[np.isfinite(every)]
+    if len(every) == 0 or np.ptp(every) == 0.0:
+        middle = float(every[0]) if len(every) else 0.0
+        return middle - 0.5, middle + 0.5
+    room = margin * float(np.ptp(every))
+    return float(every.min()) - room, float(every.max()) + room
+
+
+def _panel(axes: Axes, x: Array, wall: Wall, k: int, alone: str) -> None:
+    y = wall.measured[:, k]
+    level = float(wall.noise[k])
+    axes.axhspan(-2 * level, 2 * level, color=NOISE, linewidth=0, zorder=0)
+    many = bool(np.isfinite(y).sum() > MANY)
+    overlaid = bool(np.any(wall.predicted[np.isfinite(wall.predicted)] != 0.0))
+    dots(axes, x, y, 2.4 if many else 4.4, TINT if overlaid else alone, 0.6)
+    if overlaid:
+        dots(axes, x, wall.left[:, k], 1.0 if many else 2.0, AFTER, 0.7)
+    axes.axhline(0.0, color=INK, linewidth=0.5, zorder=1)
+    if many:
+        axes.set_rasterization_zorder(0.8)  # both kinds of dots as one image per panel

@@ -1,0 +1,471 @@
+"""A diagnosis: what is missing, on the terminal, on its page, and in its recording."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from crosscheck.diagnosis.path import ModelPath, Stage
+from crosscheck.diagnosis.result import Diagnosis, MissingEffect
+from crosscheck.diagnosis.words import (
+    equals_of,
+    noise_is_other,
+    probability_name,
+    removed,
+    within_words,
+)
+from crosscheck.fit.least_squares.problem import Kind, Problem
+from crosscheck.fit.noise.whiteness import STRUCTURED
+from crosscheck.fit.reasons import DiagnosisVerdict, probability_words
+from crosscheck.fit.words import rms_words, value_lines
+from crosscheck.inference.priors import SURE
+from crosscheck.show.blocks import (
+    Block,
+    Bold,
+    Cell,
+    Check,
+    Checks,
+    Code,
+    Dot,
+    Figure,
+    Items,
+    Line,
+    Page,
+    Panel,
+    Small,
+    Styled,
+    TextTable,
+    codes,
+    cut,
+    present,
+    rms_table,
+    section,
+)
+from crosscheck.show.candidates import candidate_blocks, candidate_lines
+from crosscheck.show.markdown import kinds_table, markdown, row_heading, unused
+from crosscheck.show.residuals import (
+    association_section,
+    facts_of,
+    map_section,
+    title_of,
+    wall_section,
+)
+from crosscheck.show.terminal import show
+from seecr.counted import counted
+from seecr.effects import Terms
+from seecr.show.colours import AFTER, BEFORE, CALM, TINT
+from seecr.units import in_unit, parameter_name, short, with_error
+
+_STYLE = {
+    DiagnosisVerdict.NO_EFFECT_MISSING: "green",
+    DiagnosisVerdict.EFFECTS_FOUND: "bold cyan",
+    DiagnosisVerdict.MANY_EFFECTS: "bold magenta",
+    DiagnosisVerdict.UNKNOWN_EFFECT: "bold yellow",
+    DiagnosisVerdict.NO_VERDICT: "bold red",
+}
+# Where not all fit, on the terminal and in a recording: diagnosis.json has the others.
+_FILE = "diagnosis.json"
+_MOST_CANDIDATES, _MOST_PARAMETERS, _MOST_LISTED = 6, 9, 6
+# Correlations above this are named; parameters beyond this many plausible sizes are doubtful.
+_CORRELATED, _PLAUSIBLE = 0.9, 5.0
+_MOST_CORRELATIONS = 8
+# More parameters than this stand in two columns.
+_ONE_COLUMN = 8
+# Noise within this factor of what was stated is as stated.
+_AS_STATED = 1.25
+
+
+# --- terminal -------------------------------------------------------------------------------------
+
+
+def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None) -> None:
+    """Print the verdict, the errors on the way, the parameters, and what to measure next."""
+    show(_on_terminal(found, out), console)
+
+
+def _on_terminal(found: Diagnosis, out: Path) -> Iterator[Block]:
+    yield Items(found.sight.lines() if found.sight is not None else (), style="dim")
+    yield Line(f"{found.verdict}: {found.reason}", _STYLE[found.verdict])
+    yield Items(found.notes, "note: ", "dim")
+    if found.verdict is not DiagnosisVerdict.NO_VERDICT:
+        yield _way(found)
+        if found.left is not None:
+            yield Line(f"error beyond the noise: {found.left.words}", "dim")
+        if found.chances is not None and found.chances.words:
+            yield Line(f"note: {found.chances.words}", "dim")
+        for finding in found.missing:
+            likely = f"{probability_name(found)} {probability_words(finding.probability)}"
+            yield Line(f"{finding.effect}: {finding.title} ({likely})", "bold")
+            yield _finding(finding)
+        if within := within_words(found):
+            yield Line(f"note: {within}", "dim")
+        yield from candidate_lines(found)
+        yield Items(equals_of(found), style="dim")
+    yield Items(found.measure_further, "measure next: ")
+    yield Line(f"Results in {out}/ (open diagnosis.html)", "dim")
+
+
+def _way(found: Diagnosis) -> TextTable:
+    rows = [("before", found.before, "")]
+    for finding in found.missing:
+        rows.append((f"+ {finding.effect}", finding.rms, ""))
+        rows.append(("  on held-out runs", finding.held_out_rms, "dim"))
+    return rms_table([*rows, ("noise alone", found.floor, "dim")])
+
+
+def _finding(finding: MissingEffect) -> Items:
+    """Its values, what it cannot be told from, and how to check it."""
+    values = value_lines(finding.layout, finding.values, finding.stderr, finding.at_bound)
+    lines = cut(list(values), _MOST_PARAMETERS, _FILE)
+    if finding.rivals:
+        lines.append(f"indistinguishable from: {', '.join(finding.indistinguishable)}")
+    return Items([*lines, f"check: {finding.check}"], "  ")
+
+
+# --- page -----------------------------------------------------------------------------------------
+
+
+def page_of_diagnosis(found: Diagnosis) -> Page:
+    """The page of a diagnosis: the verdict, what to do, then figures and tables."""
+    of = f" of {title_of(found.path.problem)}" if found.path is not None else ""
+    path = found.path
+    sight = [] if found.sight is None else [Line(" ".join(found.sight.lines()), "dim")]
+    tests = [Checks(some)] if (some := checks(found)) else []
+    next_steps = [Items(found.measure_further)] if found.measure_further else []
+    blocks = present(
+        None if path is None else _facts(found, path.problem),
+        _no_search(found),
+        None if path is None else _waterfall(found, path),
+        section("Missing effects, in the order in which they were added",
+                *(_card(found, k, one) for k, one in enumerate(found.missing, 1))),
+        section("What to measure next", *next_steps),
+        section("What speaks for it, and what against", *tests),
+        section("What these data can show", *sight),
+        *([] if path is None else _errors(found, path)),
+        association_section("What the unexplained error depends on", found.where),
+        section("What else was tried, and why it is not listed", *candidate_blocks(found)),
+        None if path is None else _confusion(found),
+    )  # fmt: skip
+    return Page(
+        title=f"{found.verdict.heading}{of}",
+        heading=f"Diagnosis{of}",
+        verdict=found.verdict.value,
+        name=found.verdict.heading,
+        meaning=found.verdict.meaning,
+        sentence=found.reason,
+        blocks=blocks,
+        notes=found.notes,
+        footer="A named effect is the best explanation of those tried, not a proven cause: carry "
+        "out its independent check. Errors are rms of single components, in the base frame. The "
+        "same numbers, in SI: diagnosis.json.",
+    )
+
+
+def _facts(found: Diagnosis, problem: Problem) -> Block:
+    """The data, how large noise is if not as assumed, what is left, what could not be seen."""
+    other = noise_is_other(found)
+    more = [("estimated noise", rms_words(found.floor))] if other else []
+    if found.left is not None:
+        more.append(("error beyond the noise", found.left.words))
+    if found.chances is not None and found.chances.words:
+        shown = found.chances.shown
+        words = "at no size" if shown is None else f"from {rms_words(shown)} rms on"
+        more.append(("smooth unknown effect visible", words))
+    return facts_of(problem, *more, noise="assumed noise" if other else "noise")
+
+
+def _no_search(found: Diagnosis) -> Line | None:
+    if found.verdict is not DiagnosisVerdict.NO_VERDICT:
+        return None
+    floor = rms_words(found.floor)
+    alone = f"; noise alone would give {floor}" if floor else ""
+    before = rms_words(found.before) or "nothing to compare"
+    return Line(f"Errors of the model: {before}{alone}. No effects were searched for.")
+
+
+def _waterfall(found: Diagnosis, path: ModelPath) -> Panel | None:
+    from crosscheck.show.effect_figures import waterfall
+
+    added = ", after each effect was added" if found.missing else ""
+    estimated = "the estimated " if noise_is_other(found) else ""
+    together = (
+        " The noise of the commanded lengths moves several readings together, so an error within "
+        "the noise of each reading need not be noise."
+    ) * bool(path.problem.sigma.length_m)
+    words = (
+        "Bars (dots if the axis is logarithmic): rms error on held-out runs, which the model was "
+        f"not fitted to{added}. Bracket: the range over these runs, with one tick for each. Faint "
+        "mark: the same error on the rows that the model was fitted to, which proves nothing. Grey "
+        f"background: the error that {estimated}noise alone would give.{together}"
+    )
+    title = "How the error falls" if found.missing else "How large the error is"
+    return section(title, Figure(waterfall(found)), Line(words, "dim"))
+
+
+def _errors(found: Diagnosis, path: ModelPath) -> list[Block | None]:
+    """Where the errors are, and what those of each cable look like."""
+    problem, before, last = path.problem, path.first, path.last
+    calm = found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
+    alone = CALM if calm else BEFORE
+    added = [name for name in last.state.terms.names if name not in path.base]
+    key: list[str] = [Dot(TINT if added else alone), "error of the given model"]
+    if added:
+        key += [" \N{NO-BREAK SPACE} ", Dot(AFTER), f"what remains with {' + '.join(added)}"]
+    more = " Scale and colours are the same before and after." if found.missing else ""
+    return [
+        map_section(
+            "Where the errors are" if calm else "Where the model fails",
+            problem, before, last, more,
+        ),
+        wall_section(
+            "What the error looks like", problem, before, last, alone, [*key, ". "],
+            "assumed noise" if noise_is_other(found) else "noise",
+        ),
+    ]  # fmt: skip
+
+
+def _confusion(found: Diagnosis) -> Panel | None:
+    from crosscheck.show.effect_figures import confusion_of, draw_confusion
+
+    confusion = confusion_of(found)
+    if confusion is None:
+        return None
+    words: list[str] = [
+        "Percentage of the row's signal, over its plausible sizes, that the column could imitate "
+        "with these poses and readings."
+    ]
+    if confusion.twins:
+        words.append(" Framed: ")
+        for k, (a, b) in enumerate(confusion.twins):
+            words += [", " * bool(k), Code(a), " and ", Code(b)]
+        words.append(" imitate each other.")
+    if found.missing:
+        words.append(" Bold: the effects found.")
+    figure = Figure(draw_confusion(confusion), wide=False)
+    return section("Which effects these data can tell apart", figure, Line(words, "dim"))
+
+
+# --- missing effects ------------------------------------------------------------------------------
+
+
+def _card(found: Diagnosis, number: int, finding: MissingEffect) -> Panel:
+    """A missing effect on the page: what it does, its values, how to check it."""
+    rivals = finding.indistinguishable
+    removes, errors = removed(finding.share), rms_words(finding.held_out_rms)
+    name, also = probability_name(found).capitalize(), " or one of its equivalents" * bool(rivals)
+    instead = "that" if len(rivals) == 1 else "one of those"
+    correlated = correlations(found, finding)
+    title = finding.title
+    return Panel(
+        (f"{number}. {title[0].upper()}{title[1:]} ",
+         Small(f"{finding.effect}, {finding.layout.effect.place}")),
+        present(
+            Line(
+                f"Adding it {removes}; the error there is then {errors}. {name} that it{also} is "
+                f"missing: {probability_words(finding.probability)}."
+            ),
+            Line((Bold("Indistinguishable on these data from"), " ", *codes(rivals),
+                  f": adding {instead} instead explains the error as well.")) if rivals else None,
+            parameter_table(finding),
+            Line(f"Correlated above {_CORRELATED:g}: {'; '.join(correlated)}.", "dim")
+            if correlated else None,
+            Line((Bold("Independent check:"), f" {finding.check}.")),
+        ),
+        "card",
+    )  # fmt: skip
+
+
+def parameter_table(finding: MissingEffect) -> TextTable:
+    """Values and standard errors of a missing effect, and what is doubtful about each."""
+    layout = finding.layout
+    sizes = (finding.values - layout.null) / layout.scale
+    rows: list[list[Cell]] = []
+    for name, si, value, error, bound, size in zip(
+        layout.names, layout.units, finding.values.tolist(), finding.stderr.tolist(),
+        finding.at_bound.tolist(), sizes.tolist(), strict=True,
+    ):  # fmt: skip
+        factor, unit = in_unit(si)
+        shown, spread = with_error(factor * value, factor * error)
+        seen = bool(np.isfinite(error))
+        flags = [
+            *["at its bound"] * bound,
+            *["not determined by these data"] * (not seen),
+            *[f"{short(abs(size), 2)} plausible sizes"] * (abs(size) > _PLAUSIBLE),
+        ]
+        rows.append([
+            Code(parameter_name(name, si)),
+            shown if seen or bound else "",
+            f"± {spread}" if seen else spread,
+            unit,
+            Styled(", ".join(flags), "bad") if flags else "",
+        ])  # fmt: skip
+    heads = ["parameter", "#value", "#standard error", "unit", "doubts"]
+    if not any(row[-1] for row in rows):
+        heads, rows = heads[:-1], [row[:-1] for row in rows]
+    return TextTable(heads, rows, kind="two" if len(rows) > _ONE_COLUMN else "")
+
+
+def correlations(found: Diagnosis, finding: MissingEffect) -> list[str]:
+    """Parameters that the data hold together, the strongest first."""
+    assert found.path is not None
+    best = found.path.last.fit
+    every = _spoken(best.terms, finding.effect)
+    own = np.flatnonzero(best.terms.own(finding.effect))
+    correlation = best.correlation
+    pairs = {
+        (min(i, j), max(i, j)): float(correlation[i, j])
+        for i in own.tolist()
+        for j in range(len(every))
+        if i != j and abs(correlation[i, j]) > _CORRELATED
+    }
+    ranked = sorted(pairs.items(), key=lambda item: -abs(item[1]))
+    out = [f"{every[i]} with {every[j]} ({short(value)})"
+           for (i, j), value in ranked[:_MOST_CORRELATIONS]]  # fmt: skip
+    if len(ranked) > _MOST_CORRELATIONS:
+        out.append(f"and {counted(len(ranked) - _MOST_CORRELATIONS, 'more pair')}")
+    return out
+
+
+def _spoken(terms: Terms, effect: str) -> list[str]:
+    """Parameters as the cards' tables name them, those of other effects with whose they are."""
+    return [
+        parameter_name(name, unit) + ("" if term.name == effect else f" of {term.name}")
+        for term in terms
+        for name, unit in zip(term.layout.names, term.layout.units, strict=True)
+    ]
+
+
+# --- what was tested ------------------------------------------------------------------------------
+
+
+def checks(found: Diagnosis) -> list[Check]:
+    """What speaks for the verdict and what against it."""
+    path, chances, w = found.path, found.chances, found.whiteness
+    if path is None or chances is None or w is None:
+        return []
+    scales, _rhos = path.search.best.fit.noise.by_kind(path.problem)
+    sizes = ", ".join(
+        f"{short(value)} times the assumed one ({kind})" for kind, value in scales.items()
+    )
+    unknown = chances.unknown
+    out = [
+        Check("size of the noise", max(scales.values()) < _AS_STATED, sizes),
+        Check(
+            "neighbouring rows", not w.structured,
+            f"their correlation is {short(max(w.lag_errors, w.neighbour_errors))} standard errors "
+            f"from zero; white noise stays below {STRUCTURED:g}",
+        ),
+        Check(
+            "something unknown", unknown < 1.0 - SURE,
+            f"probability {probability_words(unknown)}",
+        ),
+        Check("effects tried", None, f"{path.tried}, in {len(path.search.cache)} models"),
+    ]  # fmt: skip
+    listed = path.stages
+    if not any(stage.added for stage in listed):
+        return out
+    better, blocks = _better_runs(listed)
+    worst, largest = max((_largest_size(stage), stage.added) for stage in listed if stage.added)
+    bound = _at_bounds(listed[-1])
+    return [
+        *out,
+        Check("held-out runs", better == blocks, "each added effect improves the prediction of "
+            f"{better} of {blocks}"),
+        Check("sizes", worst < _PLAUSIBLE and not bound, f"at most {short(worst, 2)} plausible "
+              f"sizes ({largest})" + (f"; at its bound: {', '.join(bound)}" if bound else "")),
+    ]  # fmt: skip
+
+
+def _better_runs(stages: Sequence[Stage]) -> tuple[int, int]:
+    """Runs left out whose error falls with every effect that was added, and all.
+
+    Only of steps with the same blocks: those of an effect with values for each run are others.
+    """
+    pairs = [(a.held_out.chi2, b.held_out.chi2) for a, b in itertools.pairwise(stages)]
+    falls = [a - b for a, b in pairs if len(a) == len(b)]
+    least = np.min(falls, axis=0) if falls else np.zeros(0)
+    return int(np.sum(least > 0)), len(least)
+
+
+def _largest_size(stage: Stage) -> float:
+    return float(np.max(np.abs(stage.fit.terms[stage.added].sizes)))
+
+
+def _at_bounds(stage: Stage) -> list[str]:
+    """The effects of a model that have a parameter at its bound."""
+    labels = np.array(stage.fit.terms.labels)[stage.fit.at_bound]
+    return list(dict.fromkeys(effect for effect, _name in labels.tolist()))
+
+
+# --- texts of a recording -------------------------------------------------------------------------
+
+
+def diagnosis_text(found: Diagnosis, scene: Sequence[str]) -> str:
+    """The verdict, what to measure next, what was assumed, and how to read the views.
+
+    Args:
+        found: the diagnosis. scene: what is drawn, in words; empty if nothing is.
+    """
+    steps = cut(found.measure_further, _MOST_LISTED, _FILE)
+    notes = cut(found.notes, _MOST_LISTED, _FILE)
+    play = (
+        " goes from the model as it stood through the effects added. ", Code("pose"),
+        " (choose it at the bottom left) goes through the measured poses: orange edges measured, "
+        "blue the last model, pink edges the first.",
+    )  # fmt: skip
+    blocks = present(
+        Line(found.reason),
+        Line((Bold("Scene."), " ", *scene, " Blue box and cables: the model at the worst pose; "
+              "orange edges: what was measured there.")) if scene else None,
+        Line((Bold("Play."), " ", Code("model_step"), *play)) if scene else None,
+        section("What to measure next", Items(steps)) if steps else None,
+        section("Notes", Items(notes)) if notes else None,
+    )  # fmt: skip
+    return markdown(blocks, found.verdict.heading)
+
+
+def step_text(
+    found: Diagnosis, stages: Sequence[Stage], k: int, kinds: Sequence[Kind], line: int
+) -> str:
+    """One model: its errors, and its last effect.
+
+    Args:
+        found: the diagnosis. stages: the models. k: which one. kinds: of readings.
+        line: of the worst pose in the data.
+    """
+    stage = stages[k]
+    fitted = stage.rms
+    errors = [
+        (stage.held_out.rms[kind.key], fitted[kind.key], found.floor.get(kind.key) or 0.0)
+        for kind in kinds
+    ]
+    finding = next((f for f in found.missing if f.effect == stage.added), None)
+    more: Iterable[Block] = ()
+    if finding is not None:
+        more = [Line(f"It {removed(finding.share)}: {finding.title}."), _finding(finding)]
+    elif found.candidates and len(stages) == 1:
+        rows = [(row.effect, str(row.why_not)) for row in found.candidates[:_MOST_CANDIDATES]]
+        more = [TextTable(["tried", "why not listed"], rows)]
+    blocks = [
+        kinds_table(kinds, errors, ("held-out runs", "fitted runs", "noise")),
+        *more,
+        Line(f"The box shows the worst pose, line {line} of the data."),
+    ]
+    title = f"Step {k} of {len(stages) - 1}: {stage.label}"
+    return markdown([Panel(title, blocks)])
+
+
+def pose_of_step_text(
+    problem: Problem, stages: Sequence[Stage], kinds: Sequence[Kind], k: int
+) -> str:
+    """The numbers of one row under the first and the last model."""
+    head = row_heading(problem.data, k)
+    if not problem.use[k]:
+        return head + markdown([unused(problem.data, k)])
+    ends = stages if len(stages) < 2 else [stages[0], stages[-1]]
+    sizes = [[float(kind.sizes(problem, s.state.raw)[k]) for s in ends] for kind in kinds]
+    return head + markdown([kinds_table(kinds, sizes, [s.label for s in ends], "error")])

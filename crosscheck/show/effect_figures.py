@@ -1,0 +1,285 @@
+"""Figures of effects: what each explains, what could imitate it, how small it can be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
+
+from crosscheck.diagnosis.path import ModelPath, Stage
+from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.words import noise_is_other
+from crosscheck.fit.least_squares.imitation import basis, beside, imitated
+from crosscheck.fit.least_squares.problem import Kind, kinds_read
+from crosscheck.fit.reasons import DiagnosisVerdict, Why
+from crosscheck.inference.catalogue import About
+from crosscheck.inference.held_out import rms_by_block
+from crosscheck.planning.result import Visible
+from crosscheck.show.figures import WIDTH, blank, grid, image, plain_log, styled
+from seecr.pose import Array
+from seecr.show.colours import AFTER, BEFORE, CALM, GREY, INK, NOISE
+from seecr.units import short
+
+# Errors this many times the noise need a logarithmic axis for both to be seen.
+_FAR = 12.0
+# More runs than this are shown by their range alone.
+_MOST_TICKS = 24
+# An error above the noise by this part is not explained.
+_ABOVE = 1.15
+
+
+def waterfall(found: Diagnosis) -> str:
+    """One row per model, one panel per kind of reading."""
+    assert found.path is not None
+    stages = found.path.stages
+    kinds = kinds_read(found.path.problem)
+    with styled():
+        figure = blank(0.42 * len(stages) + 1.05)
+        panels = figure.subplots(1, len(kinds), sharey=True, squeeze=False)[0]
+        for axes, kind in zip(panels, kinds, strict=True):
+            _panel(axes, found, stages, kind)
+        panels[0].set_yticks(range(len(stages)), [_label(stage, found) for stage in stages])
+        panels[0].set_ylim(len(stages) - 0.45, -0.75)
+        return image(figure, "Errors on held-out runs, model by model, compared with the noise")
+
+
+def _label(stage: Stage, found: Diagnosis) -> str:
+    rivals = [f.rivals for f in found.missing if f.effect == stage.added]
+    if rivals and rivals[0]:
+        more = f" or {len(rivals[0])} more" if len(rivals[0]) > 1 else f"\nor {rivals[0][0].name}"
+        return stage.label + more
+    return stage.label
+
+
+def _panel(axes: Axes, found: Diagnosis, stages: Sequence[Stage], kind: Kind) -> None:
+    assert found.path is not None
+    problem = found.path.problem
+    values = [(stage.held_out.rms[kind.key] or 0.0) * kind.factor for stage in stages]
+    blocks = [rms_by_block(problem, stage.held_out, kind.key) * kind.factor for stage in stages]
+    floor = (found.floor.get(kind.key) or 0.0) * kind.factor
+    top = max(*values, *(float(np.nanmax(b, initial=0.0)) for b in blocks), floor)
+    logarithmic = floor > 0.0 and top > _FAR * floor
+    if logarithmic:
+        plain_log(axes)
+        left, right = 0.5 * min(floor, *values), top * (top / floor) ** 0.32
+    else:
+        left, right = 0.0, 1.45 * top
+        axes.locator_params(axis="x", nbins=5)
+    axes.set_xlim(left, right)
+    axes.axvspan(left, floor, color=NOISE, linewidth=0, zorder=0)
+    axes.axvline(floor, color=GREY, linewidth=1.0, linestyle=(0, (3, 2)), zorder=1)
+    noise = "estimated noise" if noise_is_other(found) else "noise"
+    axes.annotate(
+        f"{noise} {short(floor)}", (floor, -0.72), xytext=(3, -2), textcoords="offset points",
+        color=GREY, fontsize=7.5, va="top",
+    )  # fmt: skip
+    for row, (stage, value, runs) in enumerate(zip(stages, values, blocks, strict=True)):
+        in_sample = _in_sample(stage, kind)
+        (_point if logarithmic else _bar)(axes, row, stage, value, _colour(stage, found))
+        # beside a dot, which would hide it, and on a bar
+        _runs(axes, row + 0.3 * logarithmic, runs)
+        if stage.added and in_sample is not None:
+            axes.plot(
+                [in_sample] * 2, [row - 0.3, row + 0.3], color="#b9c0c7", linewidth=1.4, zorder=4
+            )
+        reach = max(value, float(np.nanmax(runs, initial=0.0)))
+        words = f"{short(value)} {kind.unit}"
+        if row == len(stages) - 1 and value > _ABOVE * floor > 0 and not _is_noise(found):
+            words += "\nnot explained"
+        axes.annotate(
+            words, (reach, row), xytext=(5, 0), textcoords="offset points", va="center",
+            fontsize=8.5, color=INK,
+        )  # fmt: skip
+    scale = ", logarithmic" if logarithmic else ""
+    axes.set_xlabel(f"rms {kind.name} error [{kind.unit}]{scale}")
+    axes.tick_params(axis="y", length=0)
+    axes.spines["left"].set_visible(False)
+    grid(axes, "x")
+
+
+def _is_noise(found: Diagnosis) -> bool:
+    """Whether the last model leaves noise, of whatever size."""
+    return found.verdict in (DiagnosisVerdict.EFFECTS_FOUND, DiagnosisVerdict.NO_EFFECT_MISSING)
+
+
+def _in_sample(stage: Stage, kind: Kind) -> float | None:
+    value = stage.rms[kind.key]
+    return None if value is None else value * kind.factor
+
+
+def _colour(stage: Stage, found: Diagnosis) -> str:
+    if not stage.added:
+        return CALM if found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING else BEFORE
+    return AFTER
+
+
+def _point(axes: Axes, row: int, stage: Stage, value: float, colour: str) -> None:
+    """Where the axis has no zero to begin a bar at."""
+    axes.plot(
+        value, row, marker="o", markersize=11, markeredgewidth=1.6, zorder=2,
+        markeredgecolor=colour, markerfacecolor=colour,
+    )  # fmt: skip
+
+
+def _bar(axes: Axes, row: int, stage: Stage, value: float, colour: str) -> None:
+    axes.barh(
+        row, value, height=0.52, zorder=2,
+        color=colour, edgecolor=colour,
+        linewidth=0.8,
+    )  # fmt: skip
+
+
+def _runs(axes: Axes, row: float, runs: np.ndarray) -> None:
+    """The range over the runs left out, and one tick per run."""
+    runs = runs[np.isfinite(runs)]
+    if len(runs) < 2:
+        return
+    axes.plot([runs.min(), runs.max()], [row, row], color=INK, linewidth=0.9, zorder=5)
+    shown = runs if len(runs) <= _MOST_TICKS else np.quantile(runs, [0, 0.25, 0.5, 0.75, 1])
+    axes.plot(
+        shown, [row] * len(shown), linestyle="none", marker="|", markersize=7,
+        markeredgewidth=0.9, color=INK, zorder=5,
+    )  # fmt: skip
+
+
+# Effects in the map where some are listed, and where none are.
+_FEW, _MANY = 12, 30
+# From here on two effects look alike.
+ALIKE = 0.9
+
+
+@dataclass(frozen=True, eq=False)
+class Confusion:
+    """What could imitate what.
+
+    Attributes:
+        names: of the effects. listed: of those, how many the diagnosis lists (they come first).
+        part: (k, k) part of the row's signal that the column could imitate.
+    """
+
+    names: tuple[str, ...]
+    listed: int
+    part: Array
+
+    @property
+    def twins(self) -> list[tuple[str, str]]:
+        """Pairs that imitate each other."""
+        k = len(self.names)
+        return [
+            (self.names[i], self.names[j])
+            for i in range(k)
+            for j in range(i + 1, k)
+            if min(self.part[i, j], self.part[j, i]) > ALIKE
+        ]
+
+
+def confusion_of(found: Diagnosis) -> Confusion | None:
+    """Of the effects found, their rivals and the best of the others, at the final model."""
+    if found.path is None:
+        return None
+    columns, about = {}, found.path.search.every.about(found.path.last.fit)
+    for name in _names(found):
+        own = _columns(found.path, about, name)
+        if own is not None and float(np.sum(own**2)) > 0.0:
+            columns[name] = own
+    kept = tuple(columns)
+    if len(kept) < 2:
+        return None
+    bases = {name: basis(own) for name, own in columns.items()}
+    part = np.array([[imitated(columns[a], bases[b]) for b in kept] for a in kept])
+    listed = sum(1 for f in found.missing if f.effect in columns)
+    return Confusion(kept, listed, part)
+
+
+def _names(found: Diagnosis) -> list[str]:
+    """Listed effects first, then what cannot be told from them, then the best of the others."""
+    names = [f.effect for f in found.missing]
+    names += [rival.name for f in found.missing for rival in f.rivals]
+    names += [
+        row.effect
+        for row in sorted(found.candidates, key=lambda row: -row.score)
+        if not row.why_not.lacking and row.why_not.why is not Why.UNSEEN
+    ]
+    return list(dict.fromkeys(names))[: _FEW if found.missing else _MANY]
+
+
+def _columns(path: ModelPath, about: About, name: str) -> Array | None:
+    """(N, p) what an effect does beside the base model, by plausible sizes."""
+    final = path.last.fit
+    key = path.search.every.keys_of(final.terms).get(name, name)
+    own = about.columns.get(key)
+    if own is None:
+        return None
+    had = np.array([effect in path.base for effect, _key in final.terms.labels], dtype=bool)
+    return beside(own, basis(final.jacobian[:, had]))
+
+
+def draw_confusion(confusion: Confusion) -> str:
+    """A matrix: row imitated by column; pairs that imitate each other are framed."""
+    names, part = confusion.names, confusion.part
+    k = len(names)
+    side = min(0.5, 7.2 / k)
+    with styled():
+        figure = blank(side * k + 1.75, min(WIDTH, side * k + 3.4))
+        axes = figure.subplots()
+        axes.imshow(part, cmap="Blues", vmin=0.0, vmax=1.25, aspect="equal")
+        for i in range(k):
+            for j in range(k):
+                if i != j and part[i, j] >= 0.005:
+                    axes.text(
+                        j, i, _words(part[i, j], k), ha="center", va="center",
+                        fontsize=7.5 if k <= _FEW else 6.2,
+                        color="white" if part[i, j] > 0.75 else INK,
+                    )  # fmt: skip
+        for a, b in confusion.twins:
+            for i, j in ((names.index(a), names.index(b)), (names.index(b), names.index(a))):
+                corner = (j - 0.46, i - 0.46)
+                axes.add_patch(
+                    Rectangle(corner, 0.92, 0.92, fill=False, edgecolor=BEFORE, linewidth=1.8)
+                )
+        axes.set_xticks(range(k), names, rotation=40, ha="right", rotation_mode="anchor")
+        axes.set_yticks(range(k), names)
+        for label in axes.get_yticklabels()[: confusion.listed]:
+            label.set_fontweight("bold")
+        for label in axes.get_xticklabels()[: confusion.listed]:
+            label.set_fontweight("bold")
+        axes.set_xlabel("could be imitated by")
+        axes.tick_params(length=0)
+        for spine in axes.spines.values():
+            spine.set_visible(False)
+        return image(figure, "How much of each effect another could imitate")
+
+
+def _words(part: float, count: int) -> str:
+    if count > _FEW and part < 0.5:
+        return ""
+    text = f"{100 * np.floor(100 * part) / 100:.0f}"
+    return text if part < 0.9995 else "100"
+
+
+_SIZE_ROW = 0.19
+
+
+def draw_sizes(effects: tuple[Visible, ...]) -> str:
+    """The smallest size that shows and that can be named, in plausible sizes, of each effect."""
+    shown = [found for found in effects if np.isfinite(found.factor)]
+    with styled():
+        figure = blank(_SIZE_ROW * len(shown) + 0.9)
+        axes = figure.subplots()
+        place = np.arange(len(shown))[::-1]
+        factor = np.array([found.factor for found in shown])
+        named = np.array([np.nan if found.twins else found.identifiable for found in shown])
+        axes.hlines(place, factor, np.where(np.isfinite(named), named, factor), color=INK, lw=0.6)
+        axes.plot(factor, place, "o", color=AFTER, markersize=5, label="shows")
+        axes.plot(named, place, "D", color=BEFORE, markersize=4, label="can be named")
+        axes.axvline(1.0, color=INK, linewidth=0.8, linestyle=":")
+        axes.set_yticks(place, [found.name for found in shown])
+        axes.set_ylim(-0.7, len(shown) - 0.3)
+        plain_log(axes)
+        axes.set_xlabel("smallest visible size, in plausible sizes (dotted: 1)")
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+        grid(axes, "x")
+        return image(figure, "The smallest visible sizes")

@@ -1,0 +1,262 @@
+"""The suite: its results on the terminal, and the texts of a case's recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+
+from crosscheck.show.blocks import Block, Bold, Cell, Code, Items, Line, Styled, TextTable, section
+from crosscheck.show.markdown import markdown, pose_heading
+from crosscheck.show.terminal import console_for, show
+from crosscheck.suite.effects import effect_failures, effects_line
+from crosscheck.suite.results import (
+    QUANTITY_HEADS,
+    TABLE_HEADS,
+    case_cells,
+    failure_lines,
+    widened_lines,
+)
+from crosscheck.suite.run import threshold_cells, verdict_line
+from crosscheck.suite.verdicts import FINDINGS, Outcome, Verdict
+from seecr.counted import counted
+from seecr.description.robot import Robot
+from seecr.pose import Array, pose_difference, rxyz_from_quat
+
+if TYPE_CHECKING:
+    from crosscheck.suite.results import CaseResult
+    from crosscheck.suite.run import Run
+
+_STYLE = {
+    Outcome.AGREE: "green",
+    Outcome.DIFFER: "bold red",
+    Outcome.NOT_CONVERGED: "bold yellow",
+}
+# Failures told on the terminal; summary.md and results.json have them all.
+_MOST = 5
+# Columns of words, of the case's result, and those shown on any terminal.
+_RESULT = TABLE_HEADS.index("result")
+_WORDS = (0, _RESULT, _RESULT + 1)
+_ESSENTIAL = (0, *(TABLE_HEADS.index(head) for head in QUANTITY_HEADS.values()), _RESULT)
+_ROOMY = 124
+
+_KINDS = {
+    "sweep": "poses along a line",
+    "random": "poses at random",
+    "starts": "starts of one command",
+}
+_TITLES = {
+    "position_m": "position",
+    "orientation_rad": "orientation",
+    "tension_N": "tension",
+    "settled_position_m": "position, plain settling",
+    "settled_orientation_rad": "orientation, plain settling",
+}
+_LISTED = 12
+_SCENE = (
+    " White edges: the commanded platform. Blue box: SEECR's answer. Orange edges: MuJoCo's. Blue "
+    "inside orange means that both agree. A thick cable pulls, coloured by its tension; a grey "
+    "dashed one hangs slack."
+)
+_LINES, _CROSSES = "Lines are SEECR, dots MuJoCo.", "Crosses are SEECR, the dots on them MuJoCo."
+_LOGARITHM = (
+    "The lowest plot is their difference as a decimal logarithm: -9 is a billionth of a metre."
+)
+
+
+# --- terminal -------------------------------------------------------------------------------------
+
+
+def print_run(run: Run, out: Path, console: Console | None = None) -> None:
+    """Print the table, what needs a look, the verdict, and where the files are.
+
+    Args:
+        run: what to tell about.
+        out: the folder of results.
+        console: where to; standard output by default.
+    """
+    console = console_for(console)
+    show(_on_terminal(run, out, console.width), console)
+
+
+def _on_terminal(run: Run, out: Path, width: int) -> Iterator[Block]:
+    if run.results:
+        yield _table(run, width)
+    for result in run.results:
+        name = result.case.name
+        yield from _first([f"{name}, {line}" for line in _notes(result)], name)
+    for verdict in FINDINGS:
+        if run.count(verdict):
+            poses = counted(run.count(verdict), "pose")
+            yield Line(f"Finding at {poses}: {verdict.value}.")
+    yield from _first(effect_failures(run.effects), "effects")
+    if run.effects and run.results:
+        yield Line(effects_line(run.effects))
+    yield Line(verdict_line(run), _STYLE[run.outcome])
+    yield Line(f"{run.wall_s:.1f} s; results in {out}/")
+
+
+def _table(run: Run, width: int) -> TextTable:
+    """The cases, without the columns that are left out where the terminal is narrow."""
+    shown = [i for i in range(len(TABLE_HEADS)) if width >= _ROOMY or i in _ESSENTIAL]
+    rows: list[list[Cell]] = []
+    for result in run.results:
+        cells: list[Cell] = [*case_cells(result)]
+        cells[_RESULT] = Styled(str(cells[_RESULT]), _STYLE[result.outcome])
+        rows.append([cells[i] for i in shown])
+    limits = threshold_cells(run)
+    return TextTable(
+        [TABLE_HEADS[i] if i in _WORDS else f"#{TABLE_HEADS[i]}" for i in shown],
+        [*rows, [limits[i] for i in shown]],
+        [*([""] * len(rows)), "dim"],
+        "whole",
+    )
+
+
+def _notes(result: CaseResult) -> list[str]:
+    """Failures, branches and widened thresholds of a case; its free motions are only counted."""
+    branches = [f for f in result.findings if f.verdict is Verdict.BRANCH and not f.fails]
+    return [
+        *failure_lines(result),
+        *(f"pose {f.pose}: {f.text}" for f in branches),
+        *widened_lines(result),
+    ]
+
+
+def _first(lines: list[str], name: str) -> Iterator[Block]:
+    """The first few lines about a case or the effects, and how many more there are."""
+    yield Items(lines[:_MOST])
+    if len(lines) > _MOST:
+        yield Line(f"{name}: {len(lines) - _MOST} more in summary.md")
+
+
+# --- texts of a recording -------------------------------------------------------------------------
+
+
+def guide_text(result: CaseResult, along: str, watched: int | None) -> str:
+    """What to look at in a case, and its worst numbers.
+
+    Args:
+        result: the case's.
+        along: the timeline over the poses.
+        watched: the pose, counted from 0, whose settling is shown; None for no settling.
+    """
+    case, robot, count = result.case, result.robot, len(result.case.poses)
+    marks = _LINES if case.kind == "sweep" else _CROSSES
+    settling = "" if watched is None else (
+        " (choose it at the bottom left) is MuJoCo alone: it lets go of the platform at command "
+        f"{watched}, which comes to rest on SEECR's answer. Seconds are simulated; the platform is "
+        "stopped at each peak of its motion energy, so it swings less than a real one would."
+    )  # fmt: skip
+    more = [" The timeline ", Code("settling_time"), settling] if settling else []
+    worst = [
+        [_TITLES[name], number(one.value, name.rsplit("_", 1)[1]), str(one.pose),
+         number(one.allowed, name.rsplit("_", 1)[1])]
+        for name, one in result.worst.items()
+    ]  # fmt: skip
+    findings = _findings(result)
+    blocks = [
+        Line(f"{counted(robot.n_cables, 'cable')}, {robot.mass:g} kg, {robot.weight:.3g} N of "
+             f"weight; {count} {_KINDS.get(case.kind, 'poses')}."),
+        Line((Bold("Scene."), _SCENE)),
+        Line((Bold("Plots."), f" {marks} {_LOGARITHM}")),
+        Line((Bold("Play."), " The timeline ", Code(along),
+              f" goes through the {counted(count, 'command')}.", *more)),
+        section("Findings", Items(findings)) if findings else None,
+        section("Largest differences",
+                TextTable(["quantity", "largest", "pose", "allowed"], worst) if worst
+                else Line("No pose could be compared: see the findings.")),
+    ]  # fmt: skip
+    return markdown([block for block in blocks if block is not None], case.name)
+
+
+def _findings(result: CaseResult) -> list[str]:
+    """Poses by verdict, except those that agree."""
+    lines = []
+    for verdict in Verdict:
+        rows = [str(i) for i in np.flatnonzero(result.verdict == verdict)]
+        if verdict is not Verdict.AGREES and rows:
+            listed = ", ".join(rows[:_LISTED]) + (" …" if len(rows) > _LISTED else "")
+            lines.append(f"pose {listed}: {verdict.value}")
+    return lines
+
+
+def pose_numbers_text(result: CaseResult, i: int, pose: Array) -> str:
+    """The numbers of one pose.
+
+    Args:
+        result: the case's. i: the pose, counted from 0. pose: (7,) SEECR's answer, NaN for none.
+    """
+    command, gap = result.case.poses[i], result.difference
+    rows = [
+        ("command", position(command)),
+        ("turned", orientation(command)),
+        ("SEECR moves by", shift(pose, command)),
+        ("SEECR turns by", turn(pose, command)),
+        ("slack", slack_names(result.robot, result.solution.slack[i])),
+        ("MuJoCo differs by", number(gap.position_m[i], "m")),
+        ("in orientation by", number(gap.orientation_rad[i], "rad")),
+        ("in tension by", number(gap.tension_N[i], "N")),
+    ]
+    more = [Line(f.text) for f in result.findings if f.pose == i]
+    blocks: list[Block] = [*(more or [Line(result.verdict[i].value)]), TextTable([], rows)]
+    return f"{pose_heading(i, len(result.case.poses))}\n{markdown(blocks)}"
+
+
+def instant_text(t_s: float, kinetic: float, distance: Array, slack: str) -> str:
+    """The numbers of one instant of a settling.
+
+    Args:
+        t_s: simulated time [s].
+        kinetic: kinetic energy [J].
+        distance: (2,) [m, rad] from SEECR's answer.
+        slack: names of slack cables.
+    """
+    rows = [
+        ("from SEECR's answer", number(1e3 * distance[0], "mm")),
+        ("rotation from it", number(np.degrees(distance[1]), "°")),
+        ("kinetic energy", number(kinetic, "J")),
+        ("slack cables", slack),
+    ]
+    return f"## Settling, {t_s:.3f} s\n{markdown([TextTable([], rows)])}"
+
+
+def slack_names(robot: Robot, slack: NDArray[np.bool_]) -> str:
+    """The names of slack cables (m,)."""
+    return ", ".join(n for n, yes in zip(robot.cable_names, slack, strict=True) if yes) or "none"
+
+
+def number(value: float, unit: str, digits: int = 3) -> str:
+    """A number with its unit, or a dash if there is none."""
+    return f"{value:.{digits}g} {unit}" if np.isfinite(value) else "–"
+
+
+def position(pose: Array) -> str:
+    """Position of a pose (7,) in millimetres."""
+    x, y, z = 1e3 * pose[:3]
+    return f"x {x:.2f}, y {y:.2f}, z {z:.2f} mm"
+
+
+def orientation(pose: Array) -> str:
+    """Angles of a pose (7,) in degrees, R = Rx(rx) Ry(ry) Rz(rz)."""
+    rx, ry, rz = np.degrees(rxyz_from_quat(pose[3:])) + 0.0
+    return f"rx {rx:.2f}, ry {ry:.2f}, rz {rz:.2f}°"
+
+
+def shift(pose: Array, command: Array) -> str:
+    """Displacement of a pose (7,) from its command."""
+    if not np.isfinite(pose).all():
+        return "no answer"
+    x, y, z = 1e3 * (pose[:3] - command[:3])
+    return f"dx {x:+.2f}, dy {y:+.2f}, dz {z:+.2f} mm"
+
+
+def turn(pose: Array, command: Array) -> str:
+    """Angle between a pose (7,) and its command."""
+    if not np.isfinite(pose).all():
+        return "no answer"
+    return f"{np.degrees(np.linalg.norm(pose_difference(pose, command)[3:])):.2f}°"

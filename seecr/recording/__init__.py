@@ -1,1 +1,0 @@
-"""Recordings for the Rerun viewer. Importing its modules imports Rerun: a second or two."""

@@ -1,0 +1,402 @@
+"""The figure of a map: slices through it, with one row of panels for each quantity."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.errors import InputError
+from seecr.pose import Array
+from seecr.show.colours import COLOURS
+from seecr.show.figures import figure
+from seecr.workspace.grid import Workspace, across_of, colour_end, directions_words
+
+# Colour of the edge of the workspace.
+_EDGE = COLOURS[4]
+# Dots of the edge at a probability: white with a rim, visible on all colours.
+_LIKELY: dict[str, Any] = {
+    "markersize": 4.0, "markerfacecolor": "white", "markeredgecolor": "black",
+    "markeredgewidth": 0.6,
+}  # fmt: skip
+# Colours for poses that cannot and can be held, if margins have no numbers.
+_NO, _YES = "#D9D9D9", COLOURS[0]
+# Cells where the platform is free to move: no scale has this grey, nor stripes.
+_FREE, _STRIPES = "#D0D0D0", "#606060"
+# A grid larger than this [m] is labelled in metres.
+_LARGE = 5.0
+# A row of panels is as high as so wide a panel needs, and the room around it, within limits [inch].
+_PANEL, _ROOM, _LOWEST, _HIGHEST = 2.4, 0.35, 1.7, 2.3
+# Letters of a title that fit into an inch.
+_LETTERS = 13
+# A vector in such a title, which stays on one line.
+_UNBROKEN = re.compile(r"\([-\d.e, ]+\)")
+# Logarithmic colours end where so much of what can be held is softer, or stiffer.
+_ENDS = (0.05, 0.95)
+# Their ends are at least so far apart, as a ratio: otherwise they would show rounding.
+_APART = 1.1
+# Margins grow without limit towards the height of the exit points: their colours end at so many
+# times the median.
+_OUTSTANDING = 4.0
+
+
+def map_figure(
+    path: Path,
+    found: Workspace,
+    most: int = 4,
+    edge: Array | None = None,
+    at_least: float | None = None,
+) -> None:
+    """Slices of a workspace: margins, and in equilibrium slack cables, deviation, rotation, if the
+    platform can turn, and the stiffness of the softest direction.
+
+    If the map has probabilities, they come second.
+
+    Args:
+        path: the file.
+        found: the workspace, with two or three axes of more than one value.
+        most: most slices drawn; they are normal to the last axis, or to the one with a single
+            value. The title states how many there are in all.
+        edge: (k, 7) poses at the edge of the workspace; those in a slice are drawn as dots, instead
+            of the line between the poses of the grid.
+        at_least: the probability to which that edge belongs, if any; the line is drawn, too.
+
+    Raises:
+        InputError: a grid with fewer than two axes of more than one value.
+    """
+    cut = _cut(found, most, edge is None or at_least is not None)
+    panels, n = _panels(found), len(cut.picked)
+    size = (0.9 + 2.9 * n, 0.7 + _height(cut) * len(panels))
+    with figure(path, len(panels), n, sharex=True, sharey=True, figsize=size) as axes:
+        for row, panel in zip(axes, panels, strict=True):
+            shown = _colours(cut, row, panel)
+            # at the left of their places panels leave room for their labels, however wide they get
+            bar = row[0].figure.colorbar(
+                shown, ax=list(row), panchor=False, shrink=0.9, label=panel.label, **panel.bar
+            )
+            bar.minorticks_off()
+            row[0].set_ylabel(f"{found.axis_names[cut.high]} [{cut.unit}]")
+            if panel.elastic:
+                _stripes(cut, row)
+        if edge is not None:
+            _dots(axes, cut, edge, at_least)
+        for k, ax in zip(cut.picked, axes[0], strict=True):
+            at = cut.per_metre * found.axes[cut.across][k]
+            ax.set_title(f"{found.axis_names[cut.across]} = {at:.4g} {cut.unit}")
+        for ax in axes[-1]:
+            ax.set_xlabel(f"{found.axis_names[cut.wide]} [{cut.unit}]")
+        words = _UNBROKEN.sub(_on_one_line, "; ".join(_words(cut, edge, at_least)))
+        title = [found.robot.name, *textwrap.wrap(words, int(_LETTERS * size[0]))]
+        axes[0, 0].figure.suptitle("\n".join(title), fontsize=9)
+
+
+def _on_one_line(vector: re.Match[str]) -> str:
+    return vector[0].replace(" ", "\N{NO-BREAK SPACE}")
+
+
+@dataclass(frozen=True, eq=False)
+class _Cut:
+    """Slices of a map.
+
+    Attributes:
+        found: the map.
+        across, wide, high: the axis normal to the slices, and those of their panels.
+        picked: (k,) indices of the slices along the first of these.
+        slices: indices of the poses of each.
+        unit, per_metre: for the axes.
+        outlined: whether a line is drawn between the poses that can be held and the others.
+    """
+
+    found: Workspace
+    across: int
+    wide: int
+    high: int
+    picked: NDArray[np.intp]
+    slices: list[NDArray[np.intp]]
+    unit: str
+    per_metre: float
+    outlined: bool
+
+    @property
+    def poses(self) -> NDArray[np.intp]:
+        """Indices of all poses that are drawn."""
+        return np.concatenate([number.ravel() for number in self.slices])
+
+    def inside(self) -> list[Array]:
+        """Margins of each slice, for the contour at zero between them.
+
+        An infinite margin does not say where between two poses the contour is, nor does that of
+        cables which hold a pose loosely, zero; both are replaced by a typical value. Where margins
+        only tell yes or no, it is half way between.
+        """
+        found = self.found
+        if _yes_or_no(found):
+            sides = np.where(found.feasible, 1.0, -1.0).ravel()
+            return [sides[one] for one in self.slices]
+        inside = np.where(found.feasible, np.maximum(found.margin, 0.0), found.margin).ravel()
+        known = np.abs(inside[np.isfinite(inside) & (inside != 0.0)])
+        far = float(np.median(known)) if len(known) else 1.0
+        inside = np.nan_to_num(inside, posinf=far, neginf=-far)
+        if np.any(inside > 0.0):
+            inside = np.where(found.feasible.ravel() & (inside == 0.0), far, inside)
+        return [inside[one] for one in self.slices]
+
+    def with_dots(self, edge: Array) -> list[NDArray[np.bool_]]:
+        """Whether each pose of the edge lies in each slice, that is, between two poses of it."""
+        axis = self.found.axes[self.across]
+        # along axes of its own a place has rounding
+        least = 1e-9 if self.found.directions is None else self.found.robot.reach
+        near = 1e-9 * max(float(np.ptp(axis)), least)
+        across = self.found.along_axes(edge[:, :3])[:, self.across]
+        return [np.abs(across - axis[k]) <= near for k in self.picked]
+
+
+def _cut(found: Workspace, most: int, outlined: bool) -> _Cut:
+    """At most so many slices of a map."""
+    lengths = [len(axis) for axis in found.axes]
+    if sum(n > 1 for n in lengths) < 2:
+        raise InputError("a figure of a map needs at least two axes with more than one value")
+    across = across_of(found)
+    wide, high = (k for k in range(3) if k != across)
+    picked = np.unique(np.linspace(0, lengths[across] - 1, most + 2).round().astype(int)[1:-1])
+    number = np.arange(found.margin.size).reshape(lengths)
+    slices = [np.take(number, k, across) for k in picked]
+    metres = max(float(np.ptp(axis)) for axis in found.axes) > _LARGE
+    unit = ("m", 1.0) if metres else ("mm", 1e3)
+    return _Cut(found, across, wide, high, picked, slices, *unit, outlined)
+
+
+def _height(cut: _Cut) -> float:
+    """Height of a row of panels [inch]: that of flat slices, and of the bar beside them."""
+    wide, high = (float(np.ptp(cut.found.axes[k])) for k in (cut.wide, cut.high))
+    return float(np.clip(_ROOM + _PANEL * high / wide, _LOWEST, _HIGHEST))
+
+
+def _words(cut: _Cut, edge: Array | None, at_least: float | None) -> Iterator[str]:
+    """What is not drawn, and the colours and dots that no colour bar explains."""
+    shown, whole = len(cut.picked), len(cut.found.axes[cut.across])
+    if shown < whole:
+        yield f"{shown} of {whole} values of {cut.found.axis_names[cut.across]}"
+    if cut.found.directions is not None:
+        yield directions_words(cut.found.directions)
+    yield from _white(cut)
+    yield from _without_end(cut)
+    if cut.found.rests.any():
+        yield "arrows: what is beyond a bar's end has its last colour"
+    dots = edge is not None and bool(np.any(cut.with_dots(edge)))
+    if (cut.outlined and any(map(_has_edge, cut.inside()))) or (dots and at_least is None):
+        yield "orange: the edge of the poses that tensions within the limits can hold"
+    if dots and at_least is not None:
+        yield f"white dots: the edge of the poses held with a probability of {at_least:g}"
+
+
+def _white(cut: _Cut) -> Iterator[str]:
+    """The meaning of cells without a colour of the scales, if there are any."""
+    found, shown, why = cut.found, cut.poses, []
+    if not _yes_or_no(found) and not found.feasible.ravel()[shown].all():
+        why.append("cannot be held (margin)")
+    if found.rests.any() and not (found.rests | found.free).ravel()[shown].all():
+        why.append("does not come to rest (below it)")
+    if why:
+        yield "white: " + ", or ".join(why)
+    if found.rests.any() and found.free.ravel()[shown].any():
+        yield "grey with stripes: balanced, but free to move"
+
+
+def _without_end(cut: _Cut) -> Iterator[str]:
+    """The meaning of margins beyond the colour bar, if there are any."""
+    margin = cut.found.margin.ravel()[cut.poses]
+    if not np.isposinf(margin).any():
+        return
+    if _yes_or_no(cut.found):
+        yield "where the platform can be held, cables can be tightened without limit"
+        return
+    larger = np.isfinite(margin) & (margin > _top_margin(cut.found))
+    also = "a larger margin, or " if larger.any() else ""
+    yield f"yellow, beyond the bar: {also}cables can be tightened without limit"
+
+
+def _yes_or_no(found: Workspace) -> bool:
+    """Whether margins only tell that poses can be held or not.
+
+    Those of robots with fewer cables than degrees of freedom are 0; and all are infinite if cables
+    can be tightened without limit everywhere.
+    """
+    held = found.margin[found.feasible]
+    few = found.robot.n_cables < found.robot.n_dof
+    return few or (len(held) > 0 and bool(np.isposinf(held).all()))
+
+
+def _dots(axes: Any, cut: _Cut, edge: Array, at_least: float | None) -> None:
+    """Draw the edge's poses (k, 7) on every panel of their slice."""
+    look = {"color": _EDGE, "markersize": 2.5} if at_least is None else _LIKELY
+    places = cut.per_metre * cut.found.along_axes(edge[:, :3])[:, [cut.wide, cut.high]]
+    for row in axes:
+        for ax, own in zip(row, cut.with_dots(edge), strict=True):
+            ax.plot(*places[own].T, ".", **look)
+
+
+@dataclass(frozen=True, eq=False)
+class _Panel:
+    """A quantity with its colours.
+
+    Attributes:
+        label: of its colour bar. values: (nx, ny, nz), NaN for no colour.
+        how: the colours, as ``pcolormesh`` takes them. bar: options of the colour bar.
+        elastic: whether it is of the elastic map.
+    """
+
+    label: str
+    values: Array
+    how: Mapping[str, Any]
+    bar: Mapping[str, Any]
+    elastic: bool = True
+
+
+def _panels(found: Workspace) -> list[_Panel]:
+    """What can be held and with which probability; then where the platform comes to rest."""
+    panels = [_held(found)]
+    if found.chance is not None:
+        how = {"vmin": 0.0, "vmax": 1.0, "cmap": "cividis"}
+        panels.append(_Panel("probability", found.chance.astype(float), how, {}, False))
+    if np.any(found.rests):
+        panels += [_slack(found), _deviation(found, "off the command [mm]", 1e3, found.deviation)]
+        if found.robot.turns:
+            panels.append(_deviation(found, "turned [°]", np.degrees(1.0), found.rotation))
+        panels.append(_softest(found))
+    return panels
+
+
+def _held(found: Workspace) -> _Panel:
+    """The margin where poses can be held; or only whether they can."""
+    if _yes_or_no(found):
+        from matplotlib.colors import ListedColormap
+        from matplotlib.ticker import FuncFormatter
+
+        said = FuncFormatter(lambda value, _: "yes" if value > 0.5 else "no")
+        how = {"vmin": -0.5, "vmax": 1.5, "cmap": ListedColormap([_NO, _YES])}
+        bar = {"ticks": [0, 1], "format": said}
+        return _Panel("can be held", found.feasible.astype(float), how, bar, False)
+    top = _top_margin(found)
+    # cells with NaN have no colour
+    margin = np.where(np.isposinf(found.margin), 2.0 * top, found.margin)
+    held = np.where(found.feasible, margin, np.nan)
+    how = {"vmin": 0.0, "vmax": top}
+    return _Panel("tension margin [N]", held, how, {"extend": "max"}, False)
+
+
+def _slack(found: Workspace) -> _Panel:
+    import matplotlib
+
+    m = found.robot.n_cables
+    shades = matplotlib.colormaps["viridis"].resampled(m + 1)
+    how = {"vmin": -0.5, "vmax": m + 0.5, "cmap": shades}
+    count = np.where(found.rests, found.slack, np.nan)
+    return _Panel("slack cables", count, how, {"ticks": np.arange(m + 1)})
+
+
+def _deviation(
+    found: Workspace, label: str, factor: float, vectors: NDArray[np.floating[Any]]
+) -> _Panel:
+    """Lengths of vectors (nx, ny, nz, 3) in units of people."""
+    values = factor * np.linalg.norm(vectors, axis=-1)
+    how = {"vmin": 0.0, "vmax": colour_end(found, values)}
+    return _Panel(label, values, how, {"extend": "max"})
+
+
+def _softest(found: Workspace) -> _Panel:
+    """The smallest stiffness, on a logarithmic scale: towards the edge it falls by decades."""
+    from matplotlib.colors import LogNorm
+    from matplotlib.ticker import FuncFormatter
+
+    ends = _soft_ends(found)
+    numbers = FuncFormatter(lambda value, _: f"{value:.12g}")
+    bar = {"extend": "both", "ticks": _ticks(*ends), "format": numbers}
+    label = "stiffness of the\nsoftest direction [N/m]"
+    return _Panel(label, _stiffness(found), {"norm": LogNorm(*ends)}, bar)
+
+
+def _top_margin(found: Workspace) -> float:
+    """Upper end of the colour bar of margins."""
+    held = found.margin[found.feasible]
+    finite = held[np.isfinite(held)]
+    half = float(np.median(finite)) if len(finite) else 0.0
+    return min(_top(finite), _OUTSTANDING * half) or 1.0
+
+
+def _stiffness(found: Workspace) -> Array:
+    """The stiffness of the softest direction (nx, ny, nz) [N/m], NaN where it is not positive."""
+    return np.where(found.rests & (found.stiffness > 0.0), found.stiffness, np.nan).astype(float)
+
+
+def _soft_ends(found: Workspace) -> tuple[float, float]:
+    """Ends of the colours of that stiffness, from poses that can be held, if there are any."""
+    stiffness = _stiffness(found)
+    for some in (stiffness[found.feasible], stiffness):
+        known = some[np.isfinite(some)]
+        if len(known):
+            low, high = (float(np.quantile(known, part)) for part in _ENDS)
+            wider = max(1.0, np.sqrt(_APART * low / high))
+            return low / wider, high * wider
+    return 1.0, 10.0
+
+
+def _ticks(low: float, high: float) -> Array:
+    """Round numbers between the ends of a logarithmic scale."""
+    from matplotlib.ticker import LogLocator, MaxNLocator
+
+    decades = np.log10(high / low)
+    some = (
+        MaxNLocator(5) if decades < 1.0
+        else LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2.0 else (1.0,))
+    )  # fmt: skip
+    ticks = np.asarray(some.tick_values(low, high))
+    return ticks[(ticks >= low) & (ticks <= high)]
+
+
+def _top(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.quantile(known, 0.95)) or 1.0 if len(known) else 1.0
+
+
+def _colours(cut: _Cut, row: Any, panel: _Panel) -> Any:
+    """Coloured cells of each slice, with the edge of the workspace on top."""
+    x, y = (cut.per_metre * cut.found.axes[k] for k in (cut.wide, cut.high))
+    shown = None
+    for ax, one, inside in zip(row, cut.slices, cut.inside(), strict=True):
+        shown = ax.pcolormesh(
+            x, y, panel.values.ravel()[one].T, **panel.how, shading="nearest",
+            rasterized=True,  # otherwise lines show between the cells of an SVG
+        )  # fmt: skip
+        if cut.outlined and _has_edge(inside):
+            ax.contour(x, y, inside.T, levels=[0.0], colors=_EDGE, linewidths=1.2)
+        ax.set_aspect("equal", anchor="W")
+        ax.grid(False)
+    return shown
+
+
+def _stripes(cut: _Cut, row: Any) -> None:
+    """Grey cells with stripes where the platform is free to move."""
+    import matplotlib
+    from matplotlib.colors import ListedColormap
+
+    x, y = (cut.per_metre * cut.found.axes[k] for k in (cut.wide, cut.high))
+    free = np.where(cut.found.free, 1.0, np.nan).ravel()
+    for ax, one in zip(row, cut.slices, strict=True):
+        if np.isfinite(free[one]).any():
+            with matplotlib.rc_context({"hatch.color": _STRIPES}):
+                ax.pcolor(
+                    x, y, free[one].T, cmap=ListedColormap([_FREE]), shading="nearest",
+                    hatch="/////", rasterized=True, zorder=0.5,
+                )  # fmt: skip
+
+
+def _has_edge(inside: Array) -> bool:
+    """Whether a slice has poses on both sides of the edge."""
+    return bool(inside.min() < 0.0 < inside.max())

@@ -1,0 +1,617 @@
+"""The page of a diagnosis: everything is on it, nothing is beside it, and the numbers are right."""
+
+from __future__ import annotations
+
+import base64
+import io
+import itertools
+import re
+import xml.etree.ElementTree as ElementTree
+from copy import copy
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import made_diagnoses as made
+import numpy as np
+import pytest
+from made_data import term
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from PIL import Image
+from written_pages import figures_of, text_of
+
+from crosscheck.diagnosis.path import ModelPath, Stage, drawn, magnification, views_of
+from crosscheck.diagnosis.result import Diagnosis, NotListed, Rival
+from crosscheck.diagnosis.words import removed, within_words
+from crosscheck.fit.least_squares.imitation import basis, imitated
+from crosscheck.fit.least_squares.problem import KINDS
+from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
+from crosscheck.inference.held_out import rms_by_block
+from crosscheck.inference.noise import Noise
+from crosscheck.preparation.prepare import noise_floor
+from crosscheck.show import error_map
+from crosscheck.show.cable_wall import Wall, draw_wall, length_changes, walls_of
+from crosscheck.show.candidates import candidate_rows, untried
+from crosscheck.show.diagnosis import checks, correlations, parameter_table
+from crosscheck.show.effect_figures import confusion_of, waterfall
+from crosscheck.show.error_map import failure_map
+from crosscheck.show.figures import keeping
+from crosscheck.show.page import render, write_page
+from seecr.effects import Terms, layout_of
+from seecr.errors import InputFileError
+from seecr.show.colours import AFTER, BEFORE, CALM
+from seecr.units import short, with_error
+
+pytestmark = pytest.mark.slow
+
+ALL = ("pulleys", "nothing", "unknown", "none", "position_only", "tensions_only", "one_angle")
+EVIL = '<script>alert("1")</script>&$x$'
+
+
+def diagnosis(name: str) -> Diagnosis:
+    found: Diagnosis = getattr(made, name)()
+    return found
+
+
+def path_of(found: Diagnosis) -> ModelPath:
+    assert found.path is not None
+    return found.path
+
+
+def ends_of(found: Diagnosis) -> tuple[Stage, Stage]:
+    """The model as it stood, and the last one of listed effects."""
+    return path_of(found).first, path_of(found).last
+
+
+def with_last(found: Diagnosis, **changes: Any) -> Diagnosis:
+    """A diagnosis whose last model is changed."""
+    *stages, last = path_of(found).stages
+    return replace(found, path=replace(path_of(found), stages=(*stages, replace(last, **changes))))
+
+
+@pytest.fixture
+def words_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures of a page are neither laid out nor drawn, which takes most of the time."""
+    monkeypatch.setattr(ConstrainedLayoutEngine, "execute", lambda *_args: None)
+    monkeypatch.setattr(Figure, "savefig", lambda *_args, **_named: None)
+
+
+_pages: dict[str, str] = {}
+
+
+def page(name: str) -> str:
+    if name not in _pages:
+        _pages[name] = render(diagnosis(name))
+    return _pages[name]
+
+
+@pytest.mark.parametrize(
+    ("name", "verdict", "heading"),
+    [
+        ("pulleys", "effects_found", "Effects found"),
+        ("nothing", "no_effect_missing", "No effect missing"),
+        ("unknown", "unknown_effect", "Unknown effect"),
+        ("none", "no_verdict", "No verdict"),
+    ],
+)
+def test_each_verdict_has_its_page(name: str, verdict: str, heading: str) -> None:
+    found = diagnosis(name)
+    assert found.verdict == verdict
+    seen = text_of(page(name))
+    assert heading in seen
+    assert found.reason in seen and "No verdict: " not in seen
+    for line in (*found.notes, *found.measure_further):
+        assert line in seen
+    for effect in found.missing:  # once
+        assert seen.count(effect.check) == 1 and effect.confirmation not in seen
+    for row in found.candidates:
+        assert re.search(rf"\b{row.effect}\b", seen)
+        assert str(row.why_not) in seen
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_the_page_needs_nothing_else(name: str) -> None:
+    text = re.sub(r'"data:[^"]*"', '"data:"', page(name))
+    figures = [re.sub(r"xmlns(:xlink)?=\S*|<!DOCTYPE.*?>", "", f, flags=re.S)
+               for f in figures_of(page(name))]  # fmt: skip
+    for part in (text, *figures):
+        assert "http" not in part
+        assert part.count("<script") == (part is text) and "<script src" not in part
+        assert "<link" not in part
+        assert "@import" not in part
+        links = re.findall(r'(?:href|src)="([^"]*)"', part)
+        assert all(link.startswith(("#", "data:")) for link in links), links
+        assert all(u.startswith("#") for u in re.findall(r"url\(([^)]*)\)", part))
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_figures_are_well_formed_and_say_what_they_show(name: str) -> None:
+    figures = figures_of(page(name))
+    assert len(figures) >= (0 if name == "none" else 3)
+    for figure in figures:
+        assert ElementTree.fromstring(figure).tag == "{http://www.w3.org/2000/svg}svg"
+    words = re.findall(r'<img alt="([^"]*)"', page(name))
+    assert len(words) == len(figures) and all(words)
+
+
+def test_the_same_diagnosis_gives_the_same_page() -> None:
+    assert render(diagnosis("pulleys")) == page("pulleys")
+
+
+def test_numbers_are_those_of_the_json() -> None:
+    found = diagnosis("pulleys")
+    document = found.as_json()
+    seen = text_of(page("pulleys"))
+    for kind in KINDS:
+        before = document["before"][kind.key]
+        held_out = document["missing"][0]["held_out"][kind.key]
+        assert f"{short(before * kind.factor)} {kind.unit}" in seen
+        assert f"{short(held_out * kind.factor)} {kind.unit}" in seen
+        assert f"noise {short(document['noise_floor'][kind.key] * kind.factor)}" in seen
+    radius = document["missing"][0]["parameters"]["radius_m"]
+    value, error = with_error(1e3 * radius["value"], 1e3 * radius["stderr"])
+    assert f"radius {value} ± {error} mm" in seen
+    assert document["missing"][0]["check"] in seen
+    assert f"Adding it {removed(document['missing'][0]['share_of_error_removed'])}; the" in seen
+
+
+@pytest.mark.parametrize("name", ["nothing", "unknown"])
+def test_nothing_is_called_missing_that_is_not_sure(name: str) -> None:
+    assert "Missing effects, in the order" not in page(name)
+    assert "the missing effect is" not in text_of(page("pulleys")).lower()
+
+
+def test_unknown_shows_where_structure_is_left() -> None:
+    found = diagnosis("unknown")
+    seen = text_of(page("unknown"))
+    assert found.where
+    assert "What the unexplained error depends on" in seen
+    for row in found.where:
+        assert str(row.against) in seen
+        assert row.bins[0].label in seen or len(row.bins) == 1
+    assert "not explained" in seen
+    # what was tried may be a part of the catalogue; inks are other ones on dark pages
+    assert "tried explains: an unknown effect is missing." in found.sentence
+    assert "Black:" not in seen and "Bracket: the range over these runs" in seen
+    assert "not explained" not in text_of(page("pulleys"))
+
+
+@pytest.mark.usefixtures("words_alone")
+def test_beside_something_unknown_probabilities_say_so() -> None:
+    found = diagnosis("pulleys")
+    assert "beside something unknown" not in text_of(page("pulleys")).lower()
+    unknown = replace(found, verdict=DiagnosisVerdict.UNKNOWN_EFFECT)
+    seen = text_of(render(unknown))
+    assert "Probability beside something unknown that it is missing: > 99 %" in seen
+    assert within_words(unknown) in seen and "probability beside something unknown" in seen
+
+
+def test_text_from_users_stays_text() -> None:
+    found = diagnosis("pulleys")
+    old = path_of(found).problem
+    robot = replace(old.robot, name=EVIL, cable_names=tuple(f"{EVIL}{k}" for k in range(4)))
+    data = replace(old.data, path=Path(EVIL.replace("/", "")))
+    problem = replace(old, robot=robot, data=data)
+    bad = NotListed(EVIL, EVIL, 0.0, Reason(Why.ALIKE, by=(EVIL,)))
+    text = render(
+        replace(
+            found,
+            path=replace(path_of(found), problem=problem),
+            sentence=EVIL,
+            notes=(EVIL,),
+            measure_next=(EVIL,),
+            candidates=(bad, *found.candidates),
+            missing=tuple(replace(f, check=EVIL) for f in found.missing),
+        )
+    )
+    assert text.count("<script") == 1  # ours, which sorts
+    seen = text_of(text)
+    assert seen.count(EVIL) >= 4  # sentence, note, next, why not
+    # a wall has 4 names, in lines of so many letters
+    assert seen.count(EVIL[:12]) - seen.count(EVIL) >= 8
+
+
+@pytest.mark.usefixtures("words_alone")
+def test_noise_that_was_assumed_and_noise_that_was_found_are_told_apart() -> None:
+    found = diagnosis("pulleys")
+    assumed = noise_floor(path_of(found).problem)
+    larger = {key: value and 18.0 * value for key, value in assumed.items()}
+    search = copy(path_of(found).search)
+    search.cache = {
+        key: replace(one, fit=replace(one.fit, noise=Noise(np.full(3, 18.0), np.zeros(3))))
+        for key, one in search.fitted.items()
+    }
+    path = replace(path_of(found), search=search)
+    seen = text_of(render(replace(found, floor=larger, path=path)))
+    assert "assumed noise position 0.030 mm" in seen
+    assert "estimated noise 0.540 mm" in seen
+    assert "the error that the estimated noise alone would give" in seen
+    assert "two standard deviations of the assumed noise" in seen
+    assert not re.search("as found|as it was", text_of(page("pulleys")))
+
+
+def test_letters_of_a_figure_that_is_kept_are_whole(tmp_path: Path) -> None:
+    with keeping(tmp_path):
+        waterfall(diagnosis("pulleys"))
+    (picture,) = tmp_path.glob("*.png")
+    with Image.open(picture) as kept:
+        edges = np.asarray(kept.convert("L"))[:, [0, 1, 2, -3, -2, -1]]
+    assert edges.min() == 255
+
+
+def test_the_scale_of_a_map_goes_on_where_errors_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    extends: list[str] = []
+    whole = Figure.colorbar
+
+    def told(figure: Figure, *args: Any, **named: Any) -> Any:
+        extends.append(named["extend"])
+        return whole(figure, *args, **named)
+
+    monkeypatch.setattr(Figure, "colorbar", told)
+    found = diagnosis("pulleys")
+    before, after = ends_of(found)
+    failure_map(path_of(found).problem, before, after)
+    monkeypatch.setattr(error_map, "_LARGEST", 100.0)
+    failure_map(path_of(found).problem, before, after)
+    assert extends == ["max", "neither"]
+
+
+@pytest.mark.parametrize("spread", [(0.01, 0.01, 1.0), (1.0, 0.01, 0.01), (1.0, 0.01, 1.0)])
+def test_the_title_above_a_narrow_map_is_whole(
+    spread: tuple[float, float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of poses one above the other the panel stood at the right, and its title beyond the edge."""
+    kept: list[Figure] = []
+    monkeypatch.setattr(error_map, "image", lambda figure, _words: kept.append(figure))
+    found = diagnosis("pulleys")
+    before, after = ends_of(found)
+    for stage in (before, after):
+        pose = stage.state.prediction.pose.copy()
+        pose[:, :3] = np.random.default_rng(1).uniform(size=(len(pose), 3)) * spread
+        monkeypatch.setitem(stage.state.prediction.kept, "pose", pose)
+    failure_map(path_of(found).problem, before, after)
+    failure_map(path_of(found).problem, before, before)
+    for figure in kept:
+        figure.draw_without_rendering()
+        figure.draw_without_rendering()  # as a page and its picture do
+        for axes in figure.axes:
+            for text in (axes.xaxis.label, axes.yaxis.label, axes._left_title):
+                box = text.get_window_extent()
+                assert box.x0 >= 0.0 and box.x1 <= figure.bbox.width, text
+                assert box.y0 >= 0.0 and box.y1 <= figure.bbox.height, text
+
+
+@pytest.mark.parametrize("spread", [(2.0, 0.0, 1.0), (1.0, 0.01, 1.0), (0.1, 0.1, 1.0)])
+@pytest.mark.parametrize("alone", [True, False])
+def test_the_colours_of_a_map_stand_beside_it_and_nothing_is_empty(
+    spread: tuple[float, float, float], alone: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A quarter of the picture was empty between a wide map and its colours."""
+    kept: list[Figure] = []
+    monkeypatch.setattr(error_map, "image", lambda figure, _words: kept.append(figure))
+    found = diagnosis("pulleys")
+    before, after = ends_of(found)
+    for stage in (before, after):
+        pose = stage.state.prediction.pose.copy()
+        pose[:, :3] = np.random.default_rng(1).uniform(size=(len(pose), 3)) * spread
+        monkeypatch.setitem(stage.state.prediction.kept, "pose", pose)
+    failure_map(path_of(found).problem, before, before if alone else after)
+    (figure,) = kept
+    figure.draw_without_rendering()
+    *panels, bar = figure.axes
+    wide = figure.get_figwidth()
+    gap = bar.get_position().x0 - max(panel.get_position().x1 for panel in panels)
+    assert 0.0 < gap * wide < 0.3
+    box = figure.get_tightbbox(figure._get_renderer())  # type: ignore[attr-defined]
+    assert wide - box.x1 < 0.2 and box.y0 < 0.2
+
+
+def test_partial_data_show_what_they_have() -> None:
+    position = text_of(page("position_only"))
+    assert "rms position error [mm]" in position
+    assert "orientation error" not in position
+    assert "Errors of the readings" in position
+    tension = text_of(page("tensions_only"))
+    assert "Errors of tension [N]" in tension
+    assert "position error" not in tension
+    assert "Arrows" not in tension
+    angle = text_of(page("one_angle"))
+    assert "angle ry" in angle
+    assert "Dots: the orientation error" in angle
+
+
+def test_the_wall_overlays_what_the_effect_accounts_for() -> None:
+    found = diagnosis("pulleys")
+    before, after = ends_of(found)
+    wall, tension = walls_of(path_of(found).problem, before, after)
+    left = wall.measured - wall.predicted
+    rms = np.sqrt(np.nanmean(left**2, axis=0))
+    assert np.all(rms < 2.0 * wall.noise)
+    assert np.all(np.sqrt(np.nanmean(wall.measured**2, axis=0)) > 20.0 * wall.noise)
+    assert np.nanstd(tension.measured - tension.predicted) < 1.1 * 0.03
+    nothing = diagnosis("nothing")
+    first, last = ends_of(nothing)
+    assert np.all(walls_of(path_of(nothing).problem, first, last)[0].predicted == 0.0)
+
+
+def test_cables_whose_tension_was_not_read_have_no_panels() -> None:
+    """Three of six rows were empty where three of six cables had load cells."""
+    found = diagnosis("pulleys")
+    problem, stages = path_of(found).problem, ends_of(found)
+    tensions = problem.data.tensions.copy()
+    tensions[:, 1::2] = np.nan
+    some = replace(problem, data=replace(problem.data, tensions=tensions))
+    whole, wall = walls_of(problem, *stages)[-1], walls_of(some, *stages)[-1]
+    assert wall.names == list(problem.robot.cable_names)[::2]
+    assert np.array_equal(wall.measured, whole.measured[:, ::2])
+    assert np.array_equal(wall.abscissae[0][1], whole.abscissae[0][1][:, ::2])
+    draw_wall(wall, BEFORE)
+
+
+def test_paid_out_is_the_commanded_change_within_a_run() -> None:
+    found = diagnosis("pulleys")
+    problem = path_of(found).problem
+    change = length_changes(problem, path_of(found).last.fit.state.prediction)
+    lengths = problem.robot.nominal_lengths(problem.data.command_pose)
+    assert np.isnan(change[0]).all()
+    assert change[1] == pytest.approx(lengths[1] - lengths[0])
+    starts = np.flatnonzero(problem.data.run_index[1:] != problem.data.run_index[:-1]) + 1
+    assert np.isnan(change[starts]).all()
+
+
+def test_the_confusion_map_holds_containments() -> None:
+    found = diagnosis("pulleys")
+    confusion = confusion_of(found)
+    assert confusion is not None
+    assert confusion.names[: confusion.listed] == ("pulley_radius",)
+    assert np.diag(confusion.part) == pytest.approx(1.0)
+    a, b = (confusion.names.index(n) for n in ("pulley_radius", "exit_point_error"))
+    assert confusion.part[a, b] > 0.9  # 12 points move cables as a sheave does
+    assert confusion.part[b, a] < 0.9
+    last = path_of(found).last.fit
+    assert confusion.part[a, a] == pytest.approx(imitated(last.jacobian, basis(last.jacobian)))
+    assert len(last.terms) == 1
+
+
+def test_rivals_are_named_and_framed() -> None:
+    found = diagnosis("pulleys")
+    rival = Rival("exit_point_error", layout_of("exit_point_error", made.robot()))
+    finding = replace(found.missing[0], rivals=(rival,))
+    assert finding.indistinguishable == (rival.name,)
+    assert {row["indistinguishable"] for row in finding.records()} == {rival.name}
+    seen = text_of(render(replace(found, missing=(finding,))))
+    assert "Indistinguishable on these data from exit_point_error" in seen
+    assert seen.index("+ pulley_radius or exit_point_error") < seen.index("Missing effects")
+
+
+def test_a_bound_and_a_blind_parameter_are_flagged() -> None:
+    found = diagnosis("pulleys")
+    finding = replace(found.missing[0], at_bound=np.array([True]), stderr=np.array([np.inf]))
+    ((_name, value, error, _unit, flags),) = parameter_table(finding).rows
+    assert flags.words == "at its bound, not determined by these data"
+    assert error == "undetermined" and float(value) != 0.0  # its bound
+    blind = replace(found.missing[0], stderr=np.array([np.inf]))
+    ((_name, value, _error, _unit, flags),) = parameter_table(blind).rows
+    assert flags.words == "not determined by these data" and value == ""
+    assert "at its bound" not in text_of(page("pulleys"))
+
+
+def test_correlated_parameters_go_by_the_names_that_tables_have() -> None:
+    found = diagnosis("pulleys")
+    robot, last = made.robot(), path_of(found).last
+    terms = Terms([*last.fit.terms, term(robot, "platform_mass", added_kg=0.1)])
+    alike = replace(last.fit, state=replace(last.fit.state, terms=terms))
+    vars(alike)["covariance"] = np.array([[1.0, 0.95], [0.95, 1.0]])
+    pairs = correlations(with_last(found, fit=alike), found.missing[0])
+    assert pairs == ["radius with added of platform_mass (0.950)"]
+
+
+def test_checks_tell_noise_from_structure() -> None:
+    good = {check.name: check.good for check in checks(diagnosis("pulleys"))}
+    assert good["size of the noise"] is True
+    assert good["something unknown"] is True
+    assert good["neighbouring rows"] is True
+    assert good["held-out runs"] is True
+    bad = {check.name: check.good for check in checks(diagnosis("unknown"))}
+    assert bad["something unknown"] is False
+    assert checks(diagnosis("none")) == []
+
+
+def test_candidates_say_what_they_would_need() -> None:
+    rows = {row["effect"][0]: row for row in candidate_rows(diagnosis("pulleys"))}
+    exit_points = rows["exit_point_error"]
+    assert exit_points["explains by itself"].part > 0.5
+    assert "mm" in exit_points["with a value of"]
+    assert "thermal_expansion" not in rows
+    assert any("thermal_expansion" in names for _why, names in untried(diagnosis("pulleys")))
+    assert "alone it explains" not in text_of(page("nothing"))
+
+
+def test_friction_would_need_a_friction_and_not_the_length_that_it_is_looked_for_with(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    friction = term(made.robot(), "exit_friction", friction=0.2, length_m=100.0)
+    monkeypatch.setattr(ModelPath, "alone", lambda _path, _name: (0.5, friction))
+    tried = NotListed("exit_friction", "rubs", 1.0, Reason(Why.IMPROBABLE))
+    (row,) = candidate_rows(replace(diagnosis("pulleys"), candidates=(tried,)))
+    assert row["with a value of"] == "friction = 0.200"
+
+
+def test_sizes_that_are_not_plausible_are_named_with_their_effect() -> None:
+    found = diagnosis("pulleys")
+    (sizes,) = (check for check in checks(found) if check.name == "sizes")
+    assert sizes.words.endswith("plausible sizes (pulley_radius)")
+    fit = path_of(found).last.fit
+    at_bound = replace(fit.state, terms=fit.terms.with_vector(fit.terms.lower))
+    stuck = with_last(found, fit=replace(fit, state=at_bound))
+    (sizes,) = (c for c in checks(stuck) if c.name == "sizes")
+    assert sizes.words.endswith("(pulley_radius); at its bound: pulley_radius")
+    assert sizes.good is False
+
+
+def test_blocks_are_the_runs_left_out() -> None:
+    found = diagnosis("pulleys")
+    problem, last = path_of(found).problem, path_of(found).last
+    runs = rms_by_block(problem, last.held_out, KINDS[0].key)
+    assert len(runs) == len(problem.data.runs)
+    count = np.array([(problem.data.run == name).sum() for name in problem.data.runs])
+    whole = np.sqrt((count * runs**2).sum() / count.sum())
+    assert whole == pytest.approx(last.held_out.rms["position_rms_m"])
+
+
+def test_arrows_fit_the_region() -> None:
+    found = diagnosis("pulleys")
+    problem, before = path_of(found).problem, path_of(found).first
+    factor = magnification(problem, before.state)
+    longest = factor * np.percentile(np.linalg.norm(before.state.raw[:, :3], axis=1), 98)
+    span = np.ptp(before.state.prediction.pose[:, :3], axis=0).max()
+    assert 0.04 * span < longest <= 0.13 * span
+    assert str(factor).rstrip("0").rstrip(".")[0] in "125"
+
+
+@pytest.mark.parametrize(
+    ("magnify", "words"),
+    [(1.0, "to scale"), (50.0, "at 50 times their length"), (0.5, "at 0.5 times their length")],
+)
+def test_arrows_say_how_long_they_are(magnify: float, words: str) -> None:
+    assert drawn(magnify) == words
+
+
+@pytest.mark.parametrize(
+    ("spans", "views"),
+    [
+        ((1.0, 0.6, 0.3), [(0, 1), (0, 2)]),
+        ((1.0, 0.0, 0.3), [(0, 2)]),
+        ((1.0, 0.5, 0.0), [(0, 1)]),
+        ((0.0, 1.0, 0.5), [(1, 2)]),
+        ((0.0, 0.0, 1.0), [(0, 2)]),
+        ((0.0, 0.0, 0.0), [(0, 2)]),
+    ],
+)
+def test_views_show_the_plane_of_a_flat_robot(
+    spans: tuple[float, ...], views: list[tuple[int, int]]
+) -> None:
+    corners = np.array([[0.0, 0.0, 0.0], spans])
+    assert views_of(corners) == views
+
+
+def test_many_rows_stay_small() -> None:
+    rng = np.random.default_rng(0)
+    n, m = 2000, 8
+    values = rng.standard_normal((n, m))
+    wall = Wall(
+        "many", [f"cable{k}" for k in range(m)], values, 0.5 * values, np.ones(m), "mm",
+        [(f"abscissa {k}", rng.uniform(size=(n, m))) for k in range(4)],
+    )  # fmt: skip
+    page_part = draw_wall(wall)
+    assert len(page_part) < 2_000_000
+    (text,) = figures_of(page_part)
+    images = re.findall(r'"data:image/png;base64,([^"]*)"', text)
+    assert len(images) == 32
+    for image in images:
+        drawn = np.asarray(Image.open(io.BytesIO(base64.b64decode(image))).convert("RGBA"))
+        assert np.mean(drawn[..., 3] > 128) > 0.02, "dots that nobody sees"
+
+
+def test_few_dots_are_drawn_as_what_they_are() -> None:
+    values = np.linspace(-1.0, 1.0, 7)[:, None]
+    wall = Wall("few", ["a"], values, 0.5 * values, np.ones(1), "mm", [("t", np.arange(7) * 1.0)])
+    (text,) = figures_of(draw_wall(wall))
+    dots = re.findall(r'd="((?:M [\d.]+ [\d.]+\s*L [\d.]+ [\d.]+\s*){7})"', text)
+    assert len(dots) == 2
+    assert "stroke-linecap: round" in text
+    assert "image/png" not in text
+
+
+@pytest.mark.parametrize(
+    ("unit", "beside"),
+    [
+        # one scale for all, beside the first column; else each panel has its own
+        ("mm", ["−5 0 5 a", "−5 0 5 b", ""]),
+        ("", ["−5 0 5 a two −5 0 5", "−0.1 0.0 0.1 b", "−0.1 0.0 0.1"]),
+    ],
+)
+def test_panels_of_a_wall_share_their_scales(unit: str, beside: list[str]) -> None:
+    values = np.outer(np.linspace(-1.0, 1.0, 7), [8.0, 0.1])
+    across = [("t", np.arange(7) * 1.0), ("l", np.outer(np.arange(7), [1.0, 10.0]))]
+    wall = Wall("two", ["a", "b"], values, 0.0 * values, np.full(2, 0.01), unit, across)
+    (text,) = figures_of(draw_wall(wall))
+    first, second, last = beside
+    # below the last row alone: the times, and the lengths of both rows
+    said = [first, "0 1 2 3 4 5 6 t", second, "0 10 20 30 40 50 60 l", last]
+    assert " ".join(re.findall(r">([^<\s]+)</text>", text)) == " ".join(said).strip()
+
+
+def test_a_wall_of_many_cables_shows_the_worst() -> None:
+    n, m = 5, 30
+    values = np.full((n, m), 0.1)
+    values[:, 17] = 9.0
+    names = [f"rope{k:02d}" for k in range(m)]
+    wall = Wall("many", names, values, 0.0 * values, np.ones(m), "mm", [("t", np.arange(n) * 1.0)])
+    (text,) = figures_of(draw_wall(wall))
+    assert text.count(">rope") == 12
+    assert "rope17" in text
+
+
+def test_names_of_cables_stay_on_the_page_and_numbers_of_panels_apart(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    kept: list[Figure] = []
+
+    def placed(figure: Figure, *_args: Any, **_named: Any) -> None:
+        figure.draw_without_rendering()
+        kept.append(figure)
+
+    monkeypatch.setattr(Figure, "savefig", placed)
+    names = ["winch_left_front_upper", "rightfrontlowercable", "a " * 40]
+    values = np.outer(np.linspace(0.15, 1.42, 7), np.ones(3))
+    across = [("t", values), ("l", 20.0 * (values - 1.0)), ("u", values), ("v", values)]
+    draw_wall(Wall("long", names, values, 0.0 * values, np.ones(3), "mm", across))
+    (figure,) = kept
+    panels = figure.axes
+    assert panels[0].get_ylabel() == "winch_left_\nfront_upper" and len(panels) == 12
+    assert panels[8].get_ylabel().endswith("…")
+    assert min(a.yaxis.label.get_window_extent().x0 for a in panels[::4]) > 0.0
+    numbers = [
+        label.get_window_extent()
+        for axes in panels[8:]
+        for label in axes.get_xticklabels()
+        if label.get_text() and axes.get_xlim()[0] <= label.get_position()[0] <= axes.get_xlim()[1]
+    ]
+    assert all(one.x1 + 3.0 < other.x0 for one, other in itertools.pairwise(numbers))
+
+
+@pytest.mark.usefixtures("words_alone")
+def test_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    path = tmp_path / "diagnosis.html"
+    write_page(diagnosis("none"), path)
+    assert path.read_text(encoding="utf-8") == render(diagnosis("none"))
+    assert list(tmp_path.iterdir()) == [path]
+    with pytest.raises(InputFileError, match=r"gone/d.html: cannot write the page: No such"):
+        write_page(diagnosis("none"), tmp_path / "gone" / "d.html")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(InputFileError, match="folder: cannot write the page"):
+        write_page(diagnosis("none"), tmp_path / "folder")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["diagnosis.html", "folder"]
+
+
+def test_pages_are_small() -> None:
+    assert all(len(page(name).encode()) < 2_000_000 for name in ALL)
+
+
+def test_nothing_missing_is_not_drawn_in_the_colour_of_alarm() -> None:
+    *calm, _confusion = figures_of(page("nothing"))  # which frames what imitates what
+    assert len(calm) > 2 and not any(BEFORE.lower() in figure.lower() for figure in calm)
+    alarming = figures_of(page("unknown"))[0].lower()
+    assert BEFORE.lower() in alarming and CALM.lower() not in alarming
+
+
+@pytest.mark.parametrize(("name", "models"), [("pulleys", 2), ("nothing", 1)])
+def test_where_an_axis_has_no_zero_there_are_dots_and_no_bars(name: str, models: int) -> None:
+    (figure,) = figures_of(waterfall(diagnosis(name)))
+    logarithmic = text_of(figure).count("logarithmic")
+    fills = rf'<path d="M [^"]*z\s*"[^>]*style="fill: (?:{BEFORE}|{CALM}|{AFTER})'
+    bars = len(re.findall(fills, figure, re.IGNORECASE))
+    assert bars == models * (3 - logarithmic)
+    assert (logarithmic > 0) == (name == "pulleys")
