@@ -122,7 +122,7 @@ TRADE = {
     # what people type: files of commands and readings (in Python crosscheck.load_commands), numbers
     "seecr.columns.commands": {"read_commands"},
     "seecr.workspace.grid": {"own_directions"},
-    "seecr.columns.reach": {"ABSURD"},
+    "seecr.columns.plausible": {"ABSURD", "scalar_last"},
     "seecr.description.mjcf": {"CABLES"},
     "seecr.pose": {"NORM_TOLERANCE"},
     "seecr.statics.starts": {"commanded_poses"},

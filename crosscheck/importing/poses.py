@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from crosscheck.importing.logs import Logged, Stream, unit_quaternions
-from crosscheck.measurements.sentinels import is_nines
+from crosscheck.measurements.plausible import is_nines
 from seecr.columns.commands import began, times_of_day
 from seecr.columns.csv import Table, read_table, show
 from seecr.counted import counted, some

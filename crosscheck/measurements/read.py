@@ -27,7 +27,7 @@ from crosscheck.measurements.data import (
     parse_quantity,
 )
 from crosscheck.measurements.dwells import averaged_dwells
-from crosscheck.measurements.notice import notice, twice
+from crosscheck.measurements.plausible import check_readings, twice
 from seecr.columns.commands import CHOICES, began, choice, known_loads, runs, temperatures, times
 from seecr.columns.csv import read_table
 from seecr.columns.known import POSITION, Columns, know_columns
@@ -527,7 +527,7 @@ def _load(columns: Columns, robot: Robot, sigma_path: str | Path | None) -> Meas
         line=columns.table.line,
         unused_columns=columns.unused,
     )
-    notes = [*columns.notes, *_way_points(data), *notice(columns, robot, data)]
+    notes = [*columns.notes, *_way_points(data), *check_readings(columns, robot, data)]
     return replace(data, notes=tuple(notes))
 
 

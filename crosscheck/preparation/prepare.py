@@ -17,11 +17,7 @@ from crosscheck.measurements.data import Measurements
 from crosscheck.preparation.fitness import refusal_of
 from crosscheck.preparation.freed import freed
 from crosscheck.preparation.parts import groups_of, laid_out
-from crosscheck.preparation.suspect_data.another_robot import another_robot_doubts
-from crosscheck.preparation.suspect_data.conventions import Misread, misread_orientations
-from crosscheck.preparation.suspect_data.exchanged_columns import exchange_doubts
-from crosscheck.preparation.suspect_data.stuck import stuck_doubts
-from crosscheck.preparation.suspect_data.tension_unit import tension_doubts
+from crosscheck.preparation.suspect import filled_in_note, suspicions, without_constants
 from seecr.description.robot import Robot
 from seecr.effects import Terms, catalogue
 from seecr.equilibrium.solving import strained
@@ -32,9 +28,6 @@ Progress = Callable[[str, float], None]
 
 Finder = Callable[[Problem, Terms], NDArray[np.bool_]]
 """Called with the data and the model as it stands; returns which rows (n,) are outliers."""
-
-# What a pose consists of, in words.
-_PARTS = ("x", "y", "z", *(f"rotation about {axis}" for axis in "xyz"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +82,7 @@ def prepare(
         )
     laid = laid_out(data, terms)
     plain = problem.experiment.predict(laid.terms.effects)
-    problem = _solved_rows(problem, plain)
+    problem, constants = without_constants(_solved_rows(problem, plain), plain)
     problem, estimates = estimate_sigma(problem, plain)
     found = freed(problem, laid)
     terms, said = found.terms, (*laid.notes, *found.notes)
@@ -101,55 +94,24 @@ def prepare(
     if far_off is not None and far_off.any() and estimates:
         others, estimates = estimate_sigma(problem.only(~far_off).with_sigma(data.sigma), plain)
         problem = problem.with_sigma(others.sigma)
-    misread = misread_orientations(problem, plain.readings)
-    odd = [
-        *([misread.words] if misread is not None and not misread.certain else []),
-        *another_robot_doubts(problem, plain.readings),
-        *stuck_doubts(problem, plain.pose[:, :3]),
-        *tension_doubts(problem, plain),
-        *exchange_doubts(problem, plain),
-        *oversized(problem, plain),
-    ]
+    asked, odd = suspicions(problem, plain)
     notes = (
         *robot.notes,
         *strained(robot),
         *data.notes,
-        *_filled_in(problem),
-        *odd,
+        *filled_in_note(problem),
+        *constants,
+        *asked,
+        *oversized(problem, plain),
         *problem.left_out,
         *estimates,
         *said,
     )
     problem = problem.with_groups(groups_of(data, terms))
-    refusal = refusal_of(problem, plain.pose[:, :3], data.sigma) or _refused(misread, problem)
+    refusal = refusal_of(problem, plain.pose[:, :3], data.sigma) or odd
     return Prepared(
         problem, terms, notes, blocks_note(problem), refusal, int(found.free.sum()), far_off
     )
-
-
-def _refused(found: Misread | None, problem: Problem) -> Refusal | None:
-    """A refusal if orientations are of another convention: what is off then is no effect."""
-    if found is None or not found.certain:
-        return None
-    return Refusal(
-        Unfit.OTHER_CONVENTION,
-        problem.data.n_rows,
-        off=found.off,
-        left=found.left,
-        convention=found.convention.value,
-        file=f" of {found.file}" if found.file else "",
-    )
-
-
-def _filled_in(problem: Problem) -> list[str]:
-    """A note about parts of the pose that nothing read."""
-    names = [name for name, is_filled in zip(_PARTS, problem.filled_in, strict=True) if is_filled]
-    if not names:
-        return []
-    return [
-        f"{', '.join(names)}: not counted as readings, because the joints allow no such motion and "
-        "the file has the same number in every row"
-    ]
 
 
 def _solved_rows(problem: Problem, plain: Prediction) -> Problem:

@@ -184,9 +184,9 @@ def notes_of(
         commands: as given; None for poses without times and temperatures.
     """
     from seecr import Commands
+    from seecr.columns.plausible import scalar_last
     from seecr.effects.base import unfed
     from seecr.equilibrium.solving import strained, strained_rows
-    from seecr.show.pose_words import scalar_last
 
     robot = solution.robot
     much = (*strained(robot), *strained_rows(solution))
@@ -251,7 +251,7 @@ def check_places(places: ArrayLike, robot: Robot) -> None:
     import numpy as np
 
     from seecr import InputError
-    from seecr.columns.reach import ABSURD
+    from seecr.columns.plausible import ABSURD
 
     array = np.asarray(places, float).reshape(-1, 3)
     far = ~(np.abs(array - robot.reference_pose[:3]) <= ABSURD * robot.reach)

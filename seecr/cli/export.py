@@ -73,7 +73,7 @@ def command(
     out.parent.mkdir(parents=True, exist_ok=True)
     files = {out: found.text} | ({beside: found.mujoco_text} if found.mujoco_text else {})
     write_texts(files, "cannot write the MJCF")
-    from seecr.show.pose_words import scalar_last
+    from seecr.columns.plausible import scalar_last
 
     slip = scalar_last(machine, coordinates[3:])
     notes = [*machine.notes, *(own.notes if own else ()), *slip]

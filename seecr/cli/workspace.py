@@ -119,12 +119,12 @@ def command(
     import numpy as np
 
     from seecr import boundary, default_axes, workspace_map
+    from seecr.columns.plausible import scalar_last
     from seecr.equilibrium.solving import strained
     from seecr.files import json_text, staged, write_text
     from seecr.show.batch_words import beyond_line
     from seecr.show.files import write_arrays
     from seecr.show.map_figure import map_figure
-    from seecr.show.pose_words import scalar_last
     from seecr.workspace.grid import own_directions
 
     machine = robot_at(robot, cable)

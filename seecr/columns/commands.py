@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from seecr.columns.csv import Table, read_table, show
 from seecr.columns.known import ANGLES, POSITION, QUATERNION, Columns, know_columns
+from seecr.columns.plausible import check_commands
 from seecr.columns.poses import aimed_poses, command_lengths, command_poses
-from seecr.columns.reach import check_reach
 from seecr.commands import Commands, Loads
 from seecr.description.robot import Robot
 from seecr.errors import InputFileError
@@ -352,7 +352,7 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
         poses, wanted = command_poses(columns, robot), None
     else:
         poses, wanted = aimed_poses(columns, robot)
-    check_reach(columns, robot, poses, lengths)
+    check_commands(columns, robot, poses, lengths)
     told, stands = _beside(path.with_suffix(".toml"))
     commands = Commands(
         pose=poses,

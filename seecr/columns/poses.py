@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.columns.angles import refuse_degrees
 from seecr.columns.known import ANGLES, POSITION, QUATERNION, Columns
+from seecr.columns.plausible import refuse_degrees
 from seecr.description.joints import pose_of_values
 from seecr.pose import NORM_TOLERANCE, Array, quat_from_rxyz, rxyz_from_quat
 

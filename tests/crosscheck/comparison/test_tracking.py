@@ -79,7 +79,7 @@ def test_only_what_was_wanted_and_read_counts() -> None:
     assert place.rows == readings().n_rows and place.max == pytest.approx(
         3e-3 * (readings().n_rows - 2)
     )
-    angles = np.tile([0.1, np.nan, np.nan], (readings().n_rows, 1))
+    angles = np.outer((-1.0) ** np.arange(readings().n_rows), [0.1, np.nan, np.nan])
     level = np.tile([np.nan, np.nan, np.nan, 1.0, 0.0, 0.0, 0.0], (readings().n_rows, 1))
     (turn,) = tracked(level, quat_wxyz=None, angles_rad=angles).away
     assert turn.kind == "orientation" and turn.rms == pytest.approx(0.1)

@@ -10,7 +10,7 @@ from made_columns import columns_of
 from rectangle import RECTANGLE
 
 from crosscheck.measurements.data import Measurements
-from crosscheck.measurements.degrees import refuse_followed_in_degrees
+from crosscheck.measurements.plausible import check_readings
 from crosscheck.measurements.read import load_commands, load_measurements
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
@@ -69,7 +69,7 @@ def read_as(
         pose[:, 3:] = told
     data = Measurements(Path("a.csv"), robot.n_cables, np.full(len(rows), "a"), command_pose=pose)
     try:
-        refuse_followed_in_degrees(columns, robot, data)
+        check_readings(columns, robot, data)
     except InputFileError as error:
         return str(error)
     return ""

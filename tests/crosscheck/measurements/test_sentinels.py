@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 from made_columns import columns_of
 from rectangle import RECTANGLE
 
-from crosscheck.measurements.sentinels import refuse_sentinels
+from crosscheck.measurements.data import Measurements
+from crosscheck.measurements.plausible import check_readings
 from seecr.errors import InputFileError
 
 REMEDY = "; leave the cells empty where nothing was read"
@@ -14,8 +18,11 @@ REMEDY = "; leave the cells empty where nothing was read"
 
 def refusal(name: str, *cells: str) -> str:
     """What is said of a column, "" if nothing is."""
+    columns = columns_of(f"note,{name}", *(f"x,{c}" for c in cells))
+    pose = np.tile(RECTANGLE.reference_pose, (len(cells), 1))
+    data = Measurements(Path("a.csv"), 4, np.full(len(cells), "a"), command_pose=pose)
     try:
-        refuse_sentinels(columns_of(f"note,{name}", *(f"x,{c}" for c in cells)), RECTANGLE)
+        check_readings(columns, RECTANGLE, data)
     except InputFileError as error:
         return str(error)
     return ""
@@ -79,5 +86,5 @@ def test_nines_count_in_the_unit_of_the_column() -> None:
 
 
 def test_other_columns_are_not_looked_at() -> None:
-    assert refusal("cmd_x_m", *["99999"] * 4) == ""
+    assert "expected reading" not in refusal("cmd_x_m", *["99999"] * 4)
     assert refusal("t_s", *["99999"] * 4) == ""

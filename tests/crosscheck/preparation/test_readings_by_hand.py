@@ -14,8 +14,7 @@ from crosscheck.fit.least_squares.problem import Problem
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.preparation.fitness import commands_table
 from crosscheck.preparation.parts import groups_of, laid_out, names_in
-from crosscheck.preparation.suspect_data.another_robot import another_robot_doubts
-from crosscheck.preparation.suspect_data.tension_unit import other_tensions
+from crosscheck.preparation.suspect import suspicions
 from seecr.commands import Loads
 from seecr.effects import ApartLayout, Own, Terms, Values
 from seecr.effects.base import Readings
@@ -43,21 +42,26 @@ def predicted(off_m: float = 0.0, pull: float = 1.0) -> Readings:
     return Readings(moved, of.quat_wxyz.copy(), pull * of.tensions)
 
 
+def doubts(of: Problem, readings: Readings) -> list[str]:
+    """What is asked about the data where a model predicts these readings."""
+    return suspicions(of, replace(of.experiment.predict(()), readings=readings))[0]
+
+
 def test_a_model_that_explains_the_readings_raises_no_doubts() -> None:
-    assert another_robot_doubts(problem(), predicted()) == []
+    assert doubts(problem(), predicted()) == []
 
 
 def test_a_model_farther_off_than_the_commands_is_doubted_with_both_distances() -> None:
     """A metre along one of three axes: 577.4 mm rms over all."""
-    (said,) = another_robot_doubts(problem(), predicted(off_m=1.0))
+    (said,) = doubts(problem(), predicted(off_m=1.0))
     assert said.startswith("The model is 577 mm from the measured positions, the commands")
     few = Problem(ROBOT, data(), SIGMA, np.arange(data().n_rows) < 3)
-    assert another_robot_doubts(few, predicted(off_m=1.0)) == []
+    assert doubts(few, predicted(off_m=1.0)) == []
 
 
 @pytest.mark.parametrize(("pull", "doubted"), [(19.0, 0), (21.0, 1), (1 / 19.0, 0), (1 / 21.0, 1)])
 def test_tensions_twenty_times_as_large_are_of_another_unit(pull: float, doubted: int) -> None:
-    said = other_tensions(problem(), problem().residuals(predicted(pull=pull)))
+    said = doubts(problem(), predicted(pull=pull))
     assert len(said) == doubted and all("is it another unit" in one for one in said)
 
 
@@ -69,7 +73,7 @@ def test_of_several_files_the_doubted_one_is_named() -> None:
     )
     readings = predicted()
     readings.position[number == 1] += [1.0, 0.0, 0.0]
-    (said,) = another_robot_doubts(problem(two), readings)
+    (said,) = doubts(problem(two), readings)
     assert said.startswith("two.csv: The model is 577 mm from the measured positions")
 
 

@@ -12,6 +12,7 @@ import seecr
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.preparation.thinned import thinned
 from seecr.effects import Term, Terms
+from seecr.pose import quat_from_rotvec
 from seecr.prediction.experiment import Experiment
 
 ROBOT = seecr.load_robot(seecr.model_path("demobot_cogiro"))
@@ -129,6 +130,16 @@ def test_rows_far_off_are_no_part_of_what_is_told_of_the_others() -> None:
     far = found.others[1::100].sum()
     assert far > 8 and "predicted to 0.1" in said
     assert said.endswith(f", except for {far} outliers")
+
+
+def test_what_was_filled_in_is_no_part_of_what_is_told_of_the_others() -> None:
+    plain = stream()
+    tilted = plain.command_pose.copy()
+    tilted[:, 3:] = quat_from_rotvec(np.outer(np.sin(np.arange(ROWS) / 20.0), [0.05, 0.03, 0.02]))
+    plain = replace(plain, command_pose=tilted)
+    level = replace(plain, quat_wxyz=np.tile([1.0, 0.0, 0.0, 0.0], (ROWS, 1)))
+    said = [thinned(ROBOT, one, 120).note_on_others(PLAIN, NOISE) for one in (plain, level)]
+    assert said[0] == said[1] and "deg" not in said[0][0]
 
 
 @pytest.mark.slow

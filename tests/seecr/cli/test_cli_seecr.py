@@ -16,10 +16,10 @@ from click.testing import CliRunner, Result
 from seecr.cli import COMMANDS, main
 from seecr.cli.arguments import robot_at
 from seecr.columns.commands import read_commands
+from seecr.columns.plausible import scalar_last
 from seecr.description.mjcf import load_robot, model_path
 from seecr.equilibrium.solving import solve
 from seecr.pose import transform_points
-from seecr.show.pose_words import scalar_last
 from seecr.workspace.planar import midline_point
 
 PLACE = ["0.17", "0.25", "0.1"]

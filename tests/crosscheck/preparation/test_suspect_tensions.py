@@ -14,9 +14,9 @@ from made_data import measured, soft_cogiro, term
 import crosscheck
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import together
+from crosscheck.preparation.exchanged import Pulls
 from crosscheck.preparation.prepare import prepare
-from crosscheck.preparation.suspect_data.pulls import Pulls
-from crosscheck.preparation.suspect_data.tension_unit import unit_of
+from crosscheck.preparation.suspect import unit_of
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.effects import Terms
@@ -136,5 +136,5 @@ def test_a_unit_needs_rows_that_agree() -> None:
 def test_the_carried_part_is_one_where_tensions_are_as_expected() -> None:
     ready = prepare(COGIRO, read_of(), Terms()).problem
     at = ready.experiment.predict(())
-    part = Pulls(ready, at).carried()
+    part = Pulls.of(ready, at).carried()
     np.testing.assert_allclose(part, 1.0, atol=0.1)

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from made_columns import columns_of
 from rectangle import RECTANGLE
 
-from crosscheck.measurements import notice
 from crosscheck.measurements.data import Measurements
+from crosscheck.measurements.plausible import check_readings, twice
 from crosscheck.measurements.read import load_measurements
-from seecr.columns.known import Columns
 from seecr.description.mjcf import load_robot, model_path
 from seecr.errors import InputFileError
 from seecr.pose import quat_from_rotvec, quat_multiply
@@ -30,36 +29,42 @@ def poses(**along: np.ndarray) -> np.ndarray:
     return out
 
 
-def data_of(told: np.ndarray, **read: Any) -> Measurements:
+def notes_on(
+    told: np.ndarray, unit: str = "m", free: tuple[str, ...] = (), **read: np.ndarray
+) -> list[str]:
+    """What is said of readings in SI units, such as ``position`` (n, 3), in columns of a unit."""
+    tables = {
+        "position": [f"meas_{axis}_{unit}" for axis in "xyz"],
+        "quat_wxyz": ["meas_qw", "meas_qx", "meas_qy", "meas_qz"],
+    }
+    header = ",".join(name for table in read for name in tables[table])
+    scale = {"m": 1.0, "mm": 1e3}[unit]
+    values = np.hstack([scale * read[k] if k == "position" else read[k] for k in read])
+    rows = [",".join("" if np.isnan(v) else f"{v:.12g}" for v in row) for row in values]
     run = np.full(len(told), "a")
-    return Measurements(path=Path("a.csv"), n_cables=4, run=run, command_pose=told, **read)
-
-
-def positions(unit: str = "m") -> Columns:
-    return columns_of(",".join(f"meas_{c}_{unit}" for c in "xyz"), *["0,0,0"] * 5, n_cables=4)
+    data = Measurements(Path("a.csv"), 4, run, command_pose=told, free=free, **read)  # type: ignore[arg-type]
+    return check_readings(columns_of(header, *rows, n_cables=4), RECTANGLE, data)
 
 
 def test_readings_that_run_against_the_commands_are_of_a_mirrored_axis() -> None:
     told = poses(x=WAY, y=WAY[[2, 0, 4, 1, 3]])
     mirrored = told[:, :3] * [1.0, -1.0, 1.0]
-    (note,) = notice._mirrored(positions("mm"), RECTANGLE, data_of(told, position=mirrored))
+    (note,) = notes_on(told, "mm", position=mirrored)
     assert note.startswith("Column meas_y_mm goes against the commands along y: is its sign the")
     turned = told[:, :3] * [-1.0, -1.0, 1.0] + [0.3, 0.0, 0.0]
-    (note,) = notice._mirrored(positions(), RECTANGLE, data_of(told, position=turned))
+    (note,) = notes_on(told, position=turned)
     assert note.startswith(
         "Columns meas_x_m meas_y_m go against the commands along x and y: are their "
     )
-    for read in (
-        told[:, :3],  # as it should be
-        told[:, :3] * [1.0, -0.4, 1.0],  # not as far
-        mirrored + np.outer([0.1, -0.1, 0.0, -0.1, 0.1], [0.0, 1.0, 0.0]),  # hardly so
-    ):
-        assert notice._mirrored(positions(), RECTANGLE, data_of(told, position=read)) == []
     still = poses(x=WAY, y=0.01 * WAY)
-    read = still[:, :3] * [1.0, -1.0, 1.0]
-    assert notice._mirrored(positions(), RECTANGLE, data_of(still, position=read)) == []
-    free = data_of(told, position=mirrored, free=("tracker_frame",))
-    assert notice._mirrored(positions(), RECTANGLE, free) == []
+    for pose, read in (
+        (told, told[:, :3]),  # as it should be
+        (told, told[:, :3] * [1.0, -0.4, 1.0]),  # not as far
+        (told, mirrored + np.outer([0.1, -0.1, 0.0, -0.1, 0.1], [0.0, 1.0, 0.0])),  # hardly so
+        (still, still[:, :3] * [1.0, -1.0, 1.0]),
+    ):
+        assert not any("against the commands" in note for note in notes_on(pose, position=read))
+    assert notes_on(told, free=("tracker_frame",), position=mirrored) == []
 
 
 def test_a_mirrored_axis_is_noted_when_a_file_is_read(tmp_path: Path) -> None:
@@ -77,12 +82,11 @@ def test_readings_that_spread_a_hundred_times_as_far_are_in_another_unit(
     told = poses(x=WAY, y=WAY)
     for times, odd in ((101.0, True), (99.0, False)):
         read = HOME[:3] + times**power * (told[:, :3] - HOME[:3])
-        data = data_of(told, position=read)
         if odd:
             with pytest.raises(InputFileError, match=f"such as meas_x_{unit}$"):
-                notice._check_spread(positions(), RECTANGLE, data)
+                notes_on(told, position=read)
         else:
-            notice._check_spread(positions(), RECTANGLE, data)
+            notes_on(told, position=read)
 
 
 def test_one_axis_in_another_unit_is_named_if_it_was_meant_to_move() -> None:
@@ -90,54 +94,50 @@ def test_one_axis_in_another_unit_is_named_if_it_was_meant_to_move() -> None:
     read = told[:, :3].copy()
     read[:, 1] = HOME[1] + 1e-3 * WAY
     with pytest.raises(InputFileError, match=r"column meas_y_m: positions were .*_m$"):
-        notice._check_spread(positions(), RECTANGLE, data_of(told, position=read))
+        notes_on(told, position=read)
     # a mean distance of 0.12 m, of which a frame of 5 m asks for 0.1
     still = poses(x=WAY, y=0.8 * WAY)
     read = still[:, :3].copy()
     read[:, 1] = HOME[1] + 1e-3 * WAY
-    notice._check_spread(positions(), RECTANGLE, data_of(still, position=read))
+    notes_on(still, position=read)
 
 
 def test_few_readings_and_readings_that_stand_still_say_nothing_of_units() -> None:
     told = poses(x=WAY)
-    some = told[:, :3] * 1e3
+    some = HOME[:3] + 150.0 * (told[:, :3] - HOME[:3])
+    with pytest.raises(InputFileError, match="such as meas_x_mm"):
+        notes_on(told, position=some)
     some[3:] = np.nan
-    notice._check_spread(positions(), RECTANGLE, data_of(told, position=some))
-    notice._check_spread(positions(), RECTANGLE, data_of(told, position=np.tile(HOME[:3], (5, 1))))
+    notes_on(told, position=some)
+    notes_on(told, position=np.tile(HOME[:3], (5, 1)))
 
 
 def test_an_offset_is_odd_from_half_of_the_spread_and_a_twentieth_of_the_frame_on() -> None:
     for told, least in ((poses(x=WAY), 0.25), (poses(x=10 * WAY), 0.5)):
         for part, odd in ((0.99, False), (1.01, True)):
-            read = told[:, :3] + [0.0, part * least, 0.0]
-            notes = notice._elsewhere(RECTANGLE, data_of(told, position=read))
+            notes = notes_on(told, position=told[:, :3] + [0.0, part * least, 0.0])
             assert bool(notes) == odd
-    assert f"they are {1.01 * 0.5:.3g} m from them, which spread by 1 m" in notes[0]
+    assert f"they are {1.01 * 0.5:.3g} m from them, which spread by 1 m. Are axes" in notes[0]
 
 
 def test_a_platform_that_is_turned_in_either_order_is_not_told_to_be_in_another() -> None:
     told = poses(x=WAY)
     wobble = quat_from_rotvec(0.1 * np.random.default_rng(0).normal(size=(5, 3)))
-    columns = columns_of("meas_qw,meas_qx,meas_qy,meas_qz", *["1,0,0,0"] * 5, n_cables=4)
-
-    def notes(quat: np.ndarray) -> list[str]:
-        return notice._other_order(columns, RECTANGLE, data_of(told, quat_wxyz=quat))
-
-    assert notes(wobble) == []
-    (note,) = notes(np.roll(wobble, -1, axis=1))
+    assert notes_on(told, quat_wxyz=wobble) == []
+    (note,) = notes_on(told, quat_wxyz=np.roll(wobble, -1, axis=1))
     assert "if their last number is the scalar" in note
     # 120 degrees about (1, 1, 1) is (1, 1, 1, 1)/2, in whatever order
     third = quat_from_rotvec(np.full((5, 3), 2.0 * np.pi / 3.0 / 3**0.5))
-    assert notes(quat_multiply(wobble, third)) == []
+    assert notes_on(told, quat_wxyz=quat_multiply(wobble, third)) == []
 
 
 def test_rows_that_are_the_same_are_listed_up_to_eight() -> None:
-    told = np.tile(HOME, (12, 1))
-    data = data_of(told, position=np.zeros((12, 3)))
-    (note,) = notice.twice(data)
+    told, run = np.tile(HOME, (12, 1)), np.full(12, "a")
+    data = Measurements(Path("a.csv"), 4, run, command_pose=told, position=np.zeros((12, 3)))
+    (note,) = twice(data)
     assert "9 as 2" in note and "10 as 2 and 3 more" in note
-    other = data_of(told, position=np.arange(36.0).reshape(12, 3))
-    assert notice.twice(other) == []
+    other = replace(data, position=np.arange(36.0).reshape(12, 3))
+    assert twice(other) == []
 
 
 @pytest.mark.parametrize(("unit", "factor", "name"), [
@@ -154,8 +154,9 @@ def test_angles_that_follow_the_commands_in_another_unit_are_refused(
     sway = np.array([0.01, -0.01, 0.0, 0.01, -0.01])  # where the platform really rests
 
     def check(read: np.ndarray, told: np.ndarray = told) -> None:
-        cells = [f"{value:.9f}" for value in read]
-        notice._check_angles(columns_of(f"meas_ry_{unit}", *cells, n_cables=4), data_of(told))
+        columns = columns_of(f"meas_ry_{unit}", *(f"{v:.9f}" for v in read), n_cables=4)
+        data = Measurements(Path("a.csv"), 4, np.full(5, "a"), command_pose=told)
+        check_readings(columns, RECTANGLE, data)
 
     right = size * (turned[:, 1] + sway)
     check(right)
@@ -174,11 +175,11 @@ def test_positions_of_exactly_nothing_are_no_readings() -> None:
         r"line 5, column meas_x_m: expected a position near its command, got exactly 0 0 0, "
         r"2.97 m from it; leave the cells empty"
     )):  # fmt: skip
-        notice._refuse_zeros(positions(), RECTANGLE, data_of(told, position=read))
+        notes_on(told, position=read)
     read[3, 0] = 1e-6
-    notice._refuse_zeros(positions(), RECTANGLE, data_of(told, position=read))
+    notes_on(told, position=read)
     there = told - np.array([*HOME[:3], 0, 0, 0, 0])  # where 0 0 0 is a place like any other
-    notice._refuse_zeros(positions(), RECTANGLE, data_of(there, position=0.0 * read))
+    notes_on(there, position=0.0 * read)
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,14 @@ from made_data import measured, soft_cogiro, term
 import crosscheck
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import load_measurements, together
+from crosscheck.preparation.exchanged import (
+    Pulls,
+    exchanged,
+    exchanged_lengths,
+    misfits,
+    unbalanced,
+)
 from crosscheck.preparation.prepare import prepare
-from crosscheck.preparation.suspect_data.exchanged_columns import exchanges, misfits
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.effects import Terms
@@ -222,9 +228,15 @@ def test_misfits_leave_out_constants_and_are_no_less_than_noise() -> None:
     assert apart[0, 0] == apart[1, 1] == 0.1 and apart[0, 1] > 5.0
 
 
+def exchanges(apart: Array) -> dict[int, int]:
+    """The exchange that misfits (m, m) of column i and cable j, of 20 rows, show."""
+    return exchanged_lengths(apart, 20)
+
+
 def test_only_one_order_that_fits_far_better_is_named() -> None:
     swapped = np.array([[9.0, 1.0, 8.0], [1.0, 9.0, 8.0], [8.0, 8.0, 1.0]])
     assert exchanges(swapped) == {0: 1, 1: 0}
+    assert exchanged_lengths(swapped, 8) != exchanged_lengths(swapped, 7) == {}
     one_way = swapped.copy()
     one_way[1, 0] = 5.0
     assert exchanges(one_way) == {}
@@ -240,6 +252,13 @@ def test_only_one_order_that_fits_far_better_is_named() -> None:
     assert exchanges(three) == {0: 1, 1: 2, 2: 0}
 
 
+def test_three_are_named_though_two_pairs_explain_a_part_alike() -> None:
+    """Cables that nearly stand in for each other: either pair leaves 15, and the three leave 1."""
+    apart = np.full((5, 5), 90.0) - 89.0 * np.eye(5)
+    apart[:3, :3] = [[90.0, 1.0, 15.0], [15.0, 90.0, 1.0], [1.0, 15.0, 15.0]]
+    assert exchanges(apart) == {0: 1, 1: 2, 2: 0}
+
+
 def test_where_every_length_fits_another_cable_an_axis_may_be_reversed_instead() -> None:
     robot = load_robot("planar_two_cable")
     data = measured(robot, [], points=4, sigma=SIGMA)
@@ -249,3 +268,65 @@ def test_where_every_length_fits_another_cable_an_axis_may_be_reversed_instead()
     apart = misfits(lengths[:, ::-1], robot.nominal_lengths(data.command_pose), 1e-4)
     assert exchanges(apart) == {0: 1, 1: 0}
     assert not any("seem exchanged" in note for note in told(mine, robot))
+
+
+ROWS = np.ones(20, bool)
+
+
+def pulls_of(measured: Array, expected: Array, along: Sequence[int] = (0, 1, 2)) -> Pulls:
+    """Cables that pull in a plane, in other directions in each row; tensions (n, m).
+
+    Args:
+        along: number of each cable's direction: those with the same are parallel.
+    """
+    n = len(measured)
+    turned = np.random.default_rng(0).normal(size=(n, 3))
+    angle = (turned + np.array([0.0, 2.0, 4.0]))[:, along]
+    matrix = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return Pulls(matrix, measured, expected, ROWS, free=False)
+
+
+def reordered(pulls: Pulls, noise: float = 0.01) -> dict[int, int]:
+    return exchanged(unbalanced(pulls, ROWS, noise), pulls.measured.shape[1], len(ROWS))
+
+
+def tensions(*each: float) -> Array:
+    """Of 20 rows, each cable's within a hundredth of a newton of one number."""
+    return np.array(each) + 0.01 * np.random.default_rng(1).normal(size=(20, len(each)))
+
+
+def test_the_order_that_balances_alone_is_found() -> None:
+    true = tensions(2.0, 5.0, 9.0)
+    pulls = pulls_of(true[:, [2, 1, 0]], true)
+    assert reordered(pulls) == {0: 2, 2: 0}
+    here, there = unbalanced(pulls, ROWS, 0.01)(np.array([[0, 1, 2], [2, 1, 0]]))
+    assert there == pytest.approx(0.01 * np.sqrt(3.0), rel=0.3) and here > 4.0
+
+
+def test_of_two_orders_that_balance_alike_neither_is() -> None:
+    """Two pairs of parallel cables, two of them with the same tension: either was exchanged."""
+    true, pairs = tensions(5.0, 2.0, 9.0, 5.0), (0, 0, 1, 1)
+    assert reordered(pulls_of(true[:, [2, 1, 0, 3]], true, along=pairs)) == {}
+    other = tensions(5.0, 2.0, 9.0, 7.0)
+    assert reordered(pulls_of(other[:, [2, 1, 0, 3]], other, along=pairs)) == {0: 2, 2: 0}
+
+
+def test_what_is_less_than_the_noise_names_nothing() -> None:
+    """The better order is so by luck: in the file's, as little is unbalanced as noise may leave."""
+    true = tensions(2.0, 5.0, 9.0)
+    wrong = pulls_of(true[:, [2, 1, 0]], true)
+    assert reordered(wrong, 1.0) == {0: 2, 2: 0}
+    assert reordered(wrong, 3.0) == {}
+
+
+def test_where_cables_pull_against_each_other_their_resultant_says_nothing() -> None:
+    """Two rows: a load of a tenth of the tensions, and one of a hundredth."""
+    pulls = Pulls(
+        matrix=np.tile([[1.0, -1.0, 0.0], [0.0, 0.0, 1.0]], (2, 1, 1)),
+        measured=np.array([[5.0, 5.0, 2.2], [5.0, 5.0, 0.2]]),
+        expected=np.array([[5.0, 5.0, 1.1], [5.0, 5.0, 0.1]]),
+        whole=np.ones(2, bool),
+        free=False,
+    )
+    carried = pulls.carried()
+    assert carried[0] == pytest.approx(2.0) and np.isnan(carried[1])

@@ -9,7 +9,7 @@ import pytest
 from made_columns import columns_of
 from rectangle import RECTANGLE
 
-from seecr.columns.reach import away_from, check_reach
+from seecr.columns.plausible import away_from, check_commands
 from seecr.description.robot import Joint
 from seecr.errors import InputFileError
 from seecr.pose import Array
@@ -26,7 +26,7 @@ def check_places(unit: str, *places: tuple[float, float, float], per_metre: floa
     """Check a file with these places in this unit."""
     header = ",".join(f"cmd_{axis}_{unit}" for axis in "xyz")
     rows = [",".join(f"{per_metre * value:.10g}" for value in place) for place in places]
-    check_reach(columns_of(header, *rows), RECTANGLE, at(*places), None)
+    check_commands(columns_of(header, *rows), RECTANGLE, at(*places), None)
 
 
 def check_lengths(unit: str, per_metre: float, *lengths: float) -> None:
@@ -34,7 +34,7 @@ def check_lengths(unit: str, per_metre: float, *lengths: float) -> None:
     header = ",".join(f"length_{i}_{unit}" for i in range(1, 5))
     rows = [",".join([f"{per_metre * length:.10g}"] * 4) for length in lengths]
     table = np.repeat(np.array(lengths)[:, None], 4, axis=1)
-    check_reach(columns_of(header, *rows), RECTANGLE, None, table)
+    check_commands(columns_of(header, *rows), RECTANGLE, None, table)
 
 
 def test_poses_are_as_far_away_as_their_coordinates_differ() -> None:
@@ -86,7 +86,7 @@ def test_metres_under_the_name_of_a_smaller_unit_are_refused(name: str, cell: st
     said = rf"line 2, column {name}: .* at most {cell} {unit}; are .* such as cmd_x_m$"
     poses = at((float(cell) / {"mm": 1000.0, "cm": 100.0}[unit], 2.0, -1.5))
     with pytest.raises(InputFileError, match=said):
-        check_reach(columns_of(name, cell), RECTANGLE, poses, None)
+        check_commands(columns_of(name, cell), RECTANGLE, poses, None)
 
 
 def test_short_lengths_are_metres_too() -> None:
@@ -109,7 +109,7 @@ def test_small_numbers_that_may_be_right_pass(
     robot = replace(RECTANGLE, reference_pose=home)
     columns = columns_of(name, *cells)
     poses = at(*((value, 2.0, -1.5) for value in columns.numbers("cmd_x").tolist()))
-    check_reach(columns, robot, poses, None)
+    check_commands(columns, robot, poses, None)
 
 
 def test_a_robot_that_most_commands_are_outside_of_is_another() -> None:
@@ -126,6 +126,6 @@ def test_commands_that_the_joints_cannot_reach_are_for_another_robot() -> None:
     slide = Joint("slide", "along y", np.array([0.0, 1.0, 0.0]), np.zeros(3))
     robot = replace(RECTANGLE, joints=(slide,))
     columns = columns_of("cmd_y_m", "1", "3")
-    check_reach(columns, robot, at((1.5, 1.0, -1.5), (1.5, 3.0, -1.5)), None)
+    check_commands(columns, robot, at((1.5, 1.0, -1.5), (1.5, 3.0, -1.5)), None)
     with pytest.raises(InputFileError, match=r"line 3: the joints of robot rectangle cannot"):
-        check_reach(columns, robot, at((1.5, 1.0, -1.5), (1.6, 3.0, -1.5)), None)
+        check_commands(columns, robot, at((1.5, 1.0, -1.5), (1.6, 3.0, -1.5)), None)

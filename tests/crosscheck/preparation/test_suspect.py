@@ -10,6 +10,7 @@ import pytest
 from made_data import measured, refused, run, soft_cogiro, soft_xml
 
 import crosscheck
+from crosscheck.fit.reasons import Unfit
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_commands, load_measurements, together
 from crosscheck.measurements.write import write_measurements
@@ -17,7 +18,13 @@ from crosscheck.preparation.prepare import prepare
 from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Terms
 from seecr.errors import InputFileError
-from seecr.pose import quat_from_rotvec, quat_multiply, rotvec_from_quat
+from seecr.pose import (
+    quat_from_rotvec,
+    quat_from_rxyz,
+    quat_multiply,
+    rotvec_from_quat,
+    rxyz_from_quat,
+)
 
 COGIRO, PLANAR = soft_cogiro(), load_robot(model_path("planar_vertical"))
 
@@ -125,3 +132,80 @@ def test_rotations_in_radians_that_are_called_degrees(cogiro):
     level = cogiro.rows(cogiro.run != "loop")
     assert "Rotations change" not in notes(still, replace(level, position=level.command_pose[:, :3],
         quat_wxyz=np.tile([1.0, 0.0, 0.0, 0.0], (level.n_rows, 1)), tensions=None))  # fmt: skip
+
+
+NOT_COUNTED = (
+    "{}: not counted as readings, because the file has the same number in every row where the "
+    "model expects changes; leave the cells empty where nothing was read"
+)
+
+
+@pytest.mark.parametrize(
+    ("filled", "names"),
+    [
+        (
+            lambda data: replace(data, quat_wxyz=np.tile([1.0, 0.0, 0.0, 0.0], (data.n_rows, 1))),
+            "rotation about x, rotation about y, rotation about z",
+        ),
+        (lambda data: replace(data, tensions=0.0 * data.tensions),
+         ", ".join(f"tension_{k}" for k in range(1, 9))),
+        (lambda data: replace(data, tensions=np.where(np.arange(8) == 2, 7.5, data.tensions)),
+         "tension_3"),
+        (lambda data: replace(data, position=np.where(np.arange(3) == 2, 0.1, data.position)), "z"),
+    ],
+    ids=["orientation", "tensions", "one tension", "z"],
+)  # fmt: skip
+def test_a_constant_that_was_filled_in_is_no_reading(cogiro, filled, names):
+    """No effect was missing, said the diagnosis, and a comparison of the same data the opposite."""
+    spoilt = prepare(COGIRO, filled(cogiro), Terms())
+    assert [n for n in spoilt.notes if "same number" in n] == [NOT_COUNTED.format(names)]
+    assert not any("Rotations change" in n or "Tensions of" in n for n in spoilt.notes)
+    blank = spoilt.problem.data
+    assert spoilt.problem.n_readings == prepare(COGIRO, blank, Terms()).problem.n_readings
+    whole = prepare(COGIRO, cogiro, Terms()).problem.n_readings
+    assert spoilt.problem.n_readings == whole - (names.count(",") + 1) * cogiro.n_rows
+
+
+def test_one_angle_of_three_that_was_filled_in_leaves_the_others(cogiro):
+    angles = rxyz_from_quat(cogiro.quat_wxyz) * [1.0, 0.0, 1.0]
+    ready = prepare(COGIRO, replace(cogiro, quat_wxyz=quat_from_rxyz(angles)), Terms())
+    assert NOT_COUNTED.format("rotation about y") in ready.notes
+    seen = ready.problem.counted[:, 3:6].any(axis=0)
+    assert seen.tolist() == [True, False, True]
+    np.testing.assert_allclose(ready.problem.data.angles_rad[:, 0], angles[:, 0], atol=1e-12)
+
+
+def test_of_several_files_only_the_one_that_was_filled_in_loses_them(cogiro):
+    level = np.tile([1.0, 0.0, 0.0, 0.0], (cogiro.n_rows, 1))
+    parts = [replace(cogiro, path=Path("own.csv")),
+             replace(cogiro, path=Path("level.csv"), quat_wxyz=level)]  # fmt: skip
+    ready = prepare(COGIRO, together(parts), Terms())
+    turned = ", ".join(f"rotation about {axis}" for axis in "xyz")
+    assert [n for n in ready.notes if "same number" in n] == [
+        f"level.csv: {NOT_COUNTED.format(turned)}"
+    ]
+    seen = ready.problem.counted[:, 3:6].all(axis=1)
+    assert np.array_equal(seen, ready.problem.data.file == 0)
+
+
+def test_numbers_that_may_well_stay_the_same_are_readings(cogiro):
+    slack = np.where(np.arange(8) == 2, 0.0, cogiro.tensions)
+    still = replace(COGIRO, ea=1e4 * COGIRO.ea)  # whose platform hardly turns
+    level = replace(cogiro, quat_wxyz=np.tile([1.0, 0.0, 0.0, 0.0], (cogiro.n_rows, 1)))
+    for robot, data in ((COGIRO, replace(cogiro, tensions=slack)),
+                        (still, level.rows(cogiro.run != "loop"))):  # fmt: skip
+        assert not any("same number" in note for note in prepare(robot, data, Terms()).notes)
+
+
+def test_where_all_readings_are_the_same_that_is_said_instead(cogiro):
+    same = {name: np.repeat(getattr(cogiro, name)[:1], cogiro.n_rows, axis=0)
+            for name in ("position", "quat_wxyz", "tensions")}  # fmt: skip
+    refusal = prepare(COGIRO, replace(cogiro, **same), Terms()).refusal
+    assert refusal is not None and refusal.unfit is Unfit.FROZEN_READINGS
+
+
+def test_axes_that_were_exchanged_are_named(cogiro, tmp_path):
+    file = tmp_path / "measured.csv"
+    write_measurements(file, replace(cogiro, position=cogiro.position[:, [1, 0, 2]]))
+    (said,) = (n for n in load_measurements(file, COGIRO).notes if "do not follow" in n)
+    assert " m if meas_x and meas_y are exchanged. Are axes exchanged, is this the file" in said

@@ -10,7 +10,7 @@ from made_data import measured, soft_cogiro
 
 from crosscheck.measurements.data import Measurements
 from crosscheck.preparation.prepare import prepare
-from crosscheck.preparation.suspect_data.stuck import _stretches
+from crosscheck.preparation.stuck import _stretches
 from seecr.effects import Terms
 
 ROBOT = soft_cogiro()

@@ -1,0 +1,420 @@
+"""Data that look wrong beside the model: of another robot, another unit or convention, or unread.
+
+For each kind of reading there is a table of what may have happened to it. If what one entry makes
+of the readings is far nearer to what the model predicts than the readings as they stand, no effect
+of a robot is to be sought in the difference: that is asked in a note, or, where the readings then
+agree with the commands too, no verdict is passed. Exchanged columns are in ``exchanged``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.fit.least_squares.problem import ORIENTATION, POSITION, TENSION, Problem
+from crosscheck.fit.reasons import Refusal, Unfit
+from crosscheck.measurements.data import Measurements
+from crosscheck.measurements.dwells import mean_rotation
+from crosscheck.preparation.exchanged import Pulls, exchange_doubts, rows_of_files
+from crosscheck.preparation.stuck import stuck_doubts
+from seecr.columns.plausible import turned_from
+from seecr.counted import some
+from seecr.effects.base import Readings
+from seecr.pose import (
+    Array,
+    quat_conjugate,
+    quat_from_rotvec,
+    quat_multiply,
+    rotvec_from_quat,
+    rxyz_from_quat,
+)
+from seecr.prediction.experiment import Prediction
+from seecr.units import short
+
+# Least number of rows from which a usual size is known, and from which a convention is.
+_SEVERAL, _LEAST_ROWS = 4, 8
+# Orientations: what four rows in five are off by counts: one in ten may be an outlier. Another
+# convention brings that so many times nearer to what the model expects. If only rather nearer, that
+# is asked and no more: where platforms turn little, conventions differ little.
+_PART, _NEARER, _RATHER_NEARER = 0.8, 2.0, 1.5
+# What is beyond noise, or beyond a platform that tilts to the other side, is so by this factor.
+_FAR = 10.0
+# Angles [rad] of less, or of less than so many times the stated noise, are not worth a word; the
+# model is to expect turns of so much.
+_LEAST, _NOISE, _LEAST_TURN = np.radians(0.01), 3.0, np.radians(0.1)
+# Positions: a model is worse than none if it is so many times as far off as the commands are.
+_WORSE = 3.0
+# Units of other load cells [N]. Scales of load cells, masses and loads are wrong by less than a
+# factor whose square is less than that between two units; within it is the middle half of the rows.
+_UNITS, _AS_GOOD = {"kgf": 9.80665, "lbf": 4.44822, "grams (gf)": 9.80665e-3}, 1.4
+# What differs by so much must have another cause than effects; radians are 57 times degrees.
+_OTHER = 20.0
+# Columns: numbers that differ by less are the same. They are to change by such parts of the robot's
+# size and of the usual tension, or by the least turn.
+_SAME, _MOVES, _PULLS = 1e-12, 0.02, 0.05
+_MOST_NAMED = 8
+
+
+def suspicions(problem: Problem, at: Prediction) -> tuple[list[str], Refusal | None]:
+    """Sentences that ask about what looks wrong, and why no verdict is passed, if so.
+
+    Args:
+        problem: the data with their noise. at: what the model as it stands predicts.
+    """
+    readings, pulls = at.readings, Pulls.of(problem, at)
+    asked, refusal = misread_orientations(problem, readings)
+    notes = [
+        *asked,
+        *_worse_than_commands(problem, readings),
+        *_other_turns(problem, readings),
+        *stuck_doubts(problem, at.pose[:, :3]),
+        *(list(_other_units(problem, pulls)) or _other_tensions(problem, readings)),
+        *exchange_doubts(problem, pulls),
+    ]
+    return notes, refusal
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _spreads(read: Array, expected: Array, seen: NDArray[np.bool_]) -> Array:
+    """(2, k) mean distances from the median of columns (n, k); NaN where rows are few.
+
+    An outlier can only make them larger.
+    """
+    out = np.full((2, seen.shape[1]), np.nan)
+    for k, rows in enumerate(seen.T):
+        if rows.sum() >= _SEVERAL:
+            both = np.stack([read[rows, k], expected[rows, k]])
+            out[:, k] = np.abs(both - np.median(both, axis=1, keepdims=True)).mean(axis=1)
+    return out
+
+
+# orientations
+
+_Meant = Callable[[Array], Array]
+
+
+def _turns(order: str, columns: str, sign: float = 1.0) -> _Meant:
+    """Quaternions of the same angles, taken as turns about moving axes in an order.
+
+    Args:
+        order: axes, such as "zyx". columns: the columns that hold these turns, such as "xyz".
+    """
+
+    def read(quat: Array) -> Array:
+        angles = sign * rxyz_from_quat(quat)
+        out = np.tile([1.0, 0.0, 0.0, 0.0], (len(quat), 1))
+        for axis, column in zip(order, columns, strict=True):
+            turn = np.zeros_like(angles)
+            turn[:, "xyz".index(axis)] = angles[:, "xyz".index(column)]
+            out = quat_multiply(out, quat_from_rotvec(turn))
+        return out
+
+    return read
+
+
+# How else orientations may be meant, in words that follow "if", and what that makes of them. These
+# agree with the file's own to first order in the angles: where platforms turn little, by little.
+_ALIKE: dict[str, _Meant] = {
+    "the three angles are a rotation vector": lambda quat: quat_from_rotvec(rxyz_from_quat(quat)),
+    **{
+        "the angles are those of R = " + " ".join(f"R{axis}(r{axis})" for axis in order): _turns(
+            order, order
+        )
+        for order in ("xzy", "yxz", "yzx", "zxy", "zyx")
+    },
+}
+CONVENTIONS: dict[str, _Meant] = {
+    "the last number of each quaternion is the scalar": lambda quat: np.roll(quat, 1, axis=1),
+    "every rotation is inverted": quat_conjugate,
+    "the last number of each quaternion is the scalar and every rotation is inverted": (
+        lambda quat: quat_conjugate(np.roll(quat, 1, axis=1))
+    ),
+    "all three angles have the other sign": _turns("xyz", "xyz", -1.0),
+    **_ALIKE,
+    "rx holds yaw, ry pitch and rz roll, of R = Rz(yaw) Ry(pitch) Rx(roll)": _turns("zyx", "xyz"),
+    "rx holds the angle about z and rz that about x, of R = Rx Ry Rz": _turns("xyz", "zyx"),
+}
+
+
+def misread_orientations(problem: Problem, readings: Readings) -> tuple[list[str], Refusal | None]:
+    """Asks whether orientations of a file are of another convention; a refusal if they must be.
+
+    Of several files the first one for which that is certain; if none is, the first one.
+
+    Args:
+        problem: the data with their noise. readings: what the model as it stands predicts.
+    """
+    if problem.data.quat_wxyz is None:
+        return [], None
+    whole = problem.counted[:, ORIENTATION].all(axis=1)
+    whole &= np.isfinite(readings.quat_wxyz).all(axis=1)
+    asked = []
+    for name, mine in rows_of_files(problem):
+        rows = mine & whole
+        found = _misread(problem, readings, rows) if rows.sum() >= _LEAST_ROWS else None
+        if found is None:
+            continue
+        off, left, convention, certain = found
+        if certain:
+            file = f" of {name.removesuffix(': ')}" if name else ""
+            return [], Refusal(
+                Unfit.OTHER_CONVENTION, problem.data.n_rows, off=off, left=left,
+                convention=convention, file=file,
+            )  # fmt: skip
+        asked.append(
+            f"{name}The measured orientations are {off} from those that the model expects, and "
+            f"{left} if {convention}: is that how they are written?"
+        )
+    return asked[:1], None
+
+
+def _misread(
+    problem: Problem, readings: Readings, rows: NDArray[np.bool_]
+) -> tuple[str, str, str, bool] | None:
+    """How far some rows are off as they stand, and by which convention they seem to be written.
+
+    Returns:
+        Both angles in words, the convention, and whether it is certain; None if it is the file's.
+    """
+    assert problem.data.quat_wxyz is not None
+    read, expected = problem.data.quat_wxyz[rows], readings.quat_wxyz[rows]
+    least = _LEAST
+    if problem.data.sigma.orientation_rad is not None:
+        noise = problem.reading_sigma[rows][:, ORIENTATION]
+        least = max(least, _NOISE * float(np.median(noise)))
+    here = min(_off(read, other) for other in (expected, *_mounted(read, expected)))
+    by = {words: meant(read) for words, meant in CONVENTIONS.items()}
+    best = min(by, key=lambda words: _off(by[words], expected))
+    near = _off(by[best], expected)
+    if here < max(least, _RATHER_NEARER * near):
+        return None
+    if best not in _ALIKE and not _is_no_tilt(read, expected, _told(problem)[rows], by[best]):
+        return None
+    off, left = (_deg(float(np.median(turned_from(x, expected)))) for x in (read, by[best]))
+    return off, left, best, here >= _NEARER * near
+
+
+def _deg(angle: float) -> str:
+    return f"{short(np.degrees(angle))} deg"
+
+
+def _off(read: Array, expected: Array) -> float:
+    """The angle [rad] that four rows in five are off by less."""
+    return float(np.quantile(turned_from(read, expected), _PART))
+
+
+def _mounted(read: Array, expected: Array) -> Iterator[Array]:
+    """What is expected if the target sits in another orientation, or the tracker stands in one."""
+    target = mean_rotation(quat_multiply(quat_conjugate(expected), read))
+    yield quat_multiply(expected, np.tile(target, (len(read), 1)))
+    frame = mean_rotation(quat_multiply(read, quat_conjugate(expected)))
+    yield quat_multiply(np.tile(frame, (len(read), 1)), expected)
+
+
+def _is_no_tilt(read: Array, expected: Array, told: Array, meant: Array) -> bool:
+    """Whether a convention agrees much better than a tilt to the other side would.
+
+    That is with the commands, or, where the platform rests far from these, with the model.
+    """
+    if _off(read, told) >= _NEARER * _off(meant, told):
+        return True
+    back = quat_multiply(told, quat_multiply(quat_conjugate(expected), told))
+    return min(_off(read, back), _off(read, expected)) > _FAR * _off(meant, expected)
+
+
+def _told(problem: Problem) -> Array:
+    """Commanded quaternions (n, 4); the reference pose's if lengths are commanded."""
+    told, home = problem.data.command_pose, problem.robot.reference_pose[3:]
+    return np.tile(home, (problem.data.n_rows, 1)) if told is None else told[:, 3:]
+
+
+def _other_turns(problem: Problem, readings: Readings) -> list[str]:
+    """Whether the platform turns far less than the model expects: radians that are called degrees.
+
+    Only changes count, since the target may sit on the platform in any orientation.
+    """
+    quat, home = problem.data.quat_wxyz, quat_conjugate(problem.robot.reference_pose[3:])
+    if quat is None:
+        read, expected = problem.data.angles_rad, rxyz_from_quat(readings.quat_wxyz)
+    else:
+        both = np.stack([quat, readings.quat_wxyz])
+        read, expected = rotvec_from_quat(quat_multiply(both, home))
+    spreads = _spreads(read, expected, problem.counted[:, ORIENTATION])
+    spreads = spreads[:, np.isfinite(spreads[0])]
+    if not spreads.size:
+        return []
+    small, large = np.sqrt(np.mean(spreads**2, axis=1)).tolist()
+    if large < _LEAST_TURN or small * _OTHER > large:
+        return []
+    return [
+        f"Rotations change by {_deg(small)} where the model expects {_deg(large)} (mean distance "
+        "from their median): are these radians in columns of degrees, or is this the file of "
+        "another robot?"
+    ]
+
+
+# positions
+
+
+def _worse_than_commands(problem: Problem, readings: Readings) -> Iterator[str]:
+    """That the commands themselves explain the positions of a file, and the model does not."""
+    read, told = problem.data.position, problem.data.command_pose
+    if told is None:
+        return
+    off, noise = read - readings.position, problem.reading_sigma[:, POSITION]
+    for name, mine in rows_of_files(problem):
+        rows = problem.counted[:, POSITION] & mine[:, None]
+        if rows.any(axis=1).sum() < _SEVERAL:
+            continue
+        model, plain = _rms(off[rows]), _rms((read - told[:, :3])[rows])
+        if model > _WORSE * plain and _rms((off / noise)[rows]) > _FAR:
+            yield (
+                f"{name}The model is {short(1e3 * model)} mm from the measured positions, the "
+                f"commands themselves are only {short(1e3 * plain)} mm from them (rms): is this "
+                "the file of another robot, or does the controller correct for elasticity already?"
+            )
+
+
+# tensions
+
+
+def _other_units(problem: Problem, pulls: Pulls) -> Iterator[str]:
+    """A sentence for each file whose tensions carry the load in another unit."""
+    part = pulls.carried()
+    for name, rows in rows_of_files(problem):
+        mine = part[rows & np.isfinite(part)]
+        unit = unit_of(mine)
+        if unit is not None:
+            yield (
+                f"{name}The measured tensions carry {short(float(np.median(mine)))} times the load "
+                f"that the model puts on the cables, as if they were in {unit}, of "
+                f"{_UNITS[unit]:.6g} N each. They are taken as they stand: are they in {unit}, or "
+                "is the platform's mass in the MJCF so far off?"
+            )
+
+
+def unit_of(part: Array) -> str | None:
+    """The unit in which tensions carry the load; None if that is newtons, or none that is known.
+
+    Args:
+        part: (k,) of the load that they carry as newtons, in each of k rows.
+    """
+    if len(part) < _SEVERAL:
+        return None
+    low, high = np.quantile(part, [0.25, 0.75]).tolist()
+    for name, newtons in _UNITS.items():
+        if low * newtons > 1.0 / _AS_GOOD and high * newtons < _AS_GOOD:
+            return name
+    return None
+
+
+def _other_tensions(problem: Problem, readings: Readings) -> list[str]:
+    """That tensions are of another order than the model expects, for whatever reason."""
+    seen = problem.counted[:, TENSION] & np.isfinite(readings.tensions)
+    if seen.any(axis=1).sum() < _SEVERAL:
+        return []
+    usual, there = _rms(problem.data.tensions[seen]), _rms(readings.tensions[seen])
+    if usual <= 0.0 or there <= 0.0 or 1.0 / _OTHER < usual / there < _OTHER:
+        return []
+    return [
+        f"Tensions of {short(usual)} N were measured where the model expects {short(there)} N "
+        "(rms): is it another unit, the file of another robot, or a pretension that the model "
+        "lacks?"
+    ]
+
+
+# columns that nobody read
+
+
+def filled_in_note(problem: Problem) -> list[str]:
+    """A note about parts of the pose that the joints lock, and that nothing read."""
+    if not problem.filled_in.any():
+        return []
+    return [
+        f"{_names(problem.filled_in)}: not counted as readings, because the joints allow no such "
+        "motion and the file has the same number in every row"
+    ]
+
+
+def without_constants(problem: Problem, at: Prediction) -> tuple[Problem, list[str]]:
+    """The problem without columns that hold one number in all rows of a file, and notes on these.
+
+    Instruments repeat a number only if what they read changes by less than their last digit. Where
+    the model expects more, whoever wrote the file filled it in. If nothing else was read the data
+    are left as they are.
+
+    Args:
+        problem: the data. at: what the model as it stands predicts.
+    """
+    data, quat, notes = problem.data, problem.data.quat_wxyz, []
+    angles = data.angles_rad if quat is None else rxyz_from_quat(quat)
+    read = np.concatenate([data.position, angles, data.tensions], axis=1)
+    turned, there = rxyz_from_quat(at.readings.quat_wxyz), at.readings
+    expected = np.concatenate([there.position, turned, there.tensions], axis=1)
+    seen = problem.counted & np.isfinite(expected)
+    usual = _rms(there.tensions[seen[:, TENSION]]) if seen[:, TENSION].any() else 0.0
+    least = np.full(len(seen.T), _PULLS * usual)
+    least[:6] = np.repeat([_MOVES * problem.robot.reach, _LEAST_TURN], 3)
+    odd = np.zeros_like(seen)
+    for name, rows in rows_of_files(problem):
+        columns = _constant(read, expected, seen & rows[:, None], least)
+        odd |= rows[:, None] & columns
+        if columns.any():
+            notes.append(
+                f"{name}{_names(columns)}: not counted as readings, because the file has the same "
+                "number in every row where the model expects changes; leave the cells empty where "
+                "nothing was read"
+            )
+    if not notes or odd[seen].all():
+        return problem, []
+    rest = _without(data, np.where(odd, np.nan, read))
+    own = problem.use, problem.left_out, problem.considered
+    return Problem(problem.robot, rest, problem.sigma, *own), notes
+
+
+def _without(data: Measurements, left: Array) -> Measurements:
+    """Data of which only some readings (n, 6 + m) are left: positions, angles and tensions."""
+    position, angles, tensions = left[:, POSITION], left[:, ORIENTATION], left[:, TENSION]
+    quat, lost = data.quat_wxyz, np.isnan(angles)
+    if quat is None or lost.all() or (lost != lost[:, :1]).any():
+        quat = None  # single angles can only be left out of angles
+    else:
+        quat, angles = np.where(lost[:, :1], np.nan, quat), data.angles_rad
+    masks = [np.asarray(np.isfinite(table).any(axis=0)) for table in (position, angles, tensions)]
+    return replace(
+        data,
+        position=position,
+        quat_wxyz=quat,
+        angles_rad=angles,
+        tensions=tensions,
+        position_mask=masks[0],
+        angle_mask=masks[1],
+        tension_mask=masks[2],
+    )
+
+
+def _constant(
+    read: Array, expected: Array, seen: NDArray[np.bool_], least: Array
+) -> NDArray[np.bool_]:
+    """(6 + m,) columns that never change though the model expects changes of more than ``least``.
+
+    A cable that reads nothing in all rows may be slack, unless no tension ever changes.
+    """
+    small, large = _spreads(read, expected, seen)
+    odd = (small <= _SAME) & (large > least)
+    if (small[TENSION] > _SAME).any():
+        odd[TENSION] &= np.where(seen, read, 0.0)[:, TENSION].any(axis=0)
+    return np.asarray(odd)
+
+
+def _names(columns: NDArray[np.bool_]) -> str:
+    """Names of columns (6 + m,) of readings."""
+    pose = [*"xyz", *(f"rotation about {axis}" for axis in "xyz")]
+    names = [pose[k] if k < 6 else f"tension_{k - 5}" for k in np.flatnonzero(columns).tolist()]
+    return some(names, _MOST_NAMED)

@@ -1,1 +1,0 @@
-"""Data that look wrong: of another robot, with columns exchanged, in another unit."""
