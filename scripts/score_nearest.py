@@ -28,9 +28,9 @@ from scipy.optimize import minimize
 from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
 from seecr.effects.cable import CableWeight
-from seecr.holding.distribution import balanced
 from seecr.inverse.correction import correct
 from seecr.pose import Array, pose_add, pose_difference, quat_to_matrix
+from seecr.tensions.distribution import balanced
 from seecr.workspace.zones import feasible
 
 

@@ -22,7 +22,7 @@ TABLE = (
     "seecr: files pose arguments curves result units",
     "seecr: description commands columns",
     "seecr: effects statics prediction",
-    "seecr: holding equilibrium inverse workspace exported",
+    "seecr: tensions equilibrium inverse workspace exported",
     "seecr: show cli",
     "crosscheck: errors given",
     "crosscheck: settle model measurements twin",

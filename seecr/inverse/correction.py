@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,21 +16,21 @@ from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.errors import InputError
-from seecr.holding.balance import bends, is_straight
-from seecr.holding.distribution import tension_limits, wanted_tensions
-from seecr.holding.hanging import bridged_lengths, least_of_heavy
-from seecr.holding.inside import balances, counted_balance, holds_tightly
-from seecr.holding.lengths import Held, hold, holds_firmly
-from seecr.holding.unheld import why_not_held, without_span
-from seecr.inverse.history import REACHED, lengths_with_history
-from seecr.inverse.nearest import Nearest, Reaching, nearest, poses_in_place
-from seecr.inverse.told import told_lengths
+from seecr.inverse.in_place import poses_in_place
+from seecr.inverse.lengths import REACHED, commanded_lengths, lengths_with_history
+from seecr.inverse.nearest import Nearest, nearest
+from seecr.inverse.nearest_problem import NearestProblem
 from seecr.pose import Array, changes_between
 from seecr.prediction.experiment import Experiment, Prediction, effects_of
 from seecr.result import COORDINATES, MOTION, Record, Result, named, rows_of
 from seecr.statics.solution import Solution
 from seecr.statics.starts import Commanded, commands_from
 from seecr.statics.tables import Tables, assemble, spanless, take
+from seecr.tensions.balance import bends, bridged_lengths, is_straight, least_of_heavy
+from seecr.tensions.distribution import tension_limits, wanted_tensions
+from seecr.tensions.infeasible import why_not_held, without_span
+from seecr.tensions.max_margin import balances, counted_balance, holds_tightly
+from seecr.tensions.rest_lengths import Held, hold, holds_stably
 from seecr.units import millimetres, without_rounding
 
 if TYPE_CHECKING:
@@ -123,9 +123,8 @@ class Correction(Result):
                 f"remaining error: at most {millimetres(_largest(left[at, :3]), 2)} and "
                 f"{without_rounding(_degrees(left[at, 3:])):.2g} deg"
             )
-            pulls = self.solution.tensions[at]
-            out.append(f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N")
-        near = lost & self.found
+            out.append(self._tensions(at))
+        near, leaves = lost & self.found, self.found & ~self.stays
         if np.any(lost):
             out.append(f"{int(lost.sum())} cannot be held with tensions within the limits:")
             out += self._reasons()
@@ -135,31 +134,27 @@ class Correction(Result):
                 f"{millimetres(_largest(left[near, :3]))} and "
                 f"{_degrees(left[near, 3:]):.4g} deg away"
             )
-            pulls = self.solution.tensions[near]
-            out.append(f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N")
+            out.append(self._tensions(near))
         out += self._strain_lines(lost)
         for rows, text in (
             (lost & ~self.found, "of them: no pose nearby was found that can be held"),
             (self.held & ~self.found, "can be held, but a cable would have no length to pay out"),
             (near & ~self.settled, "of them: a nearer pose that can be held may exist"),
-            (
-                self.found & ~self.stays,
-                ("where forces balance but the platform does not come to rest"),
-            ),
+            (leaves, "where forces balance but the platform does not come to rest"),
         ):
             if np.any(rows):
                 places = rows_words(np.flatnonzero(rows).tolist(), self.commands.line)
                 out.append(f"{int(rows.sum())} {text}: {places}")
-        if np.any(self.found & ~self.stays) and self.robot.weight == 0.0 and self._idle:
+        if self.robot.weight == 0.0 and self.solution.slack[leaves].any():
             out[-1] += (
                 ": without gravity, slack cables leave it free; give a lowest tension above 0"
             )
         return out
 
-    @property
-    def _idle(self) -> bool:
-        """Whether a cable pulls nothing where the platform does not stay."""
-        return bool(self.solution.slack[self.found & ~self.stays].any())
+    def _tensions(self, rows: NDArray[np.bool_]) -> str:
+        """The least and the largest tension of some poses."""
+        pulls = self.solution.tensions[rows]
+        return f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N"
 
     def place(self, row: int) -> str:
         """The name of a row: "line 24" of its file, or "pose 3", counted from 0, without a file."""
@@ -307,13 +302,9 @@ def margins_in_place(
 
 
 def _search_of(
-    robot: Robot,
-    poses: Commanded,
-    effects: GivenEffects,
-    lowest: ArrayLike,
-    highest: ArrayLike,
+    robot: Robot, poses: Commanded, effects: GivenEffects, lowest: ArrayLike, highest: ArrayLike,
     aim: str | ArrayLike,
-) -> _Search:
+) -> _Search:  # fmt: skip
     """A search with checked arguments."""
     given = commands_from(poses, robot)
     if given.lengths is not None:
@@ -342,7 +333,11 @@ class _Limits:
         A model's cables may be softer than the robot's, or soften as they are stretched: it is
         their own law that says at which tension they are strained so much.
         """
-        most = _tensions_at(_STRAIN, tables)
+        from seecr.compiled.rates import tensions_at_strain  # takes a while to import
+
+        each = np.empty(tables.cables.shape[:2])
+        tensions_at_strain(tables.cables, _STRAIN, each)
+        most = each.min(axis=0, initial=np.inf)
         ends = np.isinf(self.high) & (self.low < most)
         return replace(self, high=np.where(ends, most, self.high))
 
@@ -385,7 +380,7 @@ class _Search:
     def margins_in_place(self, thorough: bool) -> Array:
         """(n,) [N] margins of positions; minus infinity if they are not held or not stable."""
         tables, rows = self._tables(self.given), np.arange(len(self.given))
-        problem = self._reaching(rows, tables.scale, fix_position=True)
+        problem = self._nearest_problem(rows, tables.scale, fix_position=True)
         aimed, found = poses_in_place(problem, tables, thorough)
         margins, rows = np.full(len(rows), -np.inf), np.flatnonzero(found)
         if len(rows) == 0:
@@ -426,78 +421,69 @@ class _Search:
         tables, limits = self._tables(commands), self.limits
         return hold(tables, limits.aim, limits.low, limits.high), tables
 
-    def _reaching(self, rows: NDArray[np.intp], scale: Array, *, fix_position: bool) -> Reaching:
+    def _nearest_problem(
+        self, rows: NDArray[np.intp], scale: Array, *, fix_position: bool
+    ) -> NearestProblem:
         """The problem of the nearest poses for some rows."""
         limits, mine = self.limits, self.given.rows(rows)
-        home = np.tile(self.robot.reference_pose, (len(rows), 1))
-        own = self._tables(mine)
+        ends = limits.low, limits.high
+        own, home = self._tables(mine), np.tile(self.robot.reference_pose, (len(rows), 1))
         straight = is_straight(own, self._tables(replace(mine, pose=home)))
-
-        def balance(
-            poses: Array, some: NDArray[np.intp], about: Array | None = None
-        ) -> tuple[Array, Array]:
-            part = replace(self.given.rows(rows[some]), pose=poses)
-            return counted_balance(self._tables(part), limits.low, limits.high, about)
-
         # beside its exit point a cable may pull any way, so that much seems to be held there; but
         # the platform is at the winch, which is no place to stay
         least = _SHORT * float(np.min(self.robot.reference_lengths))
 
+        def at(poses: Array, some: NDArray[np.intp]) -> Commands:
+            return replace(self.given.rows(rows[some]), pose=poses)
+
+        def balance(
+            poses: Array, some: NDArray[np.intp], about: Array | None = None
+        ) -> tuple[Array, Array]:
+            return counted_balance(self._tables(at(poses, some)), *ends, about)
+
         def stays(poses: Array, some: NDArray[np.intp]) -> NDArray[np.bool_]:
-            part = replace(self.given.rows(rows[some]), pose=poses)
-            tables = self._tables(part)
-            straight = bridged_lengths(tables)
-            told = np.nan_to_num(told_lengths(self.robot, part, self.effects, straight), nan=np.inf)
-            firm = holds_firmly(tables, limits.aim[rows[some]], limits.low, limits.high)
-            return np.asarray(firm & (np.minimum(straight, told).min(axis=1) > least))
+            there = at(poses, some)
+            tables = self._tables(there)
+            spans = bridged_lengths(tables)
+            told = commanded_lengths(self.robot, there, self.effects, spans)
+            shortest = np.minimum(spans, np.nan_to_num(told, nan=np.inf)).min(axis=1)
+            stable = holds_stably(tables, limits.aim[rows[some]], *ends)
+            return np.asarray(stable & (shortest > least))
 
         def holds(poses: Array, some: NDArray[np.intp]) -> NDArray[np.bool_]:
-            tables = self._tables(replace(self.given.rows(rows[some]), pose=poses))
-            return holds_tightly(tables, limits.low, limits.high)
+            return holds_tightly(self._tables(at(poses, some)), *ends)
 
-        return Reaching.within(
-            self.robot, self.given.pose[rows], balance, stays, (limits.low, limits.high),
-            scale[rows], fix_position=fix_position, straight=own if straight else None,
+        return NearestProblem.within(
+            self.robot, self.given.pose[rows], balance, stays, ends, scale[rows],
+            fix_position=fix_position, straight=own if straight else None,
             holds=holds if bends(own) and self.robot.n_cables >= self.robot.n_dof else None,
         )  # fmt: skip
 
     def _nearest(self, rows: NDArray[np.intp], scale: Array, fix_position: bool) -> Nearest:
-        best = nearest(self._reaching(rows, scale, fix_position=fix_position))
-        again = np.flatnonzero(~best.firm)
+        best = nearest(self._nearest_problem(rows, scale, fix_position=fix_position))
+        again = np.flatnonzero(~best.stable)
         if fix_position and len(again):
             # the position cannot be kept either
             other = self._nearest(rows[again], scale, False)
-            better = other.firm | (other.found & ~best.found[again])
-            to = again[better]
-            best.poses[to], best.found[to] = other.poses[better], other.found[better]
-            best.firm[to], best.settled[to] = other.firm[better], other.settled[better]
+            better = other.stable | (other.found & ~best.found[again])
+            best.put(again[better], other.only(better))
         return best
 
     def _lengths(self, commands: Commands, held: Held) -> tuple[Array, Prediction]:
-        """Told lengths that pay out the rest lengths of ``held``, and the prediction with them."""
+        """Lengths to command that pay out those of ``held``, and the prediction with them."""
         limits = self.limits.aim, self.limits.low, self.limits.high
         return lengths_with_history(self.robot, commands, self.effects, held, limits)
 
 
-def _tensions_at(strain: float, tables: Tables) -> Array:
-    """(m,) [N] tensions that strain no cable by more, in any row; infinite without rows."""
-    from seecr.compiled.rates import tensions_at_strain  # takes a while to import
-
-    out = np.empty(tables.cables.shape[:2])
-    tensions_at_strain(tables.cables, strain, out)
-    return np.asarray(out.min(axis=0, initial=np.inf))
-
-
-def _largest(moved: Array) -> float:
-    """The largest of displacements (n, 3) [m]; 0 where that is rounding."""
-    largest = float(np.linalg.norm(moved, axis=1).max())
-    return 0.0 if largest < _MOVED else largest
+def _largest(vectors: Array, rounding: float = _MOVED) -> float:
+    """The longest of vectors (n, 3), displacements [m] or rotations [deg]; 0 for rounding."""
+    longest = float(np.linalg.norm(vectors, axis=1).max())
+    return 0.0 if longest < rounding else longest
 
 
 def _degrees(turned: Array) -> float:
     """The largest of rotations (n, 3) [rad] in degrees; 0 where that is rounding."""
-    largest = float(np.degrees(np.linalg.norm(turned, axis=1).max()))
-    return 0.0 if largest < _TURNED else largest
+    return _largest(np.degrees(turned), _TURNED)
 
 
 def _rests_at(poses: Array, solution: Solution) -> NDArray[np.bool_]:
@@ -509,13 +495,8 @@ def _rests_at(poses: Array, solution: Solution) -> NDArray[np.bool_]:
 
 def _without(solution: Solution, rows: NDArray[np.bool_]) -> Solution:
     """The solution with NaN in rows for which there are no lengths."""
-    if not np.any(rows):
-        return solution
-    kept = ~rows[:, None]
-    return replace(
-        solution,
-        pose=np.where(kept, solution.pose, np.nan),
-        deviation=np.where(kept, solution.deviation, np.nan),
-        tensions=np.where(kept, solution.tensions, np.nan),
-        rest_lengths=np.where(kept, solution.rest_lengths, np.nan),
-    )
+    names = ("pose", "deviation", "tensions", "rest_lengths")
+    kept: dict[str, Any] = {
+        name: np.where(rows[:, None], np.nan, getattr(solution, name)) for name in names
+    }
+    return replace(solution, **kept) if np.any(rows) else solution

@@ -12,7 +12,6 @@ from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects.terms import Terms
 from seecr.errors import InputError
-from seecr.holding.distribution import tension_limits
 from seecr.inverse.correction import margins_in_place
 from seecr.pose import Array
 from seecr.prediction.experiment import Experiment, effects_of
@@ -20,6 +19,7 @@ from seecr.prediction.model import GivenEffects, Model, model_given
 from seecr.prediction.sensitivity import sensitivities
 from seecr.prediction.uncertainty import moving_covariance
 from seecr.statics.starts import Commanded, commanded_poses, commands_from
+from seecr.tensions.distribution import tension_limits
 from seecr.workspace.zones import load_scale, tension_margin
 
 

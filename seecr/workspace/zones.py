@@ -24,9 +24,6 @@ from seecr.description.joints import motion_columns, values_of_pose
 from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.errors import InputError
-from seecr.holding.balance import balance_of, bends
-from seecr.holding.distribution import tension_limits
-from seecr.holding.inside import margins_inside
 from seecr.parallel import in_parts
 from seecr.pose import Array, all_finite, quat_rotate, transform_points
 from seecr.prediction.experiment import Experiment, effects_of
@@ -34,6 +31,9 @@ from seecr.result import Record, Result
 from seecr.statics.solution import Solution, check_solution
 from seecr.statics.starts import commanded_poses
 from seecr.statics.tables import Tables, assemble
+from seecr.tensions.balance import balance_of, bends
+from seecr.tensions.distribution import tension_limits
+from seecr.tensions.max_margin import margins_inside
 
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects

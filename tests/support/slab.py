@@ -8,7 +8,7 @@ import numpy as np
 
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Joint, Robot
-from seecr.inverse.nearest.problem import Reaching, Rows
+from seecr.inverse.nearest_problem import NearestProblem, Rows
 from seecr.pose import Array
 
 REACH = 0.25
@@ -27,7 +27,7 @@ def slides() -> Robot:
     return replace(robot, joints=joints)
 
 
-def slab(wanted_x: list[float], stays_from: float = -np.inf) -> Reaching:
+def slab(wanted_x: list[float], stays_from: float = -np.inf) -> NearestProblem:
     """Wanted poses so far [m] beside the reference pose; stable only from some x on."""
     robot = slides()
     wanted = np.tile(robot.reference_pose, (len(wanted_x), 1))
@@ -42,4 +42,4 @@ def slab(wanted_x: list[float], stays_from: float = -np.inf) -> Reaching:
         return np.asarray(poses[:, 0] - robot.reference_pose[0] >= stays_from)
 
     limits = np.zeros(3), np.array([_STIFF * REACH, _STIFF * REACH, 2.0])
-    return Reaching.within(robot, wanted, balance, stays, limits, np.ones(len(wanted)))
+    return NearestProblem.within(robot, wanted, balance, stays, limits, np.ones(len(wanted)))

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seecr.description.robot import Robot
-from seecr.holding.distribution import balanced, tension_limits
 from seecr.pose import Array
+from seecr.tensions.distribution import balanced, tension_limits
 from seecr.workspace.zones import balance_equations
 
 

@@ -6,14 +6,13 @@ import numpy as np
 
 import seecr
 from seecr.commands import Commands
-from seecr.holding.balance import straight_balance
-from seecr.holding.distribution import distribute
-from seecr.holding.inside import can_balance, innermost
-from seecr.inverse.nearest.turned import turned_in_place
+from seecr.inverse.in_place import turned_in_place
 from seecr.pose import changes_between, moved_by, rotated
 from seecr.prediction.experiment import Experiment
 from seecr.prediction.sensitivity import sensitivities
 from seecr.statics.tables import assemble
+from seecr.tensions.balance import straight_balance
+from seecr.tensions.distribution import can_balance, distribute, innermost
 from seecr.workspace.zones import tension_margin
 
 # What a walk, a change of all and a change of each cable are needed for.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from seecr.compiled.tensions import feasible_of, innermost_of
-from seecr.holding.unheld import _by_program, _least_beyond
+from seecr.tensions.infeasible import _by_program, _least_beyond
 
 LIMITS = [(0.0, np.inf), (0.2, np.inf), (0.2, 1.5)]
 

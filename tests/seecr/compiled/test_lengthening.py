@@ -19,10 +19,9 @@ from seecr.compiled.columns import (
 )
 from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Term, catalogue, layout_of
-from seecr.holding.balance import here, with_rest
-from seecr.holding.hanging import rest_after, rest_for
 from seecr.prediction.experiment import Experiment, Prediction, effects_of
 from seecr.statics import batch
+from seecr.tensions.balance import here, rest_after, rest_for, with_rest
 
 LAWS = ("nonlinear_elasticity", "hysteresis", "creep", "exit_friction", "frame_compliance")
 ALL = ("pulley_radius", "cable_weight", *LAWS)

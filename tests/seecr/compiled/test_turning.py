@@ -22,11 +22,11 @@ from seecr.description.joints import pose_of_values
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Joint, Robot
 from seecr.effects.load import ExternalWrench
-from seecr.holding.balance import balance_of, straight_balance
-from seecr.inverse.nearest.turned import Turned, turned_in_place
+from seecr.inverse.in_place import Turned, turned_in_place
 from seecr.pose import Array, pose_difference, quat_rotate, rxyz_from_quat
 from seecr.prediction.experiment import Experiment
 from seecr.statics.tables import Tables, assemble
+from seecr.tensions.balance import balance_of, straight_balance
 from seecr.workspace.planar import bar_tilt
 
 # Less than twice the mean of the tensions: this limit is the nearer one.

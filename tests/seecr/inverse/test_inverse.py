@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,9 +16,8 @@ from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
 from seecr.effects import Term, catalogue, layout_of
 from seecr.errors import InputError
-from seecr.holding.unheld import why_not_held
 from seecr.inverse.correction import correct
-from seecr.inverse.told import unplay
+from seecr.inverse.lengths import unplay
 from seecr.pose import pose_add, pose_difference
 from seecr.prediction.experiment import Experiment, Prediction, predict
 from seecr.workspace.zones import balance_equations, feasible
@@ -229,33 +227,6 @@ def test_it_is_told_which_cable_cannot_do_what_it_would_have_to() -> None:
     assert tight.records()[0]["why_not"] == tight.why_not[0]
 
 
-def test_a_load_that_no_pull_can_balance_is_told_as_such() -> None:
-    """Two cables in a plane cannot take a torque out of nothing, however they pull."""
-    matrix, load = np.array([[1.0, -1.0], [1.0, 1.0], [0.0, 0.0]]), np.array([0.0, 1.0, 0.5])
-    names, low, high = ["a", "b"], np.zeros(2), np.full(2, np.inf)
-    assert why_not_held(matrix, load, low, high, names).startswith("no pulls of the cables")
-    short = why_not_held(matrix, np.array([0.0, 2.0, 0.0]), low, np.array([0.5, 9.0]), names)
-    assert short == "cable a would have to pull 1 N, more than 0.5 N"
-    less = why_not_held(matrix, np.array([0.0, 2.0, 0.0]), np.array([1.5, 0.0]), high, names)
-    assert less == "cable a would have to pull 1 N, less than 1.5 N"
-    large = why_not_held(matrix, np.array([0.0, 2e4, 0.0]), low, np.array([6000.0, 9e4]), names)
-    assert large == "cable a would have to pull 10000 N, more than 6000 N"
-
-
-def test_where_only_the_upper_limit_is_in_the_way_no_cable_is_said_to_push() -> None:
-    """Two shallow cables from above and one from below: less is exceeded if the latter pushes."""
-    matrix, load = np.array([[-1.0, 1.0, 0.0], [0.1, 0.1, -1.0]]), np.array([0.0, 50.0])
-    high, names = np.full(3, 60.0), ["a", "b", "c"]
-    said = [
-        why_not_held(matrix, load, np.array([1.0, 1.0, low]), high, names) for low in (0.0, 1.0)
-    ]
-    for one, pull in zip(said, (250, 255), strict=True):
-        parts = [f"cable {k} would have to pull {pull} N, more than 60 N" for k in "ab"]
-        assert sorted(one.split("; ")) == parts
-    above = why_not_held(matrix, np.array([0.0, -50.0]), np.ones(3), np.full(3, 9.0), names)
-    assert "push" not in above and "cable c would have to pull" in above
-
-
 @pytest.mark.parametrize("highest", [np.inf, 50.0])
 def test_without_a_load_it_is_the_lower_limit_that_is_told(highest: float) -> None:
     """Refused once as if no pulls could balance nothing; slack cables do."""
@@ -267,30 +238,6 @@ def test_without_a_load_it_is_the_lower_limit_that_is_told(highest: float) -> No
         f"{cable[0]} would have to pull 0 N, less than 2 N; "
         f"{cable[1]} would have to pull 0 N, less than 2 N",
     )
-
-
-@pytest.mark.parametrize("size", [1e-12, 1.0, 1e4])
-def test_the_lower_limit_is_told_whatever_its_size(size: float) -> None:
-    """Three cables from above, on a point: nothing pulls against them."""
-    up = np.array([[2.0, -1.0, 0.0], [1.0, 1.0, 1.0]])
-    low, high, names = np.full(3, size), np.full(3, np.inf), ["a", "b", "c"]
-    said = why_not_held(up, np.zeros(2), low, high, names)
-    assert said.startswith(
-        "without a load all cables could be slack, but not with the lower limit: cable"
-    )
-    assert said.count(f"{size:.3g} N" if size < 1e3 else f"{size:.0f} N") >= 2
-    nothing = why_not_held(up, np.zeros(2), 0.0 * low, high, names)
-    assert nothing.startswith("tensions at their limits would balance")
-    loaded = why_not_held(up, np.array([0.0, size]), low, high, names)
-    assert loaded.startswith("cable") and "without a load" not in loaded
-
-
-def test_a_search_for_a_reason_that_fails_gives_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    ended = SimpleNamespace(status=4, x=None)
-    monkeypatch.setattr("scipy.optimize.linprog", lambda *_, **__: ended)
-    low, high = np.zeros(4), np.full(4, 0.2)
-    said = why_not_held(np.ones((1, 4)), np.ones(1), low, high, list("abcd"))
-    assert said == "no tensions within the limits balance the load there"
 
 
 def test_the_inverse_of_play_is_played_back() -> None:
@@ -495,8 +442,7 @@ def test_lengths_are_found_where_poses_are_repeated_with_every_history(name: str
 
 
 @pytest.mark.parametrize(
-    ("name", "values"),
-    [("stiffness", [0.4]), ("nonlinear_elasticity", [0.0, -1200.0])],
+    ("name", "values"), [("stiffness", [0.4]), ("nonlinear_elasticity", [0.0, -1200.0])]
 )
 def test_the_strain_that_ends_the_search_is_by_the_law_of_the_models_cables(
     name: str, values: list[float]

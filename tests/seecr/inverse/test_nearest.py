@@ -11,12 +11,10 @@ from seecr.description.mjcf import load_robot, model_path
 from seecr.effects.cable import CableWeight
 from seecr.effects.terms import Term
 from seecr.errors import InputError
+from seecr.inverse import nearest
 from seecr.inverse.correction import correct
-from seecr.inverse.nearest import search
-from seecr.inverse.nearest.motion import PlatformMotion
-from seecr.inverse.nearest.problem import Curved, Reaching, Spots
-from seecr.inverse.nearest.screen import spread
-from seecr.inverse.nearest.seeds import Candidates
+from seecr.inverse.nearest_problem import Curved, NearestProblem, PlatformMotion, Spots
+from seecr.inverse.nearest_starts import Candidates
 from seecr.pose import pose_difference, transform_points
 from seecr.prediction.model import load_model
 from seecr.workspace.planar import bar_equilibria
@@ -156,7 +154,7 @@ def test_a_pose_from_which_the_platform_goes_elsewhere_is_told(
     robot, limits = load_robot(model_path(name)), score_nearest.LIMITS[name]
     want = score_nearest.wanted_poses(robot, limits, "turned", 10, 1)[9:]
     every = lambda _self, _away, rows: np.ones(len(rows), dtype=bool)  # noqa: E731
-    monkeypatch.setattr(Reaching, "rests", every)
+    monkeypatch.setattr(NearestProblem, "rests", every)
     found = correct(robot, want, **limits)
     assert found.found.all() and found.solution.converged.all() and not found.stays.any()
     assert "1 where forces balance but the platform does not come to rest: pose " in str(found)
@@ -167,7 +165,7 @@ def test_an_answer_that_is_no_local_minimum_is_told(monkeypatch: pytest.MonkeyPa
     robot, want = load_robot(model_path("demobot_parallel")), np.array([1.2, 0.25, 0.1, 1, 0, 0, 0])
     found = correct(robot, want)
     assert found.found[0] and found.settled[0] and "nearer pose that can be held" not in str(found)
-    monkeypatch.setattr(search, "inward", lambda _problem, start: start)
+    monkeypatch.setattr(nearest, "solve_sqp", lambda _problem, start: start)
     cut = correct(robot, want)
     assert cut.found[0] and not cut.settled[0]
     assert "1 of them: a nearer pose that can be held may exist: pose 0" in str(cut)
@@ -179,7 +177,7 @@ def test_a_turn_about_a_hinge_is_as_far_as_its_shorter_way() -> None:
     want, there = pose_of_values(robot, values)[0]
     none = np.zeros((1, 4))
     motion = PlatformMotion.about(robot, want[None], values_of_pose(robot, want[None])[1], False)
-    problem = Reaching(
+    problem = NearestProblem(
         robot, want[None], values[:1], lambda poses, *_: balance_equations(robot, poses),
         lambda _, rows: np.ones(len(rows), dtype=bool), none, none, np.ones(1), motion,
     )  # fmt: skip
@@ -192,7 +190,7 @@ def test_balance_bends_as_its_rates_change() -> None:
     none = np.zeros((1, 8))
     want = robot.reference_pose[None]
     motion = PlatformMotion.about(robot, want, np.zeros((1, 0, 7)), False)
-    problem = Reaching(
+    problem = NearestProblem(
         robot, want, None, lambda poses, *_: balance_equations(robot, poses),
         lambda _, rows: np.ones(len(rows), dtype=bool), none, none, np.array([200.0]), motion,
     )  # fmt: skip
@@ -244,40 +242,6 @@ def test_numbers_that_are_none_are_refused_and_no_singular_values_are_sought() -
         values_of_pose(robot, np.where(np.arange(7) < 3, np.nan, robot.reference_pose)[None])
 
 
-def test_starts_are_the_nearest_that_differ_in_rotation() -> None:
-    """One after the other, each compared with all that were taken; rows know nothing of others."""
-    robot = load_robot(model_path("demobot_parallel"))
-    random, most = np.random.default_rng(2), 9
-    rows = random.permutation(np.repeat([0, 2], 60))
-    away = robot.length * random.normal(size=(len(rows), 6))
-    problem = Reaching.within(
-        robot, np.tile(robot.reference_pose, (3, 1)), none_balances, none_stays,
-        (np.zeros(8), np.ones(8)), np.ones(3),
-    )  # fmt: skip
-    expected = []
-    for row in (0, 2):
-        mine = sorted(np.flatnonzero(rows == row), key=lambda j: np.linalg.norm(away[j]))
-        taken: list[int] = []
-        for gap in (0.7, 0.35, 0.175):
-            for j in mine:
-                apart = [np.linalg.norm(away[j, 3:] - away[i, 3:]) for i in taken]
-                if len(taken) < most and all(one > gap * robot.length for one in apart):
-                    taken.append(int(j))
-        expected += taken
-    assert spread(problem, away, rows, most) == expected
-    # displacements without end belong to another row, and overflow nothing here
-    huge = np.concatenate([away, np.full((1, 6), 1e150)])
-    assert spread(problem, huge, np.append(rows, 1), most)[:most] == expected[:most]
-
-
-def none_balances(*_: object) -> tuple[np.ndarray, np.ndarray]:
-    raise AssertionError("nothing is balanced here")
-
-
-def none_stays(*_: object) -> np.ndarray:
-    raise AssertionError("nothing has to stay here")
-
-
 @pytest.mark.parametrize("name", ["planar_vertical", "planar_horizontal"])
 def test_no_nearest_pose_is_at_a_winch(name: str) -> None:
     """A cable of 0.1 mm may pull any way: corrections had ended there, with lengths below zero."""
@@ -313,14 +277,14 @@ def test_poses_searched_in_lots_are_the_same(monkeypatch: pytest.MonkeyPatch) ->
     wanted[:, 3] = 1.0
     whole = correct(robot, wanted)
     lots: list[list[int]] = []
-    screened = search.screened
+    pruned = nearest.prune_starts
 
-    def noted(problem: Reaching, candidates: Candidates, most: int) -> Spots:
+    def noted(problem: NearestProblem, candidates: Candidates, most: int) -> Spots:
         lots.append(sorted(set(candidates.rows.tolist())))
-        return screened(problem, candidates, most)
+        return pruned(problem, candidates, most)
 
-    monkeypatch.setattr(search, "screened", noted)
-    monkeypatch.setattr(search, "_AT_ONCE", 3)
+    monkeypatch.setattr(nearest, "prune_starts", noted)
+    monkeypatch.setattr(nearest, "_AT_ONCE", 3)
     parts = correct(robot, wanted)
     assert (~whole.held).sum() == 7 and lots[:3] == [[0, 1, 2], [3, 4, 5], [6]]
     unit = np.repeat([1.0, robot.length], 3)

@@ -8,7 +8,6 @@ import pytest
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.effects import Term
-from seecr.holding.unheld import without_span
 from seecr.inverse.correction import correct
 from seecr.pose import quat_to_matrix
 from seecr.prediction.experiment import predict
@@ -43,10 +42,3 @@ def test_within_a_pulley_the_missing_length_is_named(beside: float) -> None:
     pose = at_exit(ROBOT, beside=beside)
     assert predict(ROBOT, pose[None], pulleys).solution().status[0] is Status.NO_LENGTH
     assert "within its pulley" in correct(ROBOT, pose[None], effects=pulleys).why_not[0]
-
-
-def test_of_several_cables_one_is_named() -> None:
-    gone, pulleys = np.array([False, True, True]), np.zeros(3, bool)
-    assert without_span(gone, pulleys, ["a", "b", "c"]) == (
-        "cable b would have no length, its anchor point at its exit point, nor would 1 more cable"
-    )

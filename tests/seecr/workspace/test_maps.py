@@ -25,7 +25,7 @@ from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.inverse import correction
 from seecr.inverse.correction import correct, margins_in_place
-from seecr.inverse.nearest.turned import Turned
+from seecr.inverse.in_place import Turned
 from seecr.pose import quat_from_rotvec
 from seecr.show.batch_words import edge_line, softest_line
 from seecr.show.files import write_arrays

@@ -1,44 +1,42 @@
-"""The balance about poses, as the search for the nearest pose that can be held needs it."""
+"""The problem of the nearest pose that can be held: motion of the platform, and its balance.
+
+A distance is the norm of the displacement of the platform's origin and of its rotation vector times
+the robot's length. The coordinates of a free platform are just these. Those of a platform on joints
+are not: a hinge beside the origin also moves it, and slides behind a hinge turn. So searches for
+those make steps along directions that are orthonormal as motions of the platform.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.description.joints import pose_of_values, values_of_pose
+from seecr.description.joints import freedoms, pose_of_values, values_of_pose
 from seecr.description.robot import Robot
-from seecr.holding.balance import straight_balance
-from seecr.holding.distribution import balanced, distribute, nearly_balanced
-from seecr.holding.inside import can_balance
-from seecr.inverse.nearest.motion import Directions, PlatformMotion
+from seecr.parallel import in_parts
 from seecr.pose import Array, pose_add, pose_difference
-from seecr.statics.tables import Tables
+from seecr.statics.tables import Tables, take
+from seecr.tensions.balance import ByRow, straight_balance
+from seecr.tensions.distribution import balanced, can_balance, distribute, nearly_balanced
 
 Rows = NDArray[np.intp]
 
+Balance = Callable[..., tuple[Array, Array]]
+"""The balance at poses (k, 7) of some rows (k,): matrices (k, d, m) and loads (k, d).
 
-class Balance(Protocol):
-    """The balance at poses (k, 7) of some rows: matrices (k, d, m) and loads (k, d).
-
-    It is linearised in the tensions at ``about`` (k, m), which matters for heavy cables; by default
-    at tensions that come near to balance. A row may occur several times.
-    """
-
-    def __call__(
-        self, poses: Array, rows: Rows, about: Array | None = None, /
-    ) -> tuple[Array, Array]: ...
-
-
-Stays = Callable[[Array, Rows], NDArray[np.bool_]]
-"""Whether the platform is stable at poses (k, 7) of some rows, with the lengths that hold it there.
+It is linearised in the tensions (k, m), the third argument, which matters for heavy cables; by
+default at tensions that come near to balance. A row may occur several times.
 """
 Holds = Callable[[Array, Rows], NDArray[np.bool_]]
-"""Whether poses (k, 7) of some rows can be held, by the balance as it is and not linearised."""
+"""Whether something holds of poses (k, 7) of some rows (k,)."""
 
+# Squared motion of a combination of joints, relative to the largest, that counts as none.
+_IDLE = 1e-12
+# A position that is kept may be off by this [robot's length].
+_KEPT = 1e-8
 # Tensions of a pose this close to the limit still have some margin [load].
 _INSIDE = 1e-6
 # Weight of a tension of one load, as a displacement [robot's length]: hardly any.
@@ -48,7 +46,157 @@ _DIFFERENCE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Reaching:
+class Directions:
+    """Orthonormal directions of the platform's motion at k displacements.
+
+    Attributes:
+        basis: (k, d, d) displacements per step along each, in their columns; None for a free
+            platform, whose coordinates they are.
+        squares: (k, d, d) products of their motions: one along each, but where joints can be moved
+            without the platform; None likewise.
+        slope: (k, d) [m] derivative of half the squared distance along each.
+    """
+
+    basis: Array | None
+    squares: Array | None
+    slope: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PlatformMotion:
+    """Motions from n wanted poses; ``away`` (k, d) [m] are displacements along the coordinates.
+
+    Attributes:
+        poses: (n, 7) wanted. screws: (n, d, 7) the joints there; (n, 0, 7) for a free platform.
+        free: (d,) how far each direction may be followed, 0 or infinity; those that move the
+            origin come first.
+        turns: independent rotations that keep the origin.
+        steady: whether any rotation can keep the origin.
+    """
+
+    robot: Robot
+    poses: Array
+    screws: Array
+    free: Array
+    turns: int
+    steady: bool
+
+    @classmethod
+    def about(cls, robot: Robot, poses: Array, screws: Array, fix_position: bool) -> PlatformMotion:
+        """Motions from poses (n, 7), with ``fix_position`` only those that keep positions."""
+        whole, turns, rotations = freedoms(robot)
+        free = np.full(robot.n_dof, np.inf)
+        if fix_position and turns < whole:
+            free[: robot.n_dof - turns] = 0.0
+        return cls(robot, poses, np.ascontiguousarray(screws), free, turns, turns == rotations)
+
+    @property
+    def is_in_place(self) -> bool:
+        """Whether positions are kept."""
+        return not np.all(self.free > 0.0)
+
+    def part(self, rows: Rows) -> PlatformMotion:
+        """The motions from some of the wanted poses."""
+        return replace(self, poses=self.poses[rows], screws=self.screws[rows])
+
+    def apart(self, away: Array, rows: Rows) -> Array:
+        """(k, 6) [m] displacements of the origin, and rotation vectors times the length."""
+        return self._apart_and_columns(away, rows)[0] if self.robot.joints else away
+
+    def far(self, away: Array, rows: Rows) -> Array:
+        """(k,) [m] distances from the wanted poses of rows."""
+        return np.asarray(np.linalg.norm(self.apart(away, rows), axis=1))
+
+    def directions(self, away: Array, rows: Rows) -> Directions:
+        """Orthonormal directions to step along from displacements of rows."""
+        if not self.robot.joints:
+            return Directions(None, None, away)
+        apart, columns = self._apart_and_columns(away, rows)
+        squares, own = np.linalg.eigh(columns @ columns.swapaxes(1, 2))
+        some = squares > _IDLE * squares[:, -1:]
+        root = np.where(some, 1.0 / np.sqrt(np.where(some, squares, 1.0)), 0.0)
+        # of all orthonormal directions those nearest to the joints' own
+        basis = own * root[:, None] @ own.swapaxes(1, 2)
+        moves = basis @ columns
+        if self.is_in_place:
+            # those that keep the origin last: they turn as much as they move at all
+            linear, turned = moves[..., :3], moves[..., 3:]
+            share = linear @ linear.swapaxes(1, 2) - turned @ turned.swapaxes(1, 2)
+            order = np.linalg.eigh(share)[1][..., ::-1]
+            basis, moves = basis @ order, order.swapaxes(1, 2) @ moves
+        squares = moves @ moves.swapaxes(1, 2)
+        return Directions(basis, squares, np.einsum("kir,kr->ki", moves, apart))
+
+    def stepped(self, away: Array, rows: Rows, basis: Array | None, step: Array) -> Array:
+        """Displacements (k, d) after steps (k, d) [m] along directions; kept positions are kept."""
+        if basis is None:
+            return np.asarray(away + step)
+        return self.allowed(away + np.einsum("kij,kj->ki", basis, step), rows)
+
+    def allowed(self, away: Array, rows: Rows) -> Array:
+        """The displacements with positions brought back to the wanted ones if these are kept."""
+        if not self.is_in_place:
+            return away
+        if not self.robot.joints:
+            return np.where(self.free > 0.0, away, 0.0)
+        return self._brought(away, rows, np.zeros((len(rows), 3)))[0]
+
+    def are_allowed(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
+        """(k,) whether positions are the wanted ones, if these are kept."""
+        if not (self.is_in_place and self.robot.joints):
+            return np.ones(len(rows), dtype=bool)
+        off = np.abs(self.apart(away, rows)[:, :3]).max(axis=1)
+        return np.asarray(off <= _KEPT * self.robot.length)
+
+    def brought(self, away: Array, rows: Rows, places: Array) -> Array:
+        """The same rotations at displacements (k, 3) [m] of the origin.
+
+        Joints that cannot turn the platform without moving its origin are left as they are.
+        """
+        if not self.robot.joints:
+            return np.concatenate([places, away[:, 3:]], axis=1)
+        return self._brought(away, rows, places)[0] if self.steady else away
+
+    def turned(self, away: Array, rows: Rows) -> Array:
+        """(k, 3) [m] rotation vectors times the length; displacements if nothing can turn."""
+        return self.apart(away, rows)[:, slice(3, 6) if self.robot.turns else slice(0, 3)]
+
+    def _apart_and_columns(self, away: Array, rows: Rows) -> tuple[Array, Array]:
+        """(k, 6) [m] from the wanted poses, and (k, d, 6) motion per step of each joint."""
+        from seecr.compiled.joint_kinematics import apart_batch  # takes a while to import
+
+        k, d = away.shape
+        apart, columns = np.empty((k, 6)), np.empty((k, d, 6))
+        moves, places = np.ascontiguousarray(away), np.ascontiguousarray(rows)
+
+        def run(part: slice) -> None:
+            apart_batch(
+                self.screws, self.poses, places[part], moves[part], self.robot.length, apart[part],
+                columns[part],
+            )  # fmt: skip
+
+        in_parts(run, k)
+        return apart, columns
+
+    def _brought(self, away: Array, rows: Rows, places: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Displacements (k, d) with origins at places (k, 3) [m], and whether they are there."""
+        from seecr.compiled.joint_kinematics import bring_batch  # takes a while to import
+
+        out, there = np.array(away, order="C"), np.empty(len(rows), dtype=np.bool_)
+        of, to = np.ascontiguousarray(rows), np.ascontiguousarray(places)
+
+        def run(part: slice) -> None:
+            bring_batch(
+                self.screws, self.poses, of[part], out[part], self.robot.length, to[part],
+                there[part],
+            )  # fmt: skip
+
+        in_parts(run, len(rows))
+        return out, there
+
+
+@dataclass(frozen=True, eq=False)
+class NearestProblem:
     """The search for the poses nearest to wanted ones (n, 7) that can be held.
 
     ``away`` (k, d) is the displacement of poses from the wanted ones along the coordinates [m];
@@ -59,34 +207,26 @@ class Reaching:
     wanted: Array
     values: Array | None  # (n, d) joint values at the wanted poses, None for a free platform
     balance: Balance
-    stays: Stays
+    stays: Holds  # whether the platform is stable, with the lengths that hold it there
     least: Array  # (n, m) [N]
     most: Array  # (n, m) [N]
     scale: Array  # (n,) [N] load
     motion: PlatformMotion  # from the wanted poses
     straight: Tables | None = None  # (n,) of the wanted poses; None if cables are not straight
-    holds: Holds | None = None  # None if the balance is linear
+    holds: Holds | None = None  # whether the balance itself holds; None if it is linear
 
     @classmethod
     def within(
-        cls,
-        robot: Robot,
-        wanted: Array,
-        balance: Balance,
-        stays: Stays,
-        limits: tuple[Array, Array],
-        scale: Array,
-        *,
-        fix_position: bool = False,
-        straight: Tables | None = None,
-        holds: Holds | None = None,
-    ) -> Reaching:
+        cls, robot: Robot, wanted: Array, balance: Balance, stays: Holds,
+        limits: tuple[Array, Array], scale: Array, *, fix_position: bool = False,
+        straight: Tables | None = None, holds: Holds | None = None,
+    ) -> NearestProblem:  # fmt: skip
         """The problem of wanted poses (n, 7).
 
         Args:
             limits: (m,) smallest and largest tensions [N]. scale: (n,) [N] load.
             fix_position: keep the position and change only the orientation.
-            straight: of the wanted poses, if they are :func:`seecr.holding.balance.is_straight`:
+            straight: of the wanted poses, if they are :func:`seecr.tensions.balance.is_straight`:
                 their balance then needs neither ``balance`` nor poses.
             holds: for a balance that is not linear in the tensions.
         """
@@ -102,19 +242,25 @@ class Reaching:
             robot, wanted, values, balance, stays, least, most, scale, motion, straight, holds
         )
 
-    @property
-    def is_in_place(self) -> bool:
-        """Whether positions are kept."""
-        return self.motion.is_in_place
+    def part(self, rows: Rows) -> NearestProblem:
+        """The problem for some of its rows."""
+        holds = self.holds
+        return replace(
+            self, wanted=self.wanted[rows],
+            values=None if self.values is None else self.values[rows],
+            balance=lambda poses, some, about=None: self.balance(poses, rows[some], about),
+            stays=lambda poses, some: self.stays(poses, rows[some]),
+            holds=None if holds is None else lambda poses, some: holds(poses, rows[some]),
+            least=self.least[rows], most=self.most[rows], scale=self.scale[rows],
+            motion=self.motion.part(rows),
+            straight=None if self.straight is None else take(self.straight, rows),
+        )  # fmt: skip
 
     @property
     def home(self) -> Array:
         """The coordinates (1, 7) or (1, d) of the reference pose, see :meth:`coordinates`."""
-        return (
-            self.robot.reference_pose[None]
-            if self.values is None
-            else np.zeros((1, self.robot.n_dof))
-        )
+        free = self.values is None
+        return self.robot.reference_pose[None] if free else np.zeros((1, self.robot.n_dof))
 
     def coordinates(self, poses: Array) -> Array:
         """Joint values (k, d) at poses (k, 7), which take a search; of free platforms the poses."""
@@ -164,7 +310,7 @@ class Reaching:
             out[some] = self.holds(self.placed(away[some], rows[some]), rows[some])
         return out
 
-    def firm(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
+    def stable(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
         """Whether the platform is held and stable at these displacements, checked exactly."""
         out = self.held(away, rows)
         some = np.flatnonzero(out)
@@ -209,12 +355,7 @@ class Reaching:
         return np.asarray((_WEIGHT * self.robot.length / self.scale[rows])[:, None])
 
     def project(
-        self,
-        matrix: Array,
-        load: Array,
-        turn: Array,
-        near: tuple[Array, Array],
-        rows: Rows,
+        self, matrix: Array, load: Array, turn: Array, near: tuple[Array, Array], rows: Rows
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
         """The step and tensions nearest to ``near``, (k, d) and (k, m), in linearised balance.
 
@@ -232,11 +373,14 @@ class Reaching:
         high = np.concatenate([self.most[rows] * unit, ends], axis=1)
         goal = np.concatenate([near[1] * unit, near[0]], axis=1)
         answer, possible = distribute(whole, load, goal, low, high)
+        # beside a pose without balance, derivatives may not be finite
+        possible &= np.isfinite(answer).all(axis=1)
+        answer = np.where(np.isfinite(answer), answer, goal)
         return answer[:, m:], answer[:, :m] / unit, possible
 
 
-@dataclass(frozen=True, eq=False)
-class Spots:
+@dataclass(eq=False)
+class Spots(ByRow):
     """The points of k searches.
 
     Attributes:
@@ -247,29 +391,6 @@ class Spots:
     rows: Rows
     tensions: Array
     left: Array
-
-    def only(self, some: NDArray[np.intp] | NDArray[np.bool_]) -> Spots:
-        return Spots(self.away[some], self.rows[some], self.tensions[some], self.left[some])
-
-    def and_more(self, other: Spots) -> Spots:
-        """All points of both."""
-        both = zip(
-            (self.away, self.rows, self.tensions, self.left),
-            (other.away, other.rows, other.tensions, other.left),
-            strict=True,
-        )
-        return Spots(*(np.concatenate(pair) for pair in both))
-
-    def only_tight(self, most: float) -> Spots:
-        return self.only(self.left <= most)
-
-    def put(self, some: NDArray[np.intp], other: Spots) -> None:
-        """Overwrite some points in place."""
-        self.away[some], self.tensions[some] = other.away, other.tensions
-        self.left[some] = other.left
-
-    def copy(self) -> Spots:
-        return Spots(self.away.copy(), self.rows, self.tensions.copy(), self.left.copy())
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,7 +417,7 @@ class Curved:
     _step: float
 
     @classmethod
-    def about(cls, problem: Reaching, away: Array, tensions: Array, rows: Rows) -> Curved:
+    def about(cls, problem: NearestProblem, away: Array, tensions: Array, rows: Rows) -> Curved:
         """By finite differences: central along each direction, and one step along each pair."""
         (k, d), step = away.shape, _DIFFERENCE * problem.robot.length
         along = problem.motion.directions(away, rows)

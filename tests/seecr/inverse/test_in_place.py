@@ -11,10 +11,9 @@ from scipy.optimize import least_squares
 from seecr.description.mjcf import load_robot
 from seecr.effects import Term, Terms
 from seecr.equilibrium.solving import solve
-from seecr.inverse import correction
-from seecr.inverse.nearest import in_place, search
-from seecr.inverse.nearest.problem import Reaching, Spots
-from seecr.inverse.nearest.search import Best
+from seecr.inverse import correction, in_place, nearest
+from seecr.inverse.nearest import Best
+from seecr.inverse.nearest_problem import NearestProblem, Spots
 from seecr.pose import Array, quat_from_rotvec
 from seecr.statics.tables import Tables
 
@@ -23,9 +22,7 @@ HEAVY = Terms([Term.of(ROBOT, "cable_weight", weight_N_per_m=1.0)])
 
 # The directions of their pulls depend on how large these are: with lengths a little beside those of
 # the tensions asked for, nothing was in balance any more.
-LEANING = Terms(
-    [Term.of(ROBOT, "frame_compliance", sideways_m_per_N=2e-5, upwards_m_per_N=1e-5)],
-)
+LEANING = Terms([Term.of(ROBOT, "frame_compliance", sideways_m_per_N=2e-5, upwards_m_per_N=1e-5)])
 OVER_PULLEYS = Terms(
     [
         Term.of(ROBOT, "cable_weight", weight_N_per_m=0.1),
@@ -44,13 +41,13 @@ def rests(places: Array) -> Array:
     return found.pose
 
 
-def problem_of(poses: Array, turned: float = 0.0) -> tuple[Reaching, Tables]:
+def problem_of(poses: Array, turned: float = 0.0) -> tuple[NearestProblem, Tables]:
     """The positions of poses, with the platform asked for at another turn [rad]."""
     wanted = poses.copy()
     wanted[:, 3:] = quat_from_rotvec(np.array([0.0, turned, 0.0]))
     search = correction._search_of(ROBOT, wanted, HEAVY, 0.0, np.inf, "minimum")
     rows, tables = np.arange(len(wanted)), search._tables(search.given)
-    return search._reaching(rows, tables.scale, fix_position=True), tables
+    return search._nearest_problem(rows, tables.scale, fix_position=True), tables
 
 
 def test_the_orientation_is_that_in_which_the_platform_rests_there() -> None:
@@ -87,18 +84,6 @@ def test_what_is_not_held_leaves_the_margins_of_others_as_they_are(effects: Term
     np.testing.assert_allclose(margins, one_by_one, rtol=1e-6)
 
 
-def test_others_start_from_the_results_of_their_nearest() -> None:
-    """Of a platform that is asked for nearly upside down, where nothing else is near."""
-    poses = rests(np.linspace(0.3, 0.7, 9))
-    problem, _tables = problem_of(poses, turned=2.5)
-    best, some = Best.none(problem), np.array([1, 4, 7])
-    left = np.setdiff1d(np.arange(9), some)
-    in_place._try_all(best, problem.to(problem.coordinates(poses[some]), some), some)
-    assert np.flatnonzero(best.firm).tolist() == some.tolist()
-    assert in_place._from_neighbours(best, left, some).tolist() == left.tolist()
-    np.testing.assert_allclose(problem.placed(best.away, np.arange(9)), poses, atol=1e-9)
-
-
 @pytest.mark.parametrize("thorough", [True, False])
 def test_full_searches_are_made_only_if_they_are_asked_for(
     monkeypatch: pytest.MonkeyPatch, thorough: bool
@@ -107,7 +92,7 @@ def test_full_searches_are_made_only_if_they_are_asked_for(
     searched: list[int] = []
     own = in_place.any_that_stays
 
-    def counted(problem: Reaching) -> Best:
+    def counted(problem: NearestProblem) -> Best:
         searched.append(len(problem.wanted))
         return own(problem)
 
@@ -117,12 +102,6 @@ def test_full_searches_are_made_only_if_they_are_asked_for(
     margins = correction.margins_in_place(ROBOT, poses, HEAVY, 0.0, np.inf, thorough)
     assert np.isneginf(margins).tolist() == [False, False, True]
     assert searched == ([1] if thorough else [])
-
-
-def test_searched_rows_are_spread_evenly_from_the_first_to_the_last() -> None:
-    rows = np.arange(100, 171)
-    assert in_place._apart(rows).tolist() == [100, 110, 120, 130, 140, 150, 160, 170]
-    assert in_place._apart(rows[:3]).tolist() == [100, 101, 102]
 
 
 def level_at(places: Array) -> Array:
@@ -164,9 +143,17 @@ def test_a_position_with_a_cables_end_on_its_pulley_is_not_held() -> None:
 def test_stable_poses_are_kept_from_which_searches_go_on_to_unstable_ones(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def nowhere(_problem: Reaching, start: Spots) -> Spots:
+    def nowhere(_problem: NearestProblem, start: Spots) -> Spots:
         return start.only(np.zeros(0, dtype=np.intp))
 
-    monkeypatch.setattr(search, "inward", nowhere)
+    monkeypatch.setattr(nearest, "solve_sqp", nowhere)
     found = correction.correct(ROBOT, level_at(PLACES[:1]), prefer="position")
     assert found.stays.all() and np.abs(found.left[:, :3]).max() < 1e-9
+
+
+def test_where_the_balance_has_no_derivatives_searches_stay() -> None:
+    """Beside this position one was not finite, and the pose that it led to was refused."""
+    found = correction.correct(
+        ROBOT, level_at(np.array([[0.927, 1.083]])), effects=LEANING, prefer="position"
+    )
+    assert not found.held[0] and found.stays[0]

@@ -14,33 +14,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.compiled.columns import TENSION, TOLERANCE
-from seecr.holding.balance import (
+from seecr.pose import Array
+from seecr.statics import batch
+from seecr.statics.tables import Tables, take
+from seecr.tensions.balance import (
+    ByRow,
     Rates,
     bends,
+    bridged_lengths,
     first_tensions,
     here,
     linearised,
     next_rest,
+    rest_after,
+    rest_for,
     with_rest,
 )
-from seecr.holding.distribution import distribute
-from seecr.holding.hanging import bridged_lengths, rest_after, rest_for
-from seecr.holding.inside import HOPELESS, Inside, farthest_inside, limits_of
-from seecr.pose import Array
-from seecr.statics import batch
-from seecr.statics.tables import Tables, take
+from seecr.tensions.distribution import distribute
+from seecr.tensions.max_margin import HOPELESS, limits_of, max_margin_tensions
 
 # Most rounds of Newton's method, and the residual that ends them [load].
 _ROUNDS, _BALANCED = 40, 1e-12
 # If no tensions balance the linearised system, its residual must fall by this factor to go on,
 # unless it is this small [load]: what is left then may be the linearisation's.
 _NEARS, _NEAR = 0.5, 1e-6
-# Rounds for whether a pose is firm, which is asked for many poses.
+# Rounds for whether a pose is stable, which is asked for many poses.
 _FEW = 14
 # A slack cable is longer than its span by this part, to keep it slack.
 _MARGIN = 2e-3
 # A stiffness below this part of the largest counts as zero.
-_FIRM = 1e-12
+_UNSTABLE = 1e-12
 # A tension below this part of the load counts as zero.
 _NONE = 1e-9
 # Fractions from the aim to the tensions farthest inside, with which a pose is tried again.
@@ -48,7 +51,7 @@ _PARTS = (0.0, 0.5, 0.75, 0.9, 1.0)
 
 
 @dataclass(eq=False)
-class Held:
+class Held(ByRow):
     """Rest lengths that hold n poses.
 
     Attributes:
@@ -61,15 +64,6 @@ class Held:
     tensions: Array
     fine: NDArray[np.bool_]
 
-    def only(self, rows: NDArray[np.bool_]) -> Held:
-        """Some rows (n,)."""
-        return Held(self.rest[rows], self.tensions[rows], self.fine[rows])
-
-    def put(self, rows: NDArray[np.intp], other: Held) -> None:
-        """Overwrite rows with those of another."""
-        self.rest[rows], self.tensions[rows] = other.rest, other.tensions
-        self.fine[rows] = other.fine
-
 
 def hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int = _ROUNDS) -> Held:
     """Find rest lengths with which the poses of ``tables`` are in balance.
@@ -81,12 +75,13 @@ def hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int = _ROU
             the pose can only be held with less.
         rounds: most rounds of Newton's method.
     """
-    least, most = limits_of(tables, low, high)
-    if not bends(tables):
-        return _hold_straight(tables, aim, least, most, rounds)
-    return _hold_bent(
-        tables, aim, low, (least, most), rounds, rest_for(tables, first_tensions(tables, least))
-    )
+    limits = limits_of(tables, low, high)
+    out = _hold(tables, aim, *limits, rounds, rest_for(tables, first_tensions(tables, limits[0])))
+    if bends(tables) and tables.cables.shape[1] >= tables.n_dof:
+        lost = np.flatnonzero(~out.fine)
+        if len(lost):
+            _from_inside(out, lost, tables, aim, rounds, low, limits)
+    return out
 
 
 def hold_again(
@@ -100,7 +95,7 @@ def hold_again(
         tables: of n poses.
         held: as held before. aim, low, high: as for :func:`hold`; limits may be (n, m).
         follows: whether the tension behind a cable that sticks at its exit point changes with what
-            is paid out, :func:`seecr.holding.hanging.rest_after`.
+            is paid out, :func:`seecr.tensions.balance.rest_after`.
     """
     if bends(tables):
         out = _hold(tables, aim, *limits_of(tables, low, high), _ROUNDS, held.rest)
@@ -110,40 +105,9 @@ def hold_again(
             out.put(lost, hold(take(tables, lost), aim[lost], least, most))
     else:
         out = Held(rest_for(tables, held.tensions), held.tensions, held.fine)
-    rest = rest_after(tables, out.rest, out.tensions) if follows else out.rest
-    slack = _slack(tables, out.tensions, limits_of(tables, low, high)[0]) & out.fine[:, None]
-    return Held(_loosened(tables, rest, slack), out.tensions, out.fine)
-
-
-def _hold_straight(tables: Tables, aim: Array, least: Array, most: Array, rounds: int) -> Held:
-    """Hold poses on straight cables, whose pulls have directions that do not depend on the lengths.
-
-    The tensions are found at once, and the lengths for them from each cable's own law.
-    """
-    now = with_rest(tables, rest_for(tables, first_tensions(tables, least)))
-    at, rates = linearised(now, here(now))
-    load = rates.load(at)
-    wanted, possible = distribute(rates.by_tension, load, aim, least, most)
-    lack = np.abs(np.einsum("ndm,nm->nd", rates.by_tension, wanted) - load).max(axis=1)
-    rest = rest_for(tables, wanted)
-    rows = np.flatnonzero(possible | (lack < _NEAR * tables.scale))
-    if len(rows) == len(tables):
-        return _hold(tables, aim, least, most, rounds, rest, wanted)
-    out = Held(rest, wanted, np.zeros(len(tables), dtype=bool))
-    some = take(tables, rows), aim[rows], least[rows], most[rows], rounds, rest[rows], wanted[rows]
-    out.put(rows, _hold(*some))
-    return out
-
-
-def _hold_bent(
-    tables: Tables, aim: Array, low: Array, limits: tuple[Array, Array], rounds: int, rest: Array
-) -> Held:
-    """Hold poses on cables whose directions depend on their tensions, from rest lengths (n, m)."""
-    out = _hold(tables, aim, *limits, rounds, rest)
-    lost = np.flatnonzero(~out.fine)
-    if len(lost) and tables.cables.shape[1] >= tables.n_dof:
-        _from_inside(out, lost, tables, aim, rounds, low, limits)
-    return out
+    if follows:
+        out = Held(rest_after(tables, out.rest, out.tensions), out.tensions, out.fine)
+    return _loosened(tables, out, limits_of(tables, low, high)[0])
 
 
 def _from_inside(
@@ -155,8 +119,9 @@ def _from_inside(
     The aim is moved towards those tensions, which hold the pose, as far as necessary.
     """
     least, most = limits
-    start = farthest_inside(take(tables, rows), low, most[rows], HOPELESS)
-    _put_loose(out, rows[start.loose], take(tables, rows[start.loose]), start)
+    start = max_margin_tensions(take(tables, rows), low, most[rows], HOPELESS)
+    loose = np.flatnonzero(start.loose)
+    out.put(rows[loose], Held(start.rest[loose], start.tensions[loose], start.loose[loose]))
     held = ~start.loose & (start.margins >= -_NONE * tables.scale[rows])
     some, inside, rest = rows[held], start.tensions[held], start.rest[held]
     for part in _PARTS:
@@ -168,30 +133,18 @@ def _from_inside(
         some, inside, rest = some[~found.fine], inside[~found.fine], rest[~found.fine]
 
 
-def _put_loose(out: Held, rows: NDArray[np.intp], tables: Tables, start: Inside) -> None:
-    """Put rows that are held with loose cables into the results."""
-    if len(rows):
-        now = with_rest(tables, start.rest[start.loose])
-        at = batch.evaluate(now, here(now), threads=None)
-        fine = np.ones(len(rows), dtype=bool)
-        out.put(rows, Held(start.rest[start.loose], at.states[..., TENSION], fine))
-
-
-def _hold(
-    tables: Tables, aim: Array, least: Array, most: Array, rounds: int, rest: Array,
-    wanted: Array | None = None,
-) -> Held:  # fmt: skip
+def _hold(tables: Tables, aim: Array, least: Array, most: Array, rounds: int, rest: Array) -> Held:
     """See :func:`hold`; with limits (n, m), and rest lengths (n, m) [m] to start from.
 
-    Args:
-        wanted: (n, m) [N] tensions there if they are known to be those nearest to the aim.
+    The directions of straight cables' pulls do not depend on the lengths: their tensions are found
+    at once, and the lengths for them from each cable's own law.
     """
     n, m = tables.cables.shape[:2]
     out = Held(rest.copy(), np.zeros((n, m)), np.zeros(n, dtype=bool))
-    rows, wanted = np.arange(n), np.full((n, m), np.inf) if wanted is None else wanted
+    rows, wanted, straight = np.arange(n), np.full((n, m), np.inf), not bends(tables)
     known = Rates(*(np.zeros((n, *each, m)) for each in ((tables.n_dof,), (), (tables.n_dof,))))
-    start, short = here(tables), np.full(n, np.inf)
-    for _ in range(rounds):
+    start, short = here(tables), np.full(n, 0.0 if straight else np.inf)
+    for k in range(rounds):
         now = with_rest(take(tables, rows), out.rest[rows])
         at, rates = linearised(now, batch.take_evaluation(start, rows))
         batch.put_evaluation(start, rows, at)
@@ -211,7 +164,10 @@ def _hold(
         load = rates.load(at)
         wanted, possible = distribute(rates.by_tension, load, aim[rows], least[rows], most[rows])
         tensions = at.states[..., TENSION]
-        longer = next_rest(now, out.rest[rows], rates.by_length, tensions, wanted)
+        if straight and k == 0:
+            longer = rest_for(now, wanted)
+        else:
+            longer = next_rest(now, out.rest[rows], rates.by_length, tensions, wanted)
         # even tensions that only come near may balance, once the directions of pulls follow them
         before, lack = short[rows], np.einsum("ndm,nm->nd", rates.by_tension, wanted) - load
         short[rows] = np.abs(lack).max(axis=1)
@@ -221,23 +177,20 @@ def _hold(
         rows, wanted = rows[going], wanted[going]
     out.tensions = start.states[..., TENSION]
     # rounding may keep a row that balances to nine digits from balancing to the last
-    out.fine |= (start.residual < TOLERANCE) & _within(out.tensions, least, most, tables.scale)
-    slack = _slack(tables, out.tensions, least) & out.fine[:, None]
-    out.rest = _loosened(tables, out.rest, slack)
-    return out
+    room = _NONE * tables.scale[:, None]
+    inside = (out.tensions >= least - room) & (out.tensions <= most + room)
+    out.fine |= (start.residual < TOLERANCE) & inside.all(axis=1)
+    return _loosened(tables, out, least)
 
 
-def _slack(tables: Tables, tensions: Array, least: Array) -> NDArray[np.bool_]:
-    """(n, m) cables that pull nothing, and may."""
-    return np.asarray((tensions <= _NONE * tables.scale[:, None]) & (least <= 0.0))
+def _loosened(tables: Tables, held: Held, least: Array) -> Held:
+    """The same with a margin in cables that pull nothing and may, which keeps them slack."""
+    slack = (held.tensions <= _NONE * tables.scale[:, None]) & (least <= 0.0) & held.fine[:, None]
+    longer = (1.0 + _MARGIN) * bridged_lengths(tables)
+    return Held(np.where(slack, longer, held.rest), held.tensions, held.fine)
 
 
-def _loosened(tables: Tables, rest: Array, slack: NDArray[np.bool_]) -> Array:
-    """(n, m) [m] rest lengths with a margin in slack cables, which keeps them slack."""
-    return np.where(slack, (1.0 + _MARGIN) * bridged_lengths(tables), rest)
-
-
-def holds_firmly(tables: Tables, aim: Array, low: Array, high: Array) -> NDArray[np.bool_]:
+def holds_stably(tables: Tables, aim: Array, low: Array, high: Array) -> NDArray[np.bool_]:
     """(n,) whether poses can be held, as by :func:`hold`, and are stable with those lengths.
 
     Stable means that all eigenvalues of the stiffness exceed the rounding of the largest.
@@ -247,10 +200,4 @@ def holds_firmly(tables: Tables, aim: Array, low: Array, high: Array) -> NDArray
     at = batch.evaluate(now, here(now), threads=None)
     stiffness = np.where(found.fine[:, None, None], at.hessian, 0.0)
     each = np.linalg.eigvalsh(0.5 * (stiffness + np.swapaxes(stiffness, 1, 2)))
-    return np.asarray(found.fine & (each[:, 0] > _FIRM * each[:, -1]))
-
-
-def _within(tensions: Array, low: Array, high: Array, scale: Array) -> NDArray[np.bool_]:
-    room = 1e-9 * scale[:, None]
-    inside = (tensions >= low - room) & (tensions <= high + room)
-    return np.asarray(inside.all(axis=1))
+    return np.asarray(found.fine & (each[:, 0] > _UNSTABLE * each[:, -1]))

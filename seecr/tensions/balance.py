@@ -7,6 +7,7 @@ it is not, if the direction of a pull depends on its size (sag, yielding exit po
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +16,20 @@ from seecr.compiled.columns import (
     ANCHOR,
     EA,
     EXIT,
+    FRICTION,
     GAP,
     LIFT,
     RADIUS,
     REST,
     TENSION,
+    UP,
     WEIGHT,
 )
-from seecr.holding.hanging import bridged_lengths, rest_for
 from seecr.parallel import in_parts
 from seecr.pose import Array
 from seecr.statics import batch
-from seecr.statics.tables import Tables, take
+from seecr.statics.tables import Tables, take, ways
+from seecr.tensions.distribution import by_row
 
 # Newton steps to the tightness of a cable.
 _TIGHTNESS = 60
@@ -35,7 +38,30 @@ _TO_TENSIONS, _SAME = 8, 1e-8
 
 
 @dataclass(eq=False)
-class Rates:
+class ByRow:
+    """Arrays with a row for each of n poses or searches: the fields of a dataclass."""
+
+    def only(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Self:
+        """Some rows."""
+        return replace(self, **{name: each[rows] for name, each in vars(self).items()})
+
+    def and_more(self, other: Self) -> Self:
+        """The rows of both."""
+        its = vars(other)
+        return replace(self, **{k: np.concatenate([v, its[k]]) for k, v in vars(self).items()})
+
+    def put(self, rows: NDArray[np.intp] | NDArray[np.bool_], other: Self) -> None:
+        """Overwrite rows with those of another."""
+        for mine, its in zip(vars(self).values(), vars(other).values(), strict=True):
+            mine[rows] = its
+
+    def copy(self) -> Self:
+        """The same with arrays of its own."""
+        return replace(self, **{name: each.copy() for name, each in vars(self).items()})
+
+
+@dataclass(eq=False)
+class Rates(ByRow):
     """Derivatives of the cables' forces at n poses.
 
     Attributes:
@@ -48,15 +74,6 @@ class Rates:
     by_tension: Array
     by_length: Array
     pull: Array
-
-    def only(self, rows: NDArray[np.bool_]) -> Rates:
-        """Some rows (n,)."""
-        return Rates(self.by_tension[rows], self.by_length[rows], self.pull[rows])
-
-    def put(self, rows: NDArray[np.intp], other: Rates) -> None:
-        """Overwrite rows with those of another."""
-        self.by_tension[rows], self.by_length[rows] = other.by_tension, other.by_length
-        self.pull[rows] = other.pull
 
     def load(self, at: batch.Evaluation) -> Array:
         """The load (n, d) [N] to be balanced, at an evaluation with these derivatives."""
@@ -144,7 +161,7 @@ def _hanging(tables: Tables, now: Array, wanted: Array) -> Array:
     The strain of a parabola is T/EA - (w l)^2/(24 T^2) (Irvine 1981, section 1.2). The factor is
     its difference between two tensions over that of its tangent at the first.
     """
-    law, heavy = tables.cables, (tables.cables[..., WEIGHT] * bridged_lengths(tables)) ** 2
+    law, heavy = tables.cables, weights(tables) ** 2
     some = (heavy > 0.0) & (now > 0.0) & (wanted > 0.0)
     old, new = np.where(some, now, 1.0), np.where(some, wanted, 1.0)
     between = 1.0 / law[..., EA] + heavy * (new + old) / (24.0 * (old * new) ** 2)
@@ -162,7 +179,7 @@ def loose_rest(tables: Tables, size: Array) -> tuple[Array, Array]:
         the lengths and their derivatives [m/N].
     """
     law, way = tables.cables, bridged_lengths(tables)
-    sag = (law[..., WEIGHT] * way) ** 2 / (24.0 * size**2)
+    sag = weights(tables) ** 2 / (24.0 * size**2)
     grown = 1.0 + size / law[..., EA]
     rest = way * (1.0 + sag) / grown
     return np.asarray(rest), np.asarray(
@@ -176,7 +193,7 @@ def tightness(tables: Tables, rest: Array) -> Array:
     Newton's method starts at the cable's weight, and is for cables about as tight as that or
     tighter.
     """
-    weight = tables.cables[..., WEIGHT] * bridged_lengths(tables)
+    weight = weights(tables)
     size = np.where(weight > 0.0, weight, 1.0)
     for _ in range(_TIGHTNESS):
         found, slope = loose_rest(tables, size)
@@ -239,3 +256,118 @@ def straight_balance(tables: Tables, rows: NDArray[np.intp], away: Array) -> tup
 
     in_parts(run, k)
     return matrices, loads
+
+
+# Least mean tension [weight of the cable], and the largest bend of a catenary, that are considered.
+_LEAST, _MOST_BENT = 0.8, 1.0
+# Newton steps to a bend.
+_ROUNDS = 5
+
+
+def bridged_lengths(tables: Tables) -> Array:
+    """(n, m) [m] lengths of straight, unstrained cables at the poses of tables."""
+    return np.asarray(tables.cables[..., REST] + tables.cables[..., GAP])
+
+
+def least_of_heavy(tables: Tables) -> Array:
+    """(n, m) [N] tensions that cables with weight are not asked to go below; zero for others.
+
+    The tension in the middle is then the cable's weight, as of a catenary that sags by about a
+    seventh of its span. At the exit point it is larger by half the weight if that is straight above
+    the anchor point, and smaller by half if it is straight below. No catenary has less than about
+    three quarters of that in the middle.
+    """
+    weight = weights(tables)
+    if not weight.any():
+        return weight
+    return np.asarray(weight * (1.0 + 0.5 * _rises(tables)))
+
+
+def weights(tables: Tables) -> Array:
+    """(n, m) [N] of the cables, as long as their spans."""
+    return np.asarray(tables.cables[..., WEIGHT] * bridged_lengths(tables))
+
+
+def rest_for(tables: Tables, tensions: Array) -> Array:
+    """(n, m) [m] rest lengths with which cables have these tensions (n, m) [N].
+
+    They are exact for cables without weight, and approximate for others.
+    """
+    bridged, weight = bridged_lengths(tables), weights(tables)
+    if not weight.any():
+        return _straight_rest(tables, bridged, tensions)
+    rise = _rises(tables)
+    # the tension at the exit point includes the weight that hangs below it
+    mean = tensions - 0.5 * weight * rise
+    arcs = _arcs(0.5 * weight / np.maximum(mean, np.maximum(_LEAST * weight, 1e-300)), rise)
+    return _straight_rest(tables, bridged * arcs, np.maximum(mean, 0.0))
+
+
+def rest_after(tables: Tables, rest: Array, tensions: Array) -> Array:
+    """(n, m) [m] rest lengths with tensions (n, m) [N] where cables stick at their exit points.
+
+    What is paid out to a cable that sticks stays behind the exit point, and lowers the tension
+    there until the cable slips.
+
+    Args:
+        tables: with the cables' history at the rest lengths there.
+        rest: (n, m) [m] rest lengths with which cables would have these tensions if those behind
+            exit points stayed as they are.
+        tensions: (n, m) [N].
+    """
+    if not tables.cables[..., FRICTION].any():
+        return rest
+    from seecr.compiled.rates import stretched_lengths  # takes a while to import
+
+    spans, there = np.empty_like(rest), tables.cables.copy()
+    there[..., REST] = rest
+    by_row(stretched_lengths, there, np.array(tensions, order="C"), spans)
+    return _straight_rest(tables, spans, tensions, follows=True)
+
+
+def _straight_rest(tables: Tables, spans: Array, tensions: Array, follows: bool = False) -> Array:
+    """(n, m) [m] rest lengths with which straight cables over these spans have these tensions."""
+    from seecr.compiled.rates import rest_lengths_for  # takes a while to import
+
+    cables, pulls, out = tables.cables, np.array(tensions, order="C"), np.empty_like(spans)
+    by_row(lambda a, b, c, to: rest_lengths_for(a, b, c, follows, to), cables, spans, pulls, out)
+    return out
+
+
+def _arcs(light: Array, rise: Array) -> Array:
+    """Lengths of catenaries over the straight distances that they span.
+
+    With the bend g = w x/(2 H), for spans x and rises z, l^2 = z^2 + (x sinh(g)/g)^2, and the mean
+    of the tensions at both ends is w l coth(g)/2 (Irvine 1981, section 1.2): one equation for g.
+
+    Args:
+        light: half of the weight over the mean tension.
+        rise: over the straight distance.
+    """
+    flat = 1.0 - rise**2
+    bend = np.clip(light, 1e-6, _MOST_BENT)
+    for _ in range(_ROUNDS):
+        arc, by_arc, over, by_over = _bent(bend, rise, flat)
+        slope = 1.0 - light * (over * by_arc + by_over * arc)
+        bend = np.clip(
+            bend - (bend - light * over * arc) / np.maximum(slope, 0.1), 1e-6, _MOST_BENT
+        )
+    return np.where(light > 0.0, _bent(bend, rise, flat)[0], 1.0)
+
+
+def _bent(bend: Array, rise: Array, flat: Array) -> tuple[Array, Array, Array, Array]:
+    """Arc over distance, g coth(g), and the derivatives of both by g."""
+    sinh = np.sinh(bend)
+    longer, over = sinh / bend, bend * np.cosh(bend) / sinh
+    arc = np.sqrt(rise**2 + flat * longer**2)
+    by_arc = flat * longer * (np.cosh(bend) - longer) / (bend * arc)
+    return arc, by_arc, over, over / bend - bend / sinh**2
+
+
+def _rises(tables: Tables) -> Array:
+    """(n, m) height of exit points above anchor points, over the distance between them."""
+    way = ways(tables)
+    up = tables.load[:, None, UP : UP + 3]
+    spans = np.linalg.norm(way, axis=2)
+    # a cable without a span, its anchor point at its exit point, has no direction: it hangs level
+    return np.asarray(-(way * up).sum(axis=2) / np.where(spans > 0.0, spans, 1.0))

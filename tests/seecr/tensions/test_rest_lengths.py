@@ -12,12 +12,18 @@ from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.effects.cable import CableWeight
 from seecr.effects.geometry import FrameCompliance, PulleyRadius
-from seecr.holding.balance import balance_of, linearised_at, with_rest
-from seecr.holding.hanging import bridged_lengths, least_of_heavy, rest_for
-from seecr.holding.lengths import Held, hold, hold_again
 from seecr.prediction.experiment import Experiment
 from seecr.statics import batch
 from seecr.statics.tables import Tables, assemble
+from seecr.tensions.balance import (
+    balance_of,
+    bridged_lengths,
+    least_of_heavy,
+    linearised_at,
+    rest_for,
+    with_rest,
+)
+from seecr.tensions.rest_lengths import Held, hold, hold_again
 
 WEIGHT = 0.62784
 

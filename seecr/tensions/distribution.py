@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -13,8 +16,15 @@ from seecr.pose import LARGEST, Array, all_finite
 
 # Part of the load that may stay unbalanced, by rounding of the tensions.
 _BALANCED = 1e-9
+# Part of that by which a search for any tensions may itself be off.
+_PART = 1e-2
 AIMS = ("minimum", "middle")
 """Names of wanted tensions: as small as possible, or the middle of the limits."""
+
+
+def by_row(compiled: Callable[..., None], *arrays: NDArray[Any]) -> None:
+    """Call a compiled function with arrays (n, ...), in as many parts as there are threads."""
+    in_parts(lambda part: compiled(*(each[part] for each in arrays)), len(arrays[0]))
 
 
 def tension_limits(robot: Robot, lowest: ArrayLike, highest: ArrayLike) -> tuple[Array, Array]:
@@ -95,14 +105,7 @@ def distribute(
     rows = [np.array(np.broadcast_to(one, (n, m)), order="C") for one in (aim, low, high)]
     whole, load = np.array(matrices, order="C"), np.array(loads, order="C")
     tensions, outcome = np.zeros((n, m)), np.zeros(n, dtype=np.int64)
-
-    def run(part: slice) -> None:
-        project_batch(
-            whole[part], load[part], rows[0][part], rows[1][part], rows[2][part],
-            tensions[part], outcome[part],
-        )  # fmt: skip
-
-    in_parts(run, n)
+    by_row(project_batch, whole, load, *rows, tensions, outcome)
     undecided = (outcome == UNDECIDED) & np.isfinite(rows[1]).all(axis=1)
     for r in np.flatnonzero(undecided):
         tensions[r], left = balanced(whole[r], load[r], rows[1][r], rows[2][r])
@@ -120,14 +123,8 @@ def nearly_balanced(matrices: Array, loads: Array, low: Array, high: Array) -> A
     """
     from seecr.compiled.tensions import nearest_batch  # slow to import
 
-    n, _, m = matrices.shape
-    tensions = np.empty((n, m))
-    whole, load, least, most = map(np.ascontiguousarray, (matrices, loads, low, high))
-
-    def run(part: slice) -> None:
-        nearest_batch(whole[part], load[part], least[part], most[part], tensions[part])
-
-    in_parts(run, n)
+    tensions = np.empty((len(matrices), matrices.shape[2]))
+    by_row(nearest_batch, *map(np.ascontiguousarray, (matrices, loads, low, high)), tensions)
     return tensions
 
 
@@ -152,3 +149,65 @@ def balanced(matrix: Array, load: Array, low: Array, high: Array) -> tuple[Array
     aim = np.concatenate([load - matrix @ low, (high - low)[bounded]]) / scale
     found, left = nnls(table, aim, maxiter=100 * (m + k))
     return low + scale * found[:m], float(left)
+
+
+def can_balance(
+    matrices: Array, loads: Array, low: Array, high: Array, scale: Array
+) -> NDArray[np.bool_]:
+    """(n,) whether tensions within limits balance A tau = load; see :func:`innermost`."""
+    found = _decided(matrices, loads, low, high, scale)
+    out, odd = found > 0.0, np.flatnonzero(np.isnan(found))
+    if len(odd):
+        out[odd] = distribute(matrices[odd], loads[odd], low[odd], low[odd], high[odd])[1]
+    return np.asarray(out)
+
+
+def _decided(matrices: Array, loads: Array, low: Array, high: Array, scale: Array) -> Array:
+    """(n,) positive where tensions balance, to rounding; NaN where W is singular or too narrow."""
+    from seecr.compiled.tensions import MOST, feasible_of  # takes a while to import
+
+    room, spare = _BALANCED * scale, matrices.shape[2] - matrices.shape[1]
+    if not 0 <= spare <= MOST:
+        return _innermost(matrices, loads, low, high, scale)[0] + room
+    given, out = map(np.ascontiguousarray, (matrices, loads, low, high)), np.empty(len(matrices))
+    by_row(feasible_of, *given, room, _PART * room, out)
+    return out
+
+
+def innermost(
+    matrices: Array, loads: Array, low: Array, high: Array, scale: Array
+) -> tuple[Array, Array]:
+    """The largest margins (n,) of tensions from their limits, and these tensions (n, m) [N].
+
+    Margins are negative if limits are exceeded, infinite if cables can be tightened without limit,
+    minus infinity if nothing balances the load; then tensions are NaN.
+
+    Args:
+        matrices: (n, d, m), loads: (n, d) [N]. low, high: (n, m) [N]. scale: (n,) [N].
+    """
+    margins, tensions = _innermost(matrices, loads, low, high, scale)
+    for r in np.flatnonzero(np.isnan(margins)):
+        margins[r], tensions[r] = _by_search(matrices[r], loads[r], low[r], high[r])
+    return margins, tensions
+
+
+def _innermost(
+    matrices: Array, loads: Array, low: Array, high: Array, scale: Array
+) -> tuple[Array, Array]:
+    """The same; NaN where W is singular or there are too few cables."""
+    from seecr.compiled.tensions import innermost_of  # takes a while to import
+
+    margins, tensions = np.full(len(matrices), np.nan), np.full(low.shape, np.nan)
+    if matrices.shape[2] >= matrices.shape[1]:
+        given = map(np.ascontiguousarray, (matrices, loads, low, high))
+        by_row(innermost_of, *given, scale, margins, tensions)
+    return margins, tensions
+
+
+def _by_search(matrix: Array, load: Array, low: Array, high: Array) -> tuple[float, Array]:
+    """The same for one pose with a singular W: margin zero if a search finds tensions."""
+    if np.all(high >= low) and np.isfinite(matrix).all() and np.isfinite(load).all():
+        tensions, left = balanced(matrix, load, low, high)
+        if left < _BALANCED:
+            return 0.0, tensions
+    return -np.inf, np.full(len(low), np.nan)

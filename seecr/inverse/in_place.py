@@ -1,8 +1,9 @@
-"""Orientations in which too few cables hold a platform at many positions, for maps.
+"""Positions that can be held in some orientation, for robots with fewer cables than freedoms.
 
 The orientation that holds changes little from one position to the next. So searches from many
-orientations are made for a few positions, and the others start from their neighbours' results.
-What is found is in balance with straight cables; see :mod:`seecr.compiled.orientation`.
+orientations are made for a few positions, and the others start from their neighbours' results. What
+is found first is in balance with straight cables; see :mod:`seecr.compiled.orientation`. With sag,
+pulleys or exit points that lift, that is where searches start.
 """
 
 from __future__ import annotations
@@ -12,15 +13,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.compiled.columns import LIFT, RADIUS, WEIGHT
 from seecr.description.joints import freedoms
 from seecr.description.robot import Robot
+from seecr.inverse.nearest import Best, any_that_stays
+from seecr.inverse.nearest_problem import NearestProblem, Rows
+from seecr.inverse.nearest_sqp import tightened
 from seecr.parallel import in_parts
 from seecr.pose import Array, quat_conjugate, quat_from_rotvec, quat_multiply
 from seecr.statics import batch
 from seecr.statics.tables import Tables
 
-Rows = NDArray[np.intp]
-
+# Nearest positions whose results are tried, and how many full searches are made at once.
+_NEAREST, _AT_ONCE = 3, 8
 # Neighbours of a position.
 _NEIGHBOURS = 8
 # Part of the remaining positions that get full searches at once, and no fewer than so many.
@@ -28,6 +33,62 @@ _PART, _FEWEST = 8, 16
 # Orientations that a full search starts from, at the edge of what was found, and of these those
 # about the vertical.
 _STARTS, _MORE, _ABOUT = 24, 100, 4
+
+
+def poses_in_place(
+    problem: NearestProblem, tables: Tables, thorough: bool = True
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Stable poses (n, 7) at the wanted positions, and (n,) whether one was found.
+
+    Args:
+        problem: one in which positions may not change. tables: of its wanted poses.
+        thorough: whether full searches are made where no straight cable and no neighbour leads to
+            an orientation.
+    """
+    turned = turned_in_place(problem.robot, tables, problem.least, problem.most)
+    if not np.any(tables.cables[..., [RADIUS, WEIGHT, LIFT]]):
+        return turned.poses, turned.found
+    best, rows = Best.none(problem), np.arange(len(problem.wanted))
+    _try_all(best, np.zeros((len(rows), problem.robot.n_dof)), rows)
+    # those of straight cables without pulleys are near
+    some = rows[turned.found & ~best.stable]
+    _try_all(best, problem.to(problem.coordinates(turned.poses[some]), some), some)
+    left, fresh = ~best.stable, np.flatnonzero(best.stable)
+    while left.any():
+        if len(fresh):
+            fresh = _from_neighbours(best, np.flatnonzero(left), fresh)
+        elif not thorough:
+            break
+        else:
+            some = _evenly(np.flatnonzero(left), _AT_ONCE)
+            best.take(some, any_that_stays(problem.part(some)))
+            left[some], fresh = False, some[best.stable[some]]
+        left &= ~best.stable
+    return problem.placed(best.away, rows), best.stable
+
+
+def _try_all(best: Best, away: Array, rows: Rows) -> None:
+    """Keep what reaches balance from displacements (k, d) of rows, without those of positions."""
+    away = best.problem.motion.allowed(away, rows)
+    best.keep(tightened(best.problem, best.problem.start(away, rows)))
+
+
+def _evenly(rows: Rows, many: int) -> Rows:
+    """At most so many of the rows, evenly spread in their order."""
+    return rows[np.unique(np.linspace(0, len(rows) - 1, many).round().astype(np.intp))]
+
+
+def _from_neighbours(best: Best, rows: Rows, fresh: Rows) -> Rows:
+    """Try the results at the nearest fresh positions; returns the rows that were solved by it."""
+    from scipy.spatial import cKDTree  # takes a while to import
+
+    problem, place = best.problem, best.problem.wanted[:, :3]
+    near = cKDTree(place[fresh]).query(place[rows], k=min(_NEAREST, len(fresh)))[1]
+    near = near.reshape(len(rows), -1)
+    each, of = np.repeat(rows, near.shape[1]), fresh[near.ravel()]
+    turned = problem.to(problem.moved(best.away[of], of), each)
+    _try_all(best, turned, each)
+    return rows[best.stable[rows]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,8 +174,7 @@ def _search_all(out: Turned, near: Rows, asked: NDArray[np.bool_], count: int) -
         left = np.flatnonzero(~(tried | out.found))
         if len(left) == 0:
             return
-        many = max(_FEWEST, len(left) // _PART)
-        some = left[np.unique(np.linspace(0, len(left) - 1, many).round().astype(np.intp))]
+        some = _evenly(left, max(_FEWEST, len(left) // _PART))
         out.search(some, _many_starts(out, some, count))
         tried[some] = True
         _spread(out, near, some[out.found[some]])

@@ -8,12 +8,7 @@ from scipy.optimize import linprog, lsq_linear, minimize
 
 from seecr.description.mjcf import load_robot, model_path
 from seecr.errors import InputError
-from seecr.holding.distribution import (
-    distribute,
-    nearly_balanced,
-    tension_limits,
-    wanted_tensions,
-)
+from seecr.tensions.distribution import distribute, nearly_balanced, tension_limits, wanted_tensions
 
 SHAPES = [(6, 8), (3, 4), (6, 12), (2, 2)]
 

@@ -13,10 +13,10 @@ from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
 from seecr.effects import Term
 from seecr.equilibrium.solving import solve
-from seecr.holding.inside import Inside, farthest_inside
-from seecr.holding.lengths import hold
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.statics.tables import Tables, assemble
+from seecr.tensions.max_margin import MaxMargin, max_margin_tensions
+from seecr.tensions.rest_lengths import hold
 from seecr.workspace.maps import default_axes
 from seecr.workspace.zones import margins_with
 
@@ -37,8 +37,8 @@ def tables_of(robot: Robot, poses: np.ndarray, weight: float) -> Tables:
     return assemble(Experiment(robot, told).setup(effects_of(heavy, robot)))
 
 
-def inside_of(robot: Robot, tables: Tables, high: float = np.inf) -> Inside:
-    return farthest_inside(tables, np.zeros(robot.n_cables), np.full(robot.n_cables, high))
+def inside_of(robot: Robot, tables: Tables, high: float = np.inf) -> MaxMargin:
+    return max_margin_tensions(tables, np.zeros(robot.n_cables), np.full(robot.n_cables, high))
 
 
 # The large robot with either limit at one of its weights each; with both at both in a sweep.
@@ -91,3 +91,16 @@ def test_loose_cables_are_sought_from_several_lengths() -> None:
     pose = np.array([[0.31009, 0.4075, 0.193125, *COGIRO.reference_pose[3:]]])
     found = inside_of(COGIRO, tables_of(COGIRO, pose, 2.0))
     assert found.loose[0] and found.margins[0] == 0.0
+
+
+def test_without_an_upper_limit_all_is_held_that_is_held_with_one() -> None:
+    """Tensions that seem unlimited were sought up to thirty loads; some poses need more."""
+    poses = grid(COGIRO, 8)
+    tables = tables_of(COGIRO, poses, 0.3)
+    limited, free = (inside_of(COGIRO, tables, high).margins for high in (3000.0, np.inf))
+    assert np.all(free[limited >= 0.0] >= 0.0) and np.isposinf(free).any()
+    few = np.flatnonzero(np.isposinf(free))
+    m = COGIRO.n_cables
+    tight = tables_of(COGIRO, poses[few], 0.3)
+    held = hold(tight, np.zeros((len(few), m)), np.zeros(m), np.full(m, np.inf))
+    assert held.fine.all()

@@ -1,17 +1,22 @@
-"""Starting points for the nearest pose: samples of the workspace, and rotations about others."""
+"""Starting points for the nearest pose: the best of samples of the workspace and rotated poses."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seecr.description.joints import pose_of_values
 from seecr.description.robot import Robot
-from seecr.inverse.nearest.motion import PlatformMotion
-from seecr.inverse.nearest.problem import Reaching, Rows
+from seecr.inverse.nearest_problem import NearestProblem, PlatformMotion, Rows, Spots
+from seecr.inverse.nearest_sqp import tightened
 from seecr.pose import Array, quat_from_rotvec
+from seecr.tensions.balance import ByRow
+
+Fine = Callable[[Array, Rows], NDArray[np.bool_]]
+"""Whether displacements (k, d) of rows (k,) are fine."""
 
 # Poses sampled over the workspace; of the held ones, so many nearest and other ones per row.
 _SAMPLE, _NEAR = 24000, 128
@@ -24,34 +29,36 @@ _TURNED, _ABOUT = 256, 64
 _LEVEL, _INWARD = 1.0, 0.4
 # Solutions are rotated by up to so many times their distance over the length [rad].
 _WIDEST = 4.0
+# Bisections towards the wanted poses; after some only the nearer half goes on, but no fewer.
+_HALVINGS, _FEWER, _KEPT = 7, (2, 4), 120
+# If few are held, starts are taken from this many times as many with the smallest residuals.
+_LEAST = 8
+# Least difference in rotation [rad] between starts, but at most the nearest's distance over the
+# length. If that leaves too few, a half and then a quarter of it is enough.
+_APART = (0.7, 0.35, 0.175)
 
 
-@dataclass(frozen=True, eq=False)
-class Candidates:
+@dataclass(eq=False)
+class Candidates(ByRow):
     """Displacements (k, d) from the wanted poses of rows (k,), held or not."""
 
     away: Array
     rows: Rows
 
-    def and_more(self, other: Candidates) -> Candidates:
-        return Candidates(
-            np.concatenate([self.away, other.away]), np.concatenate([self.rows, other.rows])
-        )
-
     def in_lots(self, count: int) -> Iterator[Candidates]:
         """The same, those of ``count`` rows at a time."""
         lots = np.searchsorted(np.unique(self.rows), self.rows) // count
         for lot in range(lots.max(initial=-1) + 1):
-            yield Candidates(self.away[lots == lot], self.rows[lots == lot])
+            yield self.only(lots == lot)
 
 
-def sample(problem: Reaching) -> Array:
+def sample(problem: NearestProblem) -> Array:
     """Coordinates (k, 7) or (k, d) of the reference pose, and of poses that can be held.
 
     They can be held under the first row's load. Only the reference pose if positions are kept,
     since the others are at other positions.
     """
-    if problem.is_in_place:
+    if problem.motion.is_in_place:
         return problem.home
     random = np.random.default_rng(0)
     draw = _turned if problem.values is None else _on_joints
@@ -100,10 +107,10 @@ def _home_of(robot: Robot) -> tuple[Array, Array]:
     return pose_of_values(robot, np.zeros((1, robot.n_dof)))
 
 
-def from_sample(problem: Reaching, places: Array) -> Candidates:
+def from_sample(problem: NearestProblem, places: Array) -> Candidates:
     """The reference pose, the poses nearest to each wanted one, and as many others."""
     random, out, rows = np.random.default_rng(1), [], []
-    in_place = problem.is_in_place
+    in_place = problem.motion.is_in_place
     for row in range(len(problem.wanted)):
         mine = np.full(len(places), row)
         every = _in_place(problem, row) if in_place else problem.to(places, mine)
@@ -116,7 +123,7 @@ def from_sample(problem: Reaching, places: Array) -> Candidates:
     return Candidates(problem.motion.allowed(np.concatenate(out), each), each)
 
 
-def _in_place(problem: Reaching, row: int) -> Array:
+def _in_place(problem: NearestProblem, row: int) -> Array:
     """The reference orientation, and sampled ones at a position that are held or nearly so (k, d).
 
     The orientations that hold may be less than a thousandth of all, in separate parts.
@@ -138,7 +145,7 @@ def _in_place(problem: Reaching, row: int) -> Array:
     return np.asarray(np.concatenate([every[:1], every[1:][best]]))
 
 
-def about_wanted(problem: Reaching) -> Candidates:
+def about_wanted(problem: NearestProblem) -> Candidates:
     """Rotated poses about the wanted ones, or about the nearest point of the box."""
     n, box = len(problem.wanted), _box(problem.robot)
     middle = np.zeros((n, problem.robot.n_dof))
@@ -149,7 +156,7 @@ def about_wanted(problem: Reaching) -> Candidates:
     return _about(problem, middle, rows, widest, _TURNED, np.random.default_rng(2))
 
 
-def about_answers(problem: Reaching, away: Array, rows: Rows) -> Candidates:
+def about_answers(problem: NearestProblem, away: Array, rows: Rows) -> Candidates:
     """For some rows: their own solutions (n, d), rotated, and the nearest of other rows."""
     places, count = problem.moved(away[rows], rows), min(_ABOUT, len(rows))
     far = problem.motion.far(away[rows], rows) / problem.robot.length
@@ -166,13 +173,9 @@ def about_answers(problem: Reaching, away: Array, rows: Rows) -> Candidates:
 
 
 def _about(
-    problem: Reaching,
-    middle: Array,
-    rows: Rows,
-    widest: Array,
-    count: int,
+    problem: NearestProblem, middle: Array, rows: Rows, widest: Array, count: int,
     random: np.random.Generator,
-) -> Candidates:
+) -> Candidates:  # fmt: skip
     """Poses (k, d) of rows, rotated by up to ``widest`` (k,), half of them moved inward.
 
     Small rotations are more frequent than large ones. Two more keep the position, one of them with
@@ -192,3 +195,95 @@ def _about(
     each = np.repeat(rows, every.shape[1])
     away = motion.brought(every.reshape(len(each), -1), each, to.reshape(len(each), 3))
     return Candidates(motion.allowed(away, each), each)
+
+
+def prune_starts(problem: NearestProblem, candidates: Candidates, most: int) -> Spots:
+    """Held poses as near to the wanted ones as straight lines lead: ``most`` per row.
+
+    Where the balance is not linear, lines end where it really holds, and others where it seems to:
+    from there balance may be found still nearer, or not at all.
+    """
+    spots = _pruned(problem, candidates, most, problem.held)
+    if problem.holds is None:
+        return spots
+    return spots.and_more(_pruned(problem, candidates, most, problem.seems_held))
+
+
+def _pruned(problem: NearestProblem, candidates: Candidates, most: int, fine: Fine) -> Spots:
+    """The same, with one meaning of held."""
+    held = fine(candidates.away, candidates.rows)
+    back = _brought_back(problem, candidates, held, most)
+    away = np.concatenate([candidates.away[held], back.away])
+    rows = np.concatenate([candidates.rows[held], back.rows])
+    away, rows = toward(problem, away, rows, fine)
+    few = spread(problem, away, rows, most)
+    return tightened(problem, problem.start(away[few], rows[few]))
+
+
+def _brought_back(
+    problem: NearestProblem, candidates: Candidates, held: NDArray[np.bool_], most: int
+) -> Spots:
+    """Poses brought to balance near candidates, for rows of which few candidates are held.
+
+    This occurs with fewer cables than degrees of freedom. Tried are those with small residuals that
+    differ in rotation, and an even selection of all.
+    """
+    rows, place = np.unique(candidates.rows, return_inverse=True)
+    many = np.bincount(place[held], minlength=len(rows))
+    chosen: list[int] = []
+    for row in rows[many < most]:
+        mine = np.flatnonzero(~held & (candidates.rows == row))
+        lack = problem.lack(candidates.away[mine], candidates.rows[mine])[0]
+        best = mine[np.argsort(lack)[: _LEAST * most]]
+        apart = best[spread(problem, candidates.away[best], candidates.rows[best], most)]
+        all_over = mine[:: max(1, len(mine) // most)]
+        chosen += np.unique(np.concatenate([apart, all_over])).tolist()
+    start = problem.start(candidates.away[chosen], candidates.rows[chosen])
+    return tightened(problem, start)
+
+
+def toward(problem: NearestProblem, away: Array, rows: Rows, fine: Fine) -> tuple[Array, Rows]:
+    """As far on straight lines to the wanted poses as is fine; half of them keep their rotation."""
+    inner, outer = np.zeros(len(rows)), np.ones(len(rows))
+    turned = np.random.default_rng(4).random(len(rows)) < 0.5
+    motion, way = problem.motion, away.copy()
+    if motion.turns < away.shape[1]:
+        way[turned] -= motion.brought(away[turned], rows[turned], np.zeros((turned.sum(), 3)))
+    for number in range(_HALVINGS):
+        if number in _FEWER:
+            size = motion.far(motion.allowed(away - inner[:, None] * way, rows), rows)
+            few = _nearer_half(size, rows, len(problem.wanted))
+            away, way, rows = away[few], way[few], rows[few]
+            inner, outer = inner[few], outer[few]
+        middle = 0.5 * (inner + outer)
+        ok = fine(motion.allowed(away - middle[:, None] * way, rows), rows)
+        inner, outer = np.where(ok, middle, inner), np.where(ok, outer, middle)
+    return motion.allowed(away - inner[:, None] * way, rows), rows
+
+
+def _nearer_half(size: Array, rows: Rows, n: int) -> Rows:
+    """The nearer half of each row's points, but no fewer than a minimum."""
+    order = np.lexsort((size, rows))
+    many = np.bincount(rows, minlength=n)
+    place = np.arange(len(rows)) - (np.cumsum(many) - many)[rows[order]]
+    return order[place < np.maximum(_KEPT, many[rows[order]] // 2)]
+
+
+def spread(problem: NearestProblem, away: Array, rows: Rows, most: int) -> list[int]:
+    """The nearest points of each row that differ in rotation from those before."""
+    chosen, size = [], problem.motion.far(away, rows)
+    turned, length = problem.motion.turned(away, rows), problem.robot.length
+    order = np.lexsort((size, rows))
+    for mine in np.split(order, np.searchsorted(rows[order], np.arange(1, len(problem.wanted)))):
+        # a platform that cannot turn is compared by position
+        least = 1e-9 * length + size[mine[:1]].sum()
+        place = turned[mine] / (min(length, least) if problem.robot.turns else least)
+        far = np.full(len(mine), np.inf)
+        taken: list[int] = []
+        for gap in _APART:
+            while len(taken) < most and np.any(far > gap):
+                k = int(np.argmax(far > gap))
+                taken.append(int(mine[k]))
+                far = np.minimum(far, np.linalg.norm(place - place[k], axis=1))
+        chosen += taken
+    return chosen

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import re
 
 import numpy as np
 import pytest
@@ -13,16 +12,15 @@ from seecr.commands import Commands
 from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Term
 from seecr.equilibrium.solving import solve
-from seecr.holding.hanging import least_of_heavy
-from seecr.holding.inside import farthest_inside
-from seecr.holding.lengths import hold
-from seecr.holding.unheld import why_not_held
 from seecr.inverse.correction import correct
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.prediction.model import load_model
 from seecr.statics.tables import Tables, assemble
+from seecr.tensions.balance import least_of_heavy
+from seecr.tensions.max_margin import max_margin_tensions
+from seecr.tensions.rest_lengths import hold
 from seecr.workspace.maps import workspace_map
-from seecr.workspace.zones import margins_with
+from seecr.workspace.zones import margins_with, tension_margin
 
 LARGE = load_robot(model_path("cogiro_large"))
 SAG = load_model(model_path("cogiro_large").parent / "sag.toml", LARGE)
@@ -121,7 +119,7 @@ def test_margins_are_those_of_catenaries(place: tuple[float, float, float]) -> N
     (pose,) = level([place])
     tables = tables_at(pose[None])
     low = np.maximum(5.0, least_of_heavy(tables)[0])
-    ours = farthest_inside(tables, np.full(8, 5.0), np.full(8, 800.0))
+    ours = max_margin_tensions(tables, np.full(8, 5.0), np.full(8, 800.0))
 
     def balance(v: np.ndarray) -> np.ndarray:
         return np.asarray(catenaries(pose, v[:8])[0]) / LARGE.weight
@@ -151,18 +149,20 @@ def test_a_set_of_wrenches_counts_with_its_least_margin() -> None:
     np.testing.assert_allclose(both, np.min(each, axis=0), rtol=1e-6, atol=1e-6)
 
 
-def test_it_is_told_what_a_cable_weighs() -> None:
-    matrix, load, names = np.array([[1.0, 1.0]]), np.array([5.0]), ["a", "b"]
-    low, high = np.array([4.0, 4.0]), np.array([9.0, 9.0])
-    push = why_not_held(matrix, np.array([-3.0]), low, high, names)
-    assert re.fullmatch(
-        "cable [ab] would have to push with 7 N to keep the others at 4 N or more", push
-    )
-    free = why_not_held(matrix, np.array([-3.0]), 0.0 * low, high, names)
-    assert free in ("cable a would have to push with 3 N", "cable b would have to push with 3 N")
-    less = why_not_held(matrix, load, low, high, names, np.array([4.0, 3.0]))
-    assert less == "cable a would have to pull 1 N, less than the 4 N that it weighs"
-    heavy = why_not_held(matrix, load, low, np.array([9.0, 2.0]), names, low)
-    assert heavy == "cable b weighs 4 N, more than the 2 N it may pull"
-    just = why_not_held(matrix, np.array([8.0]), low, high, names)
-    assert just.startswith("tensions at their limits would balance the load")
+SMALL = load_robot("demobot_cogiro")
+HEAVY = [Term.of(SMALL, "cable_weight", weight_N_per_m=0.1 * SMALL.weight)]
+
+
+@pytest.mark.parametrize("part", [0.3, 0.9])
+def test_limits_that_close_in_take_as_much_from_the_margin(part: float) -> None:
+    """It is counted from the limits asked for, not from what the cables weigh."""
+    random = np.random.default_rng(3)
+    poses = np.tile(SMALL.reference_pose, (8, 1))
+    poses[:, :3] += random.uniform(-0.06, 0.06, (8, 3))
+    high = 1.5 * SMALL.weight
+    margin = tension_margin(SMALL, poses, highest=high, effects=HEAVY)
+    assert np.sum(margin > 0.0) > 4
+    for pose, own in zip(poses[margin > 0.0], margin[margin > 0.0], strict=True):
+        less = part * own
+        there = tension_margin(SMALL, pose, lowest=less, highest=high - less, effects=HEAVY)
+        assert there[0] == pytest.approx(own - less, abs=1e-5 * SMALL.weight)

@@ -13,7 +13,7 @@ from seecr.description.joints import freedoms, pose_of_values, values_of_pose
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Joint, Robot
 from seecr.inverse.correction import correct
-from seecr.inverse.nearest.motion import PlatformMotion
+from seecr.inverse.nearest_problem import PlatformMotion
 from seecr.pose import Array, pose_difference, quat_from_rotvec
 
 
