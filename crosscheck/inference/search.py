@@ -56,7 +56,7 @@ _MINIMUM = 8.0
 # An effect that waits joins the fit of all effects if it promises this much ln evidence.
 _PAYS = 2.0
 # Fits of more effects than are a diagnosis take longer, and only what all of them do together is
-# asked of them: one counts as so many.
+# asked of them: one counts as so many. Of more than twice as many, one is all.
 _LONG = 4
 # Effort: most hypotheses that are fitted about one linear model, and most linear models about
 # better and better hypotheses.
@@ -178,8 +178,8 @@ class Scores:
         done = set[Key]()
         for _ in range(_WIDENED):
             seen = {k: s for k, s in self.seen.items() if k == bare(k) and k not in done}
-            key = max(seen, key=lambda k: (seen[k], sorted(k)))
-            if seen[key] < self.score(start) - WITHIN:
+            key = max(seen, key=lambda k: (seen[k], sorted(k)), default=None)
+            if key is None or seen[key] < self.score(start) - WITHIN:
                 return
             done.add(key)
             around = self.neighbours(key)
@@ -365,6 +365,8 @@ class Search:
             many = len(bare(self.best.key) - self.stood) > FEW
             if self.best.key in self._centres or (many and k >= _ROUNDS // 2):
                 break
+            if self._is_endless(self.best.key):
+                break
             self.look_about(self.best)
 
     # --- one hypothesis ---
@@ -408,7 +410,7 @@ class Search:
         found = self._fitted(key, start, held)
         for _ in range(_REFITS):
             best = self._take(new := scored(self.every, key, found, held))
-            if new.wanted is None or best is not new:
+            if new.wanted is None or best is not new or self._is_endless(key):
                 break
             held = new.wanted
             found = self._fitted(key, found.state, held, found.noise)
@@ -423,6 +425,10 @@ class Search:
         kind = next((k for k in key if is_field(k)), None)
         columns = None if kind is None else self.every.fields[kind] * widths.get(kind, 3.0)
         return fit(self.data, start, by_name, columns, noise=noise)
+
+    def _is_endless(self, key: Key) -> bool:
+        """Whether so many effects imitate something unknown that none of them could be named."""
+        return bare(key) != key and len(bare(key) - self.stood) > 2 * FEW
 
     def _waits(self, key: str) -> bool:
         return key in self.every.members and self.every.members[key].waits
@@ -569,17 +575,16 @@ class Search:
             if len(kinds) >= _FIELDS:
                 break
         own = [k for k in centre.key if is_field(k)]
-        for kind in [*kinds[:1], *own]:  # with noise of its own a field may be worth more
-            self._fit_new(scores, end | {kind})
-        self._fit_best(scores, centre)
+        # with noise of its own a field may be worth more
+        self._fit_best(scores, centre, dict.fromkeys(end | {kind} for kind in [*kinds[:1], *own]))
 
-    def _fit_best(self, scores: Scores, centre: Hypothesis) -> None:
-        """Fit what a linear model considers best, within the budget."""
+    def _fit_best(self, scores: Scores, centre: Hypothesis, first: Iterable[Key]) -> None:
+        """Fit some hypotheses and what a linear model considers best, within the budget."""
         seen, done = scores.seen, 0
         top = max(seen.values())
-        for key in scores.best(4 * _FITS):
-            adds = key > centre.key and seen[key] < top - EQUAL
-            if not adds and done < _FITS:
+        best = [k for k in scores.best(4 * _FITS) if not (k > centre.key and seen[k] < top - EQUAL)]
+        for key in [*first, *best]:
+            if done < _FITS:
                 done += self._fit_new(scores, key)
 
     def _fit_new(self, scores: Scores, key: Key) -> int:
@@ -595,7 +600,8 @@ class Search:
                 return 0
             self._again.add((key, scores.centre.key))
         self.fit(scores, key)
-        return 1 if len(bare(key) - self.stood) <= FEW else _LONG
+        count = len(bare(key) - self.stood)
+        return 1 if count <= FEW else _LONG if count <= 2 * FEW else _FITS
 
     def _close(self) -> None:
         """Fit the neighbours of the best that are near, until none is better."""
