@@ -1,7 +1,7 @@
 """Twins with MuJoCo as the truth: the hidden effect is named, and only that.
 
 A sample that fits into a test run; ``pytest -m sweep`` has a few more, and
-``scripts/score_twins.py`` goes through all effects and seeds.
+``scripts/score.py`` goes through all effects, with many seeds.
 """
 
 from __future__ import annotations

@@ -69,7 +69,7 @@ def test_hangprinter(shared_data: Path) -> None:
     assert re.search(r"outliers, given little weight.*: lines? 19\b", notes), notes
 
 
-@pytest.mark.sweep  # of made data test_calibrate.py asks as much, in every run
+@pytest.mark.sweep  # of made data test_calibration.py asks as much, in every run
 def test_hangprinter_calibrated(shared_data: Path) -> None:
     """What is told of rows left out is what the model predicts: straight lines gave 10.6 mm."""
     found = calibrate(
