@@ -28,7 +28,7 @@ from crosscheck.inference.catalogue import Catalogue, Key, is_field, log_shares,
 from crosscheck.inference.evidence import Linear, MemberColumns, averaged, best_widths, log_evidence
 from crosscheck.inference.fit import Fit
 from crosscheck.inference.noise import NoisePrior, log_det
-from crosscheck.inference.priors import EQUAL, FIELD_WIDTHS, WIDTHS
+from crosscheck.inference.priors import EQUAL, FIELD_WIDTHS, WIDTHS, WITHIN
 from seecr.pose import Array
 
 # The widths that maximise the evidence count only if the optimum with them loses less ln posterior
@@ -44,8 +44,8 @@ class Hypothesis:
         key: its members. fit: its fit.
         widths: prior width of each member. score: ln evidence plus ln prior.
         possible: whether a robot can have its values.
-        wanted: prior widths of greatest evidence, if these would move the fit: then it is worth
-            more when it is fitted again with them.
+        wanted: prior widths that promise far more evidence, if these would move the fit: it is
+            fitted again with them. Of many small values wide priors cost that much.
     """
 
     key: Key
@@ -75,7 +75,10 @@ def scored(every: Catalogue, key: Key, fit: Fit, widths: Mapping[str, float]) ->
         z[linear.groups[field].columns] = best.values[best.place(field)]
     wanted = None
     if best.left_to_gain(z) > _NEAR:
-        wanted, best = {**widths, **best.chosen}, linear.solved(held)
+        own = linear.solved(held)
+        if log_evidence(best) > log_evidence(own) + WITHIN:
+            wanted = {**widths, **best.chosen}
+        best = own
     stood = every.stood_keys
     score = (
         log_evidence(best) + sum(log_shares(fit).values()) + _log_absent(every, fit, best.chosen)

@@ -118,13 +118,18 @@ class Posterior:
 
 
 def _unfitted(search: Search) -> dict[Key, float]:
-    """Linear scores about the best of sets that were not fitted; none is better than the best."""
+    """Linear scores of sets that were not fitted: with more than the best one, or in its place.
+
+    None is better than the best.
+    """
     best = search.best
     if best.key != search.last.centre.key:
         return {}
     base = search.last.score(best.key)
     return {
-        k: best.score + min(s - base, 0.0) for k, s in search.near.items() if k not in search.cache
+        k: best.score + min(s - base, 0.0)
+        for k, s in search.near.items()
+        if k not in search.cache and (k > best.key or len(k) <= len(best.key))
     }
 
 
@@ -189,6 +194,8 @@ def _alike(
     beside = list[tuple[float, Key, Key]]()
     for key, score in scores.items():
         gone, come, loss = best - key, key - best, scores[best] - score
+        if not gone | come <= together.keys():
+            continue  # another form of an effect of the model as it stands
         if len(gone) == len(come) == 1:
             (a,), (b,) = gone, come
             if loss < _cost(layouts[a], layouts[b]):

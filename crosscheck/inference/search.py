@@ -111,7 +111,8 @@ class Scores:
     def neighbours(self, key: Key) -> dict[Key, float]:
         """Approximate scores with one effect more, one less or, of small sets, one exchanged."""
         base, out = self.score(key), self.larger(key)
-        for member in sorted(bare(key) - self.stood):
+        standing = {name_of(k) for k in self.stood}
+        for member in sorted(k for k in bare(key) if name_of(k) not in standing):
             rest = key - {member}
             out[rest] = base - self.gain(key, member) - self.prior(key) + self.prior(rest)
             if len(bare(key) - self.stood) <= _LARGE:
@@ -171,18 +172,19 @@ class Scores:
         return at
 
     def widen(self, start: Key) -> None:
-        """Meet the neighbours of neighbours that are near, the best first.
+        """Meet sets that are no larger and differ by more than one exchange, the best first.
 
         Two effects may do what two others do, and each exchange alone explains a little less.
         """
         done = set[Key]()
         for _ in range(_WIDENED):
-            seen = {k: s for k, s in self.seen.items() if k == bare(k) and k not in done}
+            small = {k: s for k, s in self.seen.items() if len(k) <= len(start) and k == bare(k)}
+            seen = {k: s for k, s in small.items() if k not in done}
             key = max(seen, key=lambda k: (seen[k], sorted(k)), default=None)
             if key is None or seen[key] < self.score(start) - WITHIN:
                 return
             done.add(key)
-            around = self.neighbours(key)
+            around = {k: s for k, s in self.neighbours(key).items() if len(k) <= len(start)}
             self.near |= {k: s for k, s in around.items() if k not in self.solved}
 
     def _thinned(self, start: Key) -> Key:

@@ -134,7 +134,7 @@ def test_the_command_says_it_once_on_the_terminal_on_the_page_and_in_json(tmp_pa
     start = "off the wanted poses: position 5.00 mm rms, 5.00 mm at most (line "
     assert line.startswith(start) and "; orientation 0" in line
     page = text_of((tmp_path / "out" / "comparison.html").read_text())
-    assert "How far the platform is off the wanted poses" in page and "position 5.00 5.00" in page
+    assert "How far the platform is off the wanted poses" in page and "position 5 5 mm" in page
     told = json.loads((tmp_path / "out" / "comparison.json").read_text())["tracking"]
     assert told["from"] == "wanted" and told["through_tracker"] is False
     assert told["position"]["rms"] == pytest.approx(0.005) and told["position"]["unit"] == "m"
