@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from crosscheck.comparison.result import Comparison
     from crosscheck.diagnosis.diagnose import diagnose
     from crosscheck.diagnosis.result import Diagnosis, MissingEffect
+    from crosscheck.diagnosis.tolerance import Tolerance
     from crosscheck.errors import CrosscheckError, UnsolvedError
-    from crosscheck.fit.noise.tolerance import Tolerance
     from crosscheck.fit.reasons import DiagnosisVerdict
     from crosscheck.importing.case import Imported, import_case
     from crosscheck.importing.choices import ImportChoices
@@ -54,7 +54,7 @@ _MODULES = {
     "diagnosis.result": ("Diagnosis", "MissingEffect"),
     "diagnosis.diagnose": ("diagnose",),
     "errors": ("CrosscheckError", "UnsolvedError"),
-    "fit.noise.tolerance": ("Tolerance",),
+    "diagnosis.tolerance": ("Tolerance",),
     "fit.reasons": ("DiagnosisVerdict",),
     "importing.case": ("Imported", "import_case"),
     "importing.choices": ("ImportChoices",),

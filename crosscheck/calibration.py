@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from crosscheck.errors import CrosscheckError, UnsolvedError
-from crosscheck.fit.effects.contradictions import contradictions
-from crosscheck.fit.least_squares.problem import Rms, rms_by_kind
+from crosscheck.fit.problem import Rms, rms_by_kind
 from crosscheck.fit.reasons import Reason, Why, by_reason
+from crosscheck.fit.state import contradictions
 from crosscheck.fit.words import fitted_records, rms_words
-from crosscheck.given import GivenModel, GivenRobot, basis_of, considered, model_of, robot_of
+from crosscheck.given import (
+    GivenModel,
+    GivenRobot,
+    basis_of,
+    considered,
+    model_of,
+    opened,
+    robot_of,
+)
 from crosscheck.inference.catalogue import Catalogue
 from crosscheck.inference.fit import Data, Fit
 from crosscheck.inference.held_out import hold_out
-from crosscheck.inference.noise import outliers
 from crosscheck.inference.search import Search
 from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import calibrated, provenance_of, renewed
-from crosscheck.preparation.prepare import Progress, prepare
-from crosscheck.preparation.thinned import thinned
+from crosscheck.preparation.prepare import Prepared, Progress, prepare
+from crosscheck.preparation.thinned import Thinned, thinned
 from seecr.arguments import silent
 from seecr.counted import counted, plural, some
 from seecr.effects import Terms, catalogue
@@ -79,10 +85,7 @@ class Calibrated(Result, JointErrors):
     Attributes:
         fitted: the effects with standard errors, without those that the data do not see.
         covariance: (p, p) of all their parameters, in their order; SI.
-        before, after, held_out: rms errors by kind: of the model as it stood, of this one, and of
-            held-out runs, each predicted by a fit without it.
-        scale, rho: by kind of reading, the estimated noise over the stated one, and its correlation
-            between successive rows of a run.
+        before, after, held_out, scale, rho: as in :class:`JointErrors`.
         outliers: lines of the file that hardly count.
         outlier_places: the same as they are told, after the name of the file if there are several.
         settled: whether the fit converged; if not, its values are not to be used.
@@ -165,6 +168,28 @@ class Calibrated(Result, JointErrors):
         }
 
 
+def made_ready(
+    robot: GivenRobot, data: GivenData, model: GivenModel, names: frozenset[str]
+) -> tuple[Thinned, Prepared, Model, tuple[str, ...]]:
+    """What a search begins with.
+
+    Args:
+        robot, data, model: as they were given. names: of the effects that may be missing.
+
+    Returns:
+        The rows that are searched, these made ready, the model as it stands, and what is said of
+        it. A model given as effects alone becomes a new one of the robot with these.
+    """
+    robot = robot_of(robot)
+    thin = thinned(robot, measurements_of(data, robot))
+    model = opened(model, robot)
+    terms, said = model_of(model, robot)
+    basis = basis_of(model, robot)
+    if not isinstance(model, Model):
+        basis = replace(basis, terms=terms)
+    return thin, prepare(robot, thin.data, terms, names), basis, said
+
+
 def calibrate(
     robot: GivenRobot,
     data: GivenData,
@@ -189,35 +214,30 @@ def calibrate(
         CrosscheckError: the data allow no calibration.
         UnsolvedError: rows have no equilibrium.
     """
-    robot = robot_of(robot)
-    thin = thinned(robot, measurements_of(data, robot))
-    terms, said = model_of(model, robot)
-    ready = prepare(robot, thin.data, terms, considered(only, exclude))
-    if ready.refusal is not None:
-        kind = UnsolvedError if ready.refusal.unsolved else CrosscheckError
-        why = f"{ready.refusal}; nothing was fitted: {ready.refusal.remedy}"
-        raise kind(f"{thin.data.path}: {why}")
     # BLAS on several threads takes longer for matrices as narrow as these
     with threadpool_limits(limits=1, user_api="blas"):
+        thin, ready, basis, said = made_ready(robot, data, model, considered(only, exclude))
+        if ready.refusal is not None:
+            raise ready.refusal.error(thin.data.path, "nothing was fitted")
         data_ = Data.of(ready.problem, ready.terms)
         search = Search(data_, Catalogue.of(data_, ready.terms), lambda text: progress(text, 0.4))
         search.begin()
         whole = search.calibrated.fit
-        far = outliers(data_.chain, whole.weight, thin.data.n_rows)
+        far = whole.outlying
         whole = whole.with_far_off(far)
         progress("predicting held-out runs", 0.95)
         before = rms_by_kind(whole.data.problem, search.plain.raw)
         errors = JointErrors.of(before, whole)
         others = thin.note_on_others(whole.terms, ready.problem.sigma)
     notes = (*said, *contradictions(whole.terms), *ready.all_notes, *others)
-    fitted = _fitted(whole, terms)
+    fitted = _fitted(whole, basis.terms)
     kept = {one.term.name for one in fitted}
     own = np.flatnonzero([name in kept for name, _key in whole.terms.labels])
     rows = np.flatnonzero(far).tolist()
     source = provenance_of(thin.data.name, "crosscheck calibrate")
     covariance = (whole.spread * np.outer(whole.terms.scale, whole.terms.scale))[np.ix_(own, own)]
     kinds = {"before": errors.before, "after": errors.after, "held_out": errors.held_out}
-    new = calibrated(basis_of(model, robot), fitted, covariance, source, kinds)
+    new = calibrated(basis, fitted, covariance, source, kinds)
     return Calibrated(
         fitted=fitted,
         covariance=covariance,
@@ -227,7 +247,7 @@ def calibrate(
         settled=whole.settled,
         notes=notes,
         absent=_absent(search.every, kept),
-        model=renewed(new, robot, thin.data),
+        model=renewed(new, thin.robot, thin.data),
     )
 
 

@@ -41,9 +41,9 @@ from numpy.typing import NDArray
 
 from crosscheck.calibration import calibrate
 from crosscheck.diagnosis.diagnose import diagnose
-from crosscheck.fit.least_squares.problem import Problem, rms_by_kind
-from crosscheck.fit.least_squares.state import derivatives, evaluate
+from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.fit.state import derivatives, evaluate
 from crosscheck.inference import priors
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.twin.hidden import choose, times

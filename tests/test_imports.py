@@ -1,8 +1,8 @@
 """Imports point one way, and heavy ones wait until they are needed.
 
 The floors of both packages are one table, read from the lowest floor up and from left to right: a
-room, a folder or file, may import what stands before it. The same holds within a folder that has
-folders of its own. Imports inside functions count; those for types alone do not.
+room, a folder or file, may import what stands before it. The same holds within a folder whose
+files stand in an order. Imports inside functions count; those for types alone do not.
 """
 
 from __future__ import annotations
@@ -31,8 +31,11 @@ TABLE = (
     "crosscheck: calibration add diagnosis",
     "crosscheck: show cli",
 )
-# The rooms of a folder that has folders of its own.
-INNER_TABLE = ("crosscheck.fit: reasons least_squares words noise effects",)
+# The rooms of a folder whose files stand in an order.
+INNER_TABLE = (
+    "crosscheck.fit: reasons algebra problem length_errors state words",
+    "crosscheck.fit: registration residual_noise",
+)
 
 # Packages, whose faces stand on all floors: through them anything could import anything.
 FACES = ("seecr", "crosscheck")

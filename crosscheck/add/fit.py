@@ -9,8 +9,7 @@ from typing import Protocol, TypeAlias, runtime_checkable
 from crosscheck.add.result import Addition
 from crosscheck.add.weigh import weigh
 from crosscheck.errors import CrosscheckError, UnsolvedError
-from crosscheck.fit.least_squares.state import State
-from crosscheck.fit.reasons import Refusal
+from crosscheck.fit.state import State
 from crosscheck.given import GivenModel, GivenRobot, basis_of, model_of, robot_of
 from crosscheck.inference.catalogue import Catalogue, candidates
 from crosscheck.inference.fit import TRACKER, Data, Fit, fit, unfitted
@@ -101,12 +100,7 @@ def add_effects(
 
 
 def _several(effects: GivenSeveral, robot: Robot) -> tuple[list[Term], list[Layout]]:
-    """Effects with values, and parameters of those that are only named.
-
-    Raises:
-        InputError: there is no effect of a name, or something else was given.
-        CrosscheckError: nothing was given.
-    """
+    """Effects with values, and parameters of those that are only named."""
     given = effects.terms if isinstance(effects, HasTerms) else effects
     some = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
     wrong = [one for one in some if not isinstance(one, Term | str)]
@@ -135,8 +129,11 @@ def _added(
     ready = prepare(robot, data, terms)
     what = " + ".join(names)
     if ready.refusal is not None:
-        raise _refused(f"{data.path}", ready.refusal, what)
-    _refuse_lacking(ready.problem.data.path, candidates(ready.problem), names)
+        raise ready.refusal.error(data.path, f"{what} was not fitted")
+    for layout, why in candidates(ready.problem):
+        if why is not None and layout.name in names:
+            cannot = f"{layout.name} cannot be fitted to these data: {why.words}"
+            raise CrosscheckError(f"{data.path}: {cannot}")
     progress(f"fitting {what}", 0.0)
     adding = _Adding(Data.of(ready.problem, ready.terms), f"{data.path}")
     best = adding.fitted(ready.terms, valued, named)
@@ -146,20 +143,6 @@ def _added(
     base = adding.without(best, names, before)
     notes = [*said, *ready.all_notes]
     return weigh(best, base, before, names, notes, basis_of(model, robot))
-
-
-def _refused(path: str, refusal: Refusal, what: str) -> CrosscheckError:
-    kind = UnsolvedError if refusal.unsolved else CrosscheckError
-    return kind(f"{path}: {refusal}; {what} was not fitted: {refusal.remedy}")
-
-
-def _refuse_lacking(
-    path: object, every: Sequence[tuple[Layout, object]], names: Sequence[str]
-) -> None:
-    for layout, why in every:
-        if why is not None and layout.name in names:
-            words = getattr(why, "words", why)
-            raise CrosscheckError(f"{path}: {layout.name} cannot be fitted to these data: {words}")
 
 
 def _apart(terms: Terms, layout: Layout, kind: str) -> Term:
@@ -205,7 +188,8 @@ class _Adding:
         fits = []
         if layout.name in terms:
             fits.append(self._to_the_end(terms, None, layout.name))
-        considered = replace_considered(self.data, layout.name)
+        alone = self.data.problem.considering(frozenset({layout.name}))
+        considered = replace(self.data, problem=alone)
         search = Search(considered, Catalogue.of(considered, rest))
         key = search.stood | {layout.name}
         if search.plain.valid:
@@ -231,11 +215,7 @@ class _Adding:
     def _to_the_end(
         self, terms: Terms, near: State | None, what: str, noise: Noise | None = None
     ) -> Fit:
-        """A fit from given values with exact derivatives, until it converges.
-
-        Raises:
-            UnsolvedError: rows have no solution, or the fit does not converge.
-        """
+        """A fit from given values with exact derivatives, until it converges; or UnsolvedError."""
         state = self.data.state(terms, near)
         if not state.valid:
             raise UnsolvedError(
@@ -252,12 +232,6 @@ class _Adding:
                 "else is missing with crosscheck diagnose, or fix known values in the model"
             )
         return found
-
-
-def replace_considered(data: Data, name: str) -> Data:
-    """The same data, on which one effect alone may be missing."""
-    problem = data.problem.considering(frozenset({name}))
-    return replace(data, problem=problem)
 
 
 def _is_placed(term: Term) -> bool:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from crosscheck.comparison.noise import Coloured
-from crosscheck.fit.least_squares.problem import Rms
-from crosscheck.fit.noise.whiteness import Whiteness
+from crosscheck.fit.problem import Rms
+from crosscheck.fit.residual_noise import Whiteness
 from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
 from crosscheck.inference.priors import FALSE_ALARM
 from crosscheck.model.fitted import Fitted

@@ -10,14 +10,12 @@ from scipy import special
 
 from crosscheck.add.result import Addition
 from crosscheck.comparison.noise import coloured_noise
-from crosscheck.fit.effects.contradictions import contradictions
-from crosscheck.fit.effects.nothing import distance_from_nothing, is_nothing
-from crosscheck.fit.least_squares.problem import Rms, rms_by_kind
-from crosscheck.fit.noise.whiteness import whiteness
+from crosscheck.fit.problem import Rms, rms_by_kind
+from crosscheck.fit.residual_noise import whiteness
+from crosscheck.fit.state import contradictions
 from crosscheck.inference.catalogue import About, Catalogue
 from crosscheck.inference.fit import Fit, unfitted
 from crosscheck.inference.held_out import hold_out, improves, pays
-from crosscheck.inference.noise import outliers
 from crosscheck.inference.priors import FALSE_ALARM
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import provenance_of, renewed, with_fit
@@ -27,11 +25,15 @@ from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.prediction.model import Model
 
+_MOST_NAMED = 4
 # A value of more plausible sizes than this needs a check.
 _IMPLAUSIBLE = 5.0
 # Parameters with a larger correlation than this can hardly be determined separately.
 _CORRELATED = 0.95
-_MOST_NAMED = 4
+_WIDENED = (
+    "the residuals are not noise: the standard errors include by how much another missing "
+    "effect may shift these values; crosscheck diagnose searches for it"
+)
 # Another effect counts if it gains this part of what the best one does.
 _PART_OF_BEST = 0.5
 
@@ -39,14 +41,9 @@ _PART_OF_BEST = 0.5
 def weigh(
     best: Fit, base: Fit, terms: Terms, names: Sequence[str], notes: Sequence[str], basis: Model
 ) -> Addition:
-    """Judge what the named effects are worth in the best fit, against the model without them.
-
-    Args:
-        best: the fit with all of them. base: the fit without them. terms: the model as it stood.
-        names: of the new effects. notes: about the data. basis: the model to write into.
-    """
+    """Judge what the named effects are worth in the best fit, against ``base`` without them."""
     problem = best.data.problem
-    far = outliers(best.data.chain, best.weight, problem.data.n_rows)
+    far = best.outlying
     if far.any():
         best, base = best.with_far_off(far), base.with_far_off(far)
         lines = problem.data.lines_of(far)
@@ -62,7 +59,8 @@ def weigh(
     # standard errors are too small if another effect is still missing
     moved = np.zeros_like(best.covariance) if noise else _moved_together(best)
     covariance = _no_wider(best.terms, best.covariance + moved)
-    fitted = _split(best.terms, best, np.sqrt(np.diag(covariance)))
+    stderr, parts = np.sqrt(np.diag(covariance)), [(t, best.terms.part(t.name)) for t in best.terms]
+    fitted = tuple(Fitted(t, stderr[part], best.at_bound[part]) for t, part in parts)
     drop = best.metric.power(base.left) - best.metric.power(best.left)
     p = float(special.chdtrc(max(int((best.seen & own).sum()), 1), max(drop, 0.0)))
     distance, count = distance_from_nothing(best.terms, covariance, own)
@@ -84,8 +82,9 @@ def weigh(
         whiteness=white,
         coloured=coloured,
         warnings=(
-            *_warnings(problem.robot, best, fitted, own),
-            *_widened(best, np.sqrt(np.diag(moved)), own),
+            *(text for f in fitted for text in _warnings_of(problem.robot, f)),
+            *_together(best, own),
+            *([_WIDENED] if np.any(own & (np.sqrt(np.diag(moved)) > best.stderr)) else []),
         ),
         notes=tuple(dict.fromkeys(notes)),
         model=_model(best, basis, fitted, names, errors, covariance),
@@ -93,14 +92,10 @@ def weigh(
 
 
 def _moved_together(best: Fit) -> Array:
-    """How far values would move together if another effect were in the model (omitted variables).
+    """Covariance (p, p) of how far values would move if another effect were in the model.
 
-    If a fit leaves structure, something else acts, and the fitted values have absorbed what it has
-    in common with them. The catalogue shows how much that may be.
-
-    Returns:
-        The covariance (p, p) of the moves by the effects that explain most of the remainder, at
-        most as large as the largest.
+    What a fit leaves, the fitted values have partly absorbed (omitted variables). These are the
+    moves by effects that explain most of the remainder, at most as large as the largest.
     """
     about = About(Catalogue.of(best.data, best.terms), best)
     every = [about.moves(k) for k in about.columns if k in about.promises]
@@ -135,17 +130,6 @@ def _no_wider(terms: Terms, covariance: Array) -> Array:
     return np.asarray(covariance * np.outer(shrink, shrink))
 
 
-def _split(terms: Terms, best: Fit, stderr: Array) -> tuple[Fitted, ...]:
-    parts = [(term, terms.part(term.name)) for term in terms]
-    return tuple(Fitted(t, stderr[own], best.at_bound[own]) for t, own in parts)
-
-
-def _warnings(
-    robot: Robot, best: Fit, fitted: Sequence[Fitted], own: NDArray[np.bool_]
-) -> list[str]:
-    return [*(text for f in fitted for text in _warnings_of(robot, f)), *_together(best, own)]
-
-
 def _warnings_of(robot: Robot, f: Fitted) -> Iterator[str]:
     """Warnings about one effect's values."""
     name, names = f.term.name, np.array(f.term.layout.names)
@@ -165,22 +149,9 @@ def _warnings_of(robot: Robot, f: Fitted) -> Iterator[str]:
             if large.sum() > 1
             else "its plausible size: check it"
         )
-        yield (f"{name}: {_are(names[large])} {size[large].max():.3g} times {whose} on the robot")
-
-
-def _are(names: NDArray[np.str_]) -> str:
-    """Parameters as the subject of a sentence about their largest number, with its verb."""
-    return f"{some(names.tolist())} {'is' if len(names) == 1 else 'are up to'}"
-
-
-def _widened(best: Fit, moved: Array, own: NDArray[np.bool_]) -> list[str]:
-    """A warning if standard errors are mostly due to effects that may still be missing."""
-    if not np.any(own & (moved > best.stderr)):
-        return []
-    return [
-        "the residuals are not noise: the standard errors include by how much another missing "
-        "effect may shift these values; crosscheck diagnose searches for it"
-    ]
+        verb = "is" if large.sum() == 1 else "are up to"
+        most = f"{size[large].max():.3g} times {whose} on the robot"
+        yield f"{name}: {some(names[large].tolist())} {verb} {most}"
 
 
 def _together(best: Fit, own: NDArray[np.bool_]) -> list[str]:
@@ -200,3 +171,32 @@ def _together(best: Fit, own: NDArray[np.bool_]) -> list[str]:
         )
         for c, i, j in sorted(pairs, reverse=True)[:_MOST_NAMED]
     ]
+
+
+def distance_from_nothing(
+    terms: Terms, covariance: Array, own: NDArray[np.bool_]
+) -> tuple[float, int]:
+    """Distance of parameters from null, together, in standard errors, and how many are in it.
+
+    Shapes, fixed values and unidentifiable parameters (inf in the covariance) do not count. The
+    distance is infinite if no parameter was free.
+    """
+    shape = np.concatenate([term.layout.shape for term in terms])
+    free = own & ~shape & ~terms.knowledge.fixed
+    if not free.any():
+        return float("inf"), 0
+    seen = np.flatnonzero(free & np.isfinite(np.diag(covariance)) & (np.diag(covariance) > 0.0))
+    if not len(seen):
+        return 0.0, 1
+    scale = terms.scale[seen]
+    z = (terms.vector - terms.null)[seen] / scale
+    part = covariance[np.ix_(seen, seen)] / np.outer(scale, scale)
+    squared = float(z @ np.linalg.pinv(part, hermitian=True) @ z)
+    return float(np.sqrt(max(squared, 0.0))), len(seen)
+
+
+def is_nothing(distance: float, count: int) -> bool:
+    """Whether so many values are no further from null than chance takes one within its error."""
+    if not np.isfinite(distance):
+        return False
+    return bool(special.chdtr(count, distance**2) <= special.chdtr(1, 1.0))

@@ -28,8 +28,8 @@ from crosscheck.comparison.quantities import (
     of_rows,
     travel,
 )
-from crosscheck.fit.least_squares.problem import Problem
-from crosscheck.fit.noise.whiteness import as_table
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.residual_noise import as_table
 from seecr.counted import between
 from seecr.pose import Array
 from seecr.prediction.experiment import Prediction

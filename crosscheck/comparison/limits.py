@@ -11,7 +11,7 @@ import numpy as np
 
 from crosscheck.comparison.result import Comparison
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.least_squares.problem import KINDS, Kind
+from crosscheck.fit.problem import KINDS, Kind
 from crosscheck.measurements.data import EXAMPLE, parse_quantity
 from seecr.files import path_of, read_toml
 

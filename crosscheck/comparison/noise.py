@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.least_squares.problem import Problem, kinds_stated
-from crosscheck.fit.least_squares.state import State
-from crosscheck.fit.noise.outliers import outlying_rows
+from crosscheck.fit.problem import Problem, kinds_stated
+from crosscheck.fit.residual_noise import outlying_rows
+from crosscheck.fit.state import State
 from crosscheck.inference.catalogue import Catalogue
 from crosscheck.inference.evidence import Linear, MemberColumns, averaged
 from crosscheck.inference.fields import fields_about

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from crosscheck.fit.least_squares.problem import ORIENTATION, POSITION, Problem
+from crosscheck.fit.problem import ORIENTATION, POSITION, Problem
 from crosscheck.measurements.data import Names
 from seecr.pose import Array, pose_difference, quat_rotate, rotvec_from_quat
 from seecr.prediction.experiment import Prediction

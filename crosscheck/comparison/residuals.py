@@ -18,10 +18,9 @@ from crosscheck.comparison.result import (
     WorstRow,
     tracking,
 )
-from crosscheck.fit.effects.contradictions import contradictions
-from crosscheck.fit.least_squares.problem import Problem, Rms, kinds_read, rms_by_kind
-from crosscheck.fit.least_squares.state import State, evaluate
-from crosscheck.fit.noise.whiteness import as_table, whiteness
+from crosscheck.fit.problem import Problem, Rms, kinds_read, rms_by_kind
+from crosscheck.fit.residual_noise import as_table, whiteness
+from crosscheck.fit.state import State, contradictions, evaluate
 from crosscheck.fit.words import rms_words
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
 from crosscheck.measurements.data import Names

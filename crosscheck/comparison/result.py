@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.noise import Coloured
 from crosscheck.comparison.quantities import QuantityKind, Travel, channels
-from crosscheck.fit.least_squares.problem import (
+from crosscheck.fit.problem import (
     BY_NAME,
     KINDS,
     Kind,
@@ -25,10 +25,9 @@ from crosscheck.fit.least_squares.problem import (
     kinds_read,
     kinds_stated,
 )
-from crosscheck.fit.least_squares.state import State
-from crosscheck.fit.noise.unstated import errors_are_noise
-from crosscheck.fit.noise.whiteness import Whiteness
 from crosscheck.fit.reasons import Refusal
+from crosscheck.fit.residual_noise import Whiteness, errors_are_noise
+from crosscheck.fit.state import State
 from crosscheck.measurements.data import Measurements
 from seecr.counted import counted
 from seecr.description.joints import locked

@@ -63,14 +63,7 @@ class _Unknown(str):
 
 
 def check_of(term: Term, robot: Robot, stderr: Array | None = None) -> str:
-    """An effect's independent check, with what to expect: in mm, degrees and newtons.
-
-    Values that no robot can have are not given.
-
-    Args:
-        term: the effect with its values. robot: the robot that has it.
-        stderr: (k,) standard errors of the values, which determine how many digits are shown.
-    """
+    """An effect's independent check, with what to expect, to the digits that errors (k,) leave."""
     layout = term.layout
     if not term.is_possible(robot):
         return (
@@ -153,13 +146,7 @@ def measure_next(
     where: Sequence[Association],
     seen: Sequence[Varying] = (),
 ) -> list[str]:
-    """What to measure to tell effects apart, confirm or find them, a sentence each.
-
-    Args:
-        path: the models that lead to what is missing.
-        missing, verdict, where: as in the diagnosis.
-        seen: what something unknown may change.
-    """
+    """What to measure to tell effects apart, confirm or find them, a sentence each."""
     out, data = list[str](), path.problem.data
     plan = Planned(path.problem, path.last.state, path.search.data.factor, Reads.of(data))
     options = list(extensions(plan)) if any(effect.rivals for effect in missing) else []
@@ -186,7 +173,7 @@ def measured_directly(effect: str) -> str:
 def _to_separate(plan: Planned, options: Sequence[Extension], effect: MissingEffect) -> list[str]:
     """What tells an effect from each of its rivals; what tells it from several is said once."""
     ways = {
-        rival.name: telling_apart(plan, options, effect.effect, rival.layout)[:_MOST_WAYS]
+        rival.name: telling_apart(plan, options, effect.effect, rival)[:_MOST_WAYS]
         for rival in effect.rivals
     }
     by_words: dict[str, dict[str, Gain]] = {}
@@ -206,11 +193,7 @@ def _to_separate(plan: Planned, options: Sequence[Extension], effect: MissingEff
 
 
 def _from_one(effect: str, rival: str, ways: Sequence[str], can_be: bool) -> list[str]:
-    """What tells two effects apart: by hand, and by ways that tell no others apart.
-
-    Args:
-        can_be: whether there is any such way, also among those for several.
-    """
+    """What tells two effects apart: by hand, and by ways that tell no others apart, if any can."""
     start = f"to tell {effect} from {rival}:"
     direct = list(dict.fromkeys(measured_directly(n) for n in (effect, rival)))
     if not can_be:
@@ -260,7 +243,7 @@ _FIRST = {
 
 def _to_find(where: Sequence[Association]) -> str:
     # an offset says nothing about where to look; what is left beside it does
-    offset = where[0] if where and where[0].kind is QuantityKind.EVERYWHERE else None
+    offset = next((one for one in where[:1] if one.kind is QuantityKind.EVERYWHERE), None)
     rest = next((one for one in where if one.kind is not QuantityKind.EVERYWHERE), None)
     again = "repeat the same poses forward, back and an hour later"
     if rest is None:

@@ -8,31 +8,23 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from crosscheck.calibration import made_ready
 from crosscheck.diagnosis.found import diagnosis_of
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.fit.least_squares.problem import Problem, Rms, kinds_stated, rms_by_kind
-from crosscheck.fit.least_squares.state import State
-from crosscheck.fit.noise.tolerance import HALF_THE_NOISE, Tolerance
+from crosscheck.diagnosis.tolerance import HALF_THE_NOISE, Tolerance
+from crosscheck.fit.problem import Problem, Rms, kinds_stated, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Refusal, Unfit
+from crosscheck.fit.state import State
 from crosscheck.fit.words import rms_words
-from crosscheck.given import (
-    GivenModel,
-    GivenRobot,
-    basis_of,
-    considered,
-    model_of,
-    opened,
-    robot_of,
-)
+from crosscheck.given import GivenModel, GivenRobot, considered
 from crosscheck.inference.catalogue import Catalogue, candidates
 from crosscheck.inference.fit import Data
 from crosscheck.inference.priors import LIMITED, MOST_OF_IT, WIDTHS
 from crosscheck.inference.search import Search
 from crosscheck.inference.verdict import judged
-from crosscheck.measurements.read import GivenData, measurements_of
+from crosscheck.measurements.read import GivenData
 from crosscheck.planning.result import Sight, sight_of
-from crosscheck.preparation.prepare import Prepared, Progress, noise_floor, prepare
-from crosscheck.preparation.thinned import thinned
+from crosscheck.preparation.prepare import Prepared, Progress, noise_floor
 from seecr.arguments import silent
 from seecr.effects import catalogue
 from seecr.errors import InputError
@@ -70,16 +62,9 @@ def diagnose(
     """
     if not isinstance(tolerance, Tolerance):
         raise InputError(f"tolerance: expected a crosscheck.Tolerance, got {tolerance!r}")
-    robot = robot_of(robot)
-    thin = thinned(robot, measurements_of(data, robot))
-    model = opened(model, robot)
-    terms, said = model_of(model, robot)
-    basis = basis_of(model, robot)
-    if not isinstance(model, Model):
-        basis = replace(basis, terms=terms)
     # BLAS on several threads takes longer for matrices as narrow as these
     with threadpool_limits(limits=1, user_api="blas"):
-        ready = prepare(robot, thin.data, terms, considered(only, exclude))
+        thin, ready, basis, said = made_ready(robot, data, model, considered(only, exclude))
         notes = (*said, *ready.all_notes)
         found = _diagnosed(ready, notes, progress, tolerance, basis)
         if found.path is None:

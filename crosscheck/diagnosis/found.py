@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from crosscheck.calibration import JointErrors
 from crosscheck.comparison.associations import Association, associations
 from crosscheck.diagnosis.advice import check_of, measure_next
-from crosscheck.diagnosis.model import refitted_names, with_found
 from crosscheck.diagnosis.path import ModelPath, path_to
 from crosscheck.diagnosis.result import (
     PROBABLE,
@@ -19,27 +18,26 @@ from crosscheck.diagnosis.result import (
     Diagnosis,
     MissingEffect,
     NotListed,
-    Rival,
 )
+from crosscheck.diagnosis.tolerance import LeftOver, Tolerance, doubt_of, remainder_of
 from crosscheck.diagnosis.words import noise_notes, sentence_of, size_notes
-from crosscheck.fit.effects.contradictions import contradictions
-from crosscheck.fit.least_squares.problem import KINDS, Problem, Rms, rms_by_kind
-from crosscheck.fit.noise.tolerance import LeftOver, Tolerance, doubt_of, remainder_of
-from crosscheck.fit.noise.unstated import overestimated
-from crosscheck.fit.noise.whiteness import whiteness
+from crosscheck.fit.problem import KINDS, Problem, Rms, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
+from crosscheck.fit.residual_noise import overestimated, whiteness
+from crosscheck.fit.state import contradictions
 from crosscheck.fit.words import shown
 from crosscheck.inference.catalogue import name_of
 from crosscheck.inference.fields import detectable_size
 from crosscheck.inference.fit import Fit
 from crosscheck.inference.hypothesis import Hypothesis
-from crosscheck.inference.noise import outliers
 from crosscheck.inference.priors import SURE
 from crosscheck.inference.search import Search
 from crosscheck.inference.verdict import Judgement
+from crosscheck.model.fitted import Fitted
+from crosscheck.model.write import provenance_of, renewed, with_fit
 from crosscheck.planning.result import Sight
 from crosscheck.preparation.prepare import noise_floor
-from seecr.effects import effect_named
+from seecr.effects import Term, effect_named
 from seecr.pose import Array
 from seecr.prediction.model import Model
 from seecr.units import parameter_name
@@ -54,15 +52,9 @@ def diagnosis_of(
     search: Search, said: Judgement, notes: Sequence[str], sight: Sight, tolerance: Tolerance,
     basis: Model,
 ) -> Diagnosis:  # fmt: skip
-    """The diagnosis that follows from a judgement.
-
-    Args:
-        search, said: the search, and what may be said of it. notes: notes about the data.
-        sight: what these data can show. tolerance: from where on a remainder matters.
-        basis: the model as it was given.
-    """
+    """The diagnosis that follows from a judgement of a search."""
     problem = search.data.problem
-    far = outliers(search.data.chain, search.best.fit.weight, problem.data.n_rows)
+    far = search.best.fit.outlying
     alone = said.verdict is DiagnosisVerdict.EFFECTS_FOUND
     path = _without_outliers(path_to(search, said.sure, alone), far)
     chances, floor = _chances(search, said), _floor(search, said)
@@ -118,11 +110,7 @@ def diagnosis_of(
 def _contradicted(
     search: Search, missing: Sequence[MissingEffect], verdict: DiagnosisVerdict
 ) -> dict[str, str]:
-    """Notes, by effect of the model, where known values explain less than others would.
-
-    A wrong value that no fit may change is a missing effect in disguise: others are found in its
-    place.
-    """
+    """Notes, by effect of the model, where known values explain less than others would."""
     out = dict[str, str]()
     if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         return out
@@ -176,7 +164,7 @@ def _missing(search: Search, said: Judgement, path: ModelPath) -> list[MissingEf
         stderr = np.hypot(fit.stderr[part], spread[part])
         alike = dict.fromkeys(map(name_of, said.classes.alike(keys[name])))
         rivals = [
-            Rival(other, search.every.members[other].layout) for other in alike
+            search.every.members[other].layout for other in alike
             if other != name and other not in fit.terms and other in search.every.members
         ]  # fmt: skip
         out.append(
@@ -225,15 +213,13 @@ def _not_listed(
     """All effects that are not listed, the most probable first."""
     listed = {one.effect: one for one in missing}
     alike = {name: one.effect for one in missing for name in one.indistinguishable}
-    none = search.cache[search.stood]
-    assert none is not None
     chances, rows = _by_effect(search, said), list[NotListed]()
     layouts = {m.layout.name: m.layout for k, m in search.every.members.items() if "@" not in k}
     for name, layout in layouts.items():
         if name in listed or name in search.every.stood:
             continue
         alone = search.cache.get(search.stood | {name})
-        score = 0.0 if alone is None else alone.score - none.score
+        score = 0.0 if alone is None else alone.score - search.none.score
         why = _why_not(search, said, name, chances.get(name, 0.0), alike, tuple(listed))
         rows.append(NotListed(name, layout.effect.title, score, why))
     for name, why in search.every.reasons.items():
@@ -280,15 +266,10 @@ def _chances(search: Search, said: Judgement) -> Chances:
     posterior = said.posterior
     unknown = said.verdict in (DiagnosisVerdict.UNKNOWN_EFFECT, DiagnosisVerdict.MANY_EFFECTS)
     kinds = [search.every.kinds[k] for k, p in posterior.fields.items() if p > _MATTERS / 2.0]
-    seen_in = (
-        tuple(dict.fromkeys(kinds))[:_MOST_FIELDS]
-        if unknown and posterior.unknown > PROBABLE
-        else ()
-    )
+    is_seen = unknown and posterior.unknown > PROBABLE
+    seen_in = tuple(dict.fromkeys(kinds))[:_MOST_FIELDS] if is_seen else ()
     together = None
     if said.verdict is DiagnosisVerdict.MANY_EFFECTS:
-        none = search.cache[search.stood]
-        assert none is not None
         before = rms_by_kind(search.data.problem, search.plain.raw)
         together = JointErrors.of(before, search.calibrated.fit)
     shown = None if seen_in else detectable_size(search.best.fit)
@@ -333,3 +314,73 @@ def _left(
         noise = rms_by_kind(problem, sigma.copy())
     rho = max(lag, float(np.max(best.fit.noise.rho)), 0.0)
     return remainder_of(rms, noise, tolerance, problem.data.sigma, doubt_of(problem, rho))
+
+
+# --- the model with what was found ----------------------------------------------------------------
+
+
+def with_found(found: Diagnosis, basis: Model) -> Model | None:
+    """The model with what was found, all values fitted together; None without a verdict.
+
+    With nothing added or fitted again it is the model as it was given.
+    """
+    if found.path is None:
+        return None
+    if not found.missing and not refitted_names(found, basis):
+        return basis
+    names = [effect.effect for effect in found.missing]
+    errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
+    data = found.path.problem.data
+    source = provenance_of(data.name, "crosscheck diagnose")
+    new = with_fit(basis, found_effects(found), names, source, errors, found_covariance(found))
+    return renewed(new, found.path.problem.robot, data)
+
+
+def found_effects(found: Diagnosis) -> tuple[Fitted, ...]:
+    """All effects of the last model, fitted together.
+
+    Where more is missing than is listed, these make a model by themselves. The listed values, which
+    are nearer to the truth, do not.
+    """
+    assert found.path is not None
+    fit, listed = found.path.last.fit, {one.effect: one for one in found.missing}
+    out = []
+    for term in fit.terms:
+        part = fit.terms.part(term.name)
+        stderr = fit.stderr[part]
+        if term.name in listed:
+            stderr = np.maximum(stderr, listed[term.name].stderr)
+        out.append(Fitted(term, stderr, fit.at_bound[part]))
+    return tuple(out)
+
+
+def found_covariance(found: Diagnosis) -> Array | None:
+    """(p, p) covariance of the values of :func:`found_effects`, in their order.
+
+    None unless the listed effects are all that is missing, because it would be too small.
+    """
+    if found.path is None or found.verdict is not DiagnosisVerdict.EFFECTS_FOUND:
+        return None
+    fit = found.path.last.fit
+    whole = fit.with_idle(fit.covariance)
+    # some are wider still, by what a further effect would do to them
+    listed = np.concatenate([one.stderr for one in found_effects(found)]) ** 2
+    seen = np.isfinite(listed) & np.isfinite(np.diag(whole))
+    whole[np.diag_indices_from(whole)] += np.where(seen, listed - np.diag(whole), 0.0).clip(0.0)
+    return np.asarray(whole)
+
+
+def refitted_names(found: Diagnosis, own: Model) -> tuple[str, ...]:
+    """Effects of a model that agree with the data only with other values than it has."""
+    if found.path is None or found.verdict is not DiagnosisVerdict.NO_EFFECT_MISSING:
+        return ()
+    return tuple(
+        term.name for term in found.path.last.fit.terms
+        if term.name in own.names and _differs(term, own.terms[term.name])
+    )  # fmt: skip
+
+
+def _differs(new: Term, old: Term) -> bool:
+    """Whether values differ; those of single files or runs, which differ in number, do not."""
+    same = new.vector.shape == old.vector.shape
+    return same and bool((new.vector != old.vector).any())

@@ -8,24 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
-from crosscheck.fit.least_squares.problem import KINDS, Problem, Rms, rms_by_kind
-from crosscheck.fit.least_squares.state import State
+from crosscheck.fit.problem import KINDS, Problem, Rms, rms_by_kind
+from crosscheck.fit.state import State
 from crosscheck.inference.catalogue import Key, name_of, part_of
 from crosscheck.inference.fit import Fit
 from crosscheck.inference.held_out import HeldOut, by_part, hold_out
 from crosscheck.inference.search import Search
 from seecr.effects import ApartLayout, Term
 from seecr.pose import Array
-
-# The longest arrow, as a part of the widest side of the region, and the percentile of errors that
-# is drawn with this length.
-_ARROW, _LARGEST = 0.13, 98.0
-# A side is flat if it is shorter than this part of the longest one.
-_FLAT = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,10 +108,7 @@ class ModelPath:
         return None if share is None else float(np.clip(share, 0.0, 1.0)), term
 
     def removed_by(self, index: int) -> float:
-        """The part of the error on held-out runs that stage ``index`` removes from the one before.
-
-        0 to 1, of the chi2 beyond the noise.
-        """
+        """The part, 0 to 1, of the chi2 beyond noise on held-out runs that a stage removes."""
         before, after = self.stages[index - 1].held_out, self.stages[index].held_out
         kinds = [self.problem.counted[:, kind.columns].sum() for kind in KINDS]
         noise = float(np.sum(np.array(kinds) * self.noise**2))
@@ -128,21 +118,15 @@ class ModelPath:
 
 
 def path_to(search: Search, listed: Sequence[str], whole: bool) -> ModelPath:
-    """The path from the model as it stands to the members that are listed.
-
-    Args:
-        search: the search. listed: their keys. whole: whether they are all that is missing; the
-            last fit is then that of plausible sizes.
-    """
+    """The path to the listed members; if these are the ``whole``, its end has plausible sizes."""
     problem, stood = search.data.problem, search.stood
     named = bool(search.every.stood)
     start = "the given model" if named else "plain SEECR"
-    none = search.cache[stood]
-    assert none is not None
-    fit = search.unfitted if named else none.fit
+    fit = search.unfitted if named else search.none.fit
     stages = [Stage(start, "", stood, fit, hold_out(fit))]
     if named and search.wants_refit:
-        stages.append(Stage(f"{start}, fitted", "", stood, none.fit, hold_out(none.fit)))
+        fit = search.none.fit
+        stages.append(Stage(f"{start}, fitted", "", stood, fit, hold_out(fit)))
     key, left = stood, list(listed)
     while left:
         tried = {k: search.reached(key, key | {k}) for k in left}
@@ -168,67 +152,3 @@ def _by_part(fit: Fit) -> Fit:
         return fit
     parts = fit.data.problem.data.parts["run" if "run" in kinds else "file"]
     return by_part(fit, np.unique(parts, return_inverse=True)[1].astype(np.int64))
-
-
-# --- how errors are drawn -------------------------------------------------------------------------
-
-
-class Drawn(Protocol):
-    """A model that can be drawn: it has a label and a state."""
-
-    @property
-    def label(self) -> str:
-        """The model in words."""
-
-    @property
-    def state(self) -> State:
-        """The model on the data."""
-
-
-@dataclass(frozen=True, eq=False)
-class Standing:
-    """A single model that can be drawn: ``label`` names it, ``state`` has its predictions."""
-
-    label: str
-    state: State
-
-
-def magnification(problem: Problem, state: State) -> float:
-    """Factor by which arrows of the position error are enlarged; 0 if there are none.
-
-    It is a round number with which all but the largest arrows are shorter than a given part of the
-    measured region.
-    """
-    place = state.prediction.pose[:, :3]
-    size = KINDS[0].sizes(problem, state.raw)
-    size = size[np.isfinite(size)]
-    if len(size) == 0 or not np.any(size > 0):
-        return 0.0
-    span = float(np.max(np.ptp(place[problem.use], axis=0)))
-    longest = max(float(np.percentile(size, _LARGEST)), 1e-12)
-    factor = _ARROW * max(span, 1e-9) / longest
-    power = 10.0 ** np.floor(np.log10(factor))
-    return float(max(s for s in (1.0, 2.0, 5.0) if s * power <= factor) * power)
-
-
-def drawn(magnify: float) -> str:
-    """The scale of the arrows, in words."""
-    if magnify == 1.0:
-        return "to scale"
-    return f"at {magnify:g} times their length"
-
-
-def views_of(place: Array) -> list[tuple[int, int]]:
-    """Pairs of axes to show: from above and from the side, or the plane of a flat robot.
-
-    Args:
-        place: (n, 3) [m] positions that are to be seen.
-    """
-    span = np.ptp(place, axis=0)
-    wide = span > _FLAT * max(float(span.max()), 1e-12)
-    if wide.all():
-        return [(0, 1), (0, 2)]
-    kept = [int(k) for k in np.flatnonzero(wide)]
-    kept += [k for k in (0, 2, 1) if k not in kept]
-    first, second = sorted(kept[:2])
-    return [(first, second)]

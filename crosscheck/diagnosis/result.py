@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from crosscheck.calibration import JointErrors
 from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.path import ModelPath
-from crosscheck.fit.least_squares.problem import Rms
-from crosscheck.fit.noise.tolerance import LeftOver
-from crosscheck.fit.noise.whiteness import Whiteness
+from crosscheck.diagnosis.tolerance import LeftOver
+from crosscheck.fit.problem import Rms
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Refusal
+from crosscheck.fit.residual_noise import Whiteness
 from crosscheck.fit.words import rms_words, value_lines, value_records
 from crosscheck.inference.fields import Varying
 from crosscheck.planning.result import Sight
@@ -26,14 +26,6 @@ from seecr.result import Record, Result
 
 PROBABLE = 0.5
 """An effect that is not listed is called probable from this probability on."""
-
-
-@dataclass(frozen=True)
-class Rival:
-    """An effect that explains the data as well as the one listed, and its parameters."""
-
-    name: str
-    layout: Layout
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,7 +47,7 @@ class MissingEffect(Result):
     term: Term
     stderr: Array
     at_bound: NDArray[np.bool_]
-    rivals: tuple[Rival, ...]
+    rivals: tuple[Layout, ...]
     check: str
     rms: Rms
     held_out_rms: Rms

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from crosscheck.diagnosis.path import ModelPath
 from crosscheck.diagnosis.result import PROBABLE, Chances, Diagnosis, MissingEffect
-from crosscheck.fit.effects.possible import largest_size
-from crosscheck.fit.noise.tolerance import LeftOver
+from crosscheck.diagnosis.tolerance import LeftOver
 from crosscheck.fit.reasons import DiagnosisVerdict, probability_words
+from crosscheck.fit.state import largest_size
 from crosscheck.fit.words import rms_words
 from crosscheck.inference.fit import Fit
 from crosscheck.inference.verdict import Judgement
@@ -33,12 +33,7 @@ def sentence_of(
     said: Judgement, missing: Sequence[MissingEffect], path: ModelPath, chances: Chances,
     small: LeftOver | None,
 ) -> str:  # fmt: skip
-    """The verdict in words.
-
-    Args:
-        said: the judgement. missing: listed effects. path: the models shown.
-        chances: probabilities. small: what is left, if it is too small to matter; else None.
-    """
+    """The verdict in words; ``small`` is what is left, if it is too small to matter."""
     noise = _noise_words(path.search.best.fit)
     if small is not None:
         names = " and ".join(effect.effect for effect in missing)
@@ -122,9 +117,8 @@ def _with_rivals(one: MissingEffect) -> str:
 def removed(share: float) -> str:
     """What an effect does to the error on held-out runs.
 
-    Noise may have been stated too large, or be small by chance. Then all error is below it, and
-    what an effect explains of that is no share of the unexplained. Or an effect predicts nothing
-    until the next one is in the model.
+    That may be nothing: noise was stated too large, or it predicts nothing until the next one is in
+    the model.
     """
     if share < _NO_SHARE:
         return "removes no error beyond the noise on held-out runs by itself"

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, StrEnum
 
-from crosscheck.errors import CrosscheckError
+from crosscheck.errors import CrosscheckError, UnsolvedError
 from seecr.counted import counted
 
 
@@ -60,8 +60,7 @@ class Reason:
     Attributes:
         why: the kind of reason.
         parameters: number of parameters of the effect. rows: number of rows of the data.
-        p: its probability.
-        by: effects that explain as much.
+        p: its probability. by: effects that explain as much.
     """
 
     why: Why
@@ -195,20 +194,16 @@ class Refusal:
             return self.readings == 0
         return self.unfit in (Unfit.NO_EQUILIBRIUM, Unfit.UNSOLVED_MODEL)
 
+    def error(self, path: object, what: str) -> CrosscheckError:
+        """The error of a command that cannot go on with a file, and ``what`` it did not do."""
+        kind = UnsolvedError if self.unsolved else CrosscheckError
+        return kind(f"{path}: {self}; {what}: {self.remedy}")
+
     def __str__(self) -> str:
-        return self.unfit.value.format(
-            rows=counted(self.rows, "row"),
-            poses=counted(self.rows, "pose"),
-            lost=self.lost,
-            readings=counted(self.readings, "reading"),
-            lines=self.lines,
-            noise=self.noise,
-            lacking=self.lacking,
-            off=self.off,
-            left=self.left,
-            convention=self.convention,
-            file=self.file,
-        )
+        rows, poses = counted(self.rows, "row"), counted(self.rows, "pose")
+        readings = counted(self.readings, "reading")
+        some = {**vars(self), "rows": rows, "poses": poses, "readings": readings}
+        return self.unfit.value.format(**some)
 
 
 class DiagnosisVerdict(StrEnum):

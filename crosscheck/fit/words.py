@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.least_squares.problem import KINDS, Rms
+from crosscheck.fit.problem import KINDS, Rms
 from crosscheck.model.fitted import Fitted
 from seecr.effects.base import Layout
 from seecr.pose import Array
@@ -42,9 +42,8 @@ def value_lines(
     layout: Layout, values: Array, stderr: Array, at_bound: NDArray[np.bool_]
 ) -> Iterator[str]:
     """A line for each parameter (p,) of an effect: its name, value and standard error."""
-    for name, unit, value, error, bound in zip(
-        layout.names, layout.units, values, stderr, at_bound, strict=True
-    ):
+    rows = zip(layout.names, layout.units, values, stderr, at_bound, strict=True)
+    for name, unit, value, error, bound in rows:
         stop = " (at its bound)" if bound else ""
         # what is at its bound is known to be there, without an error
         known = shown(value, unit) if bound and np.isinf(error) else measured(value, error, unit)
@@ -70,9 +69,8 @@ def value_records(
     layout: Layout, values: Array, stderr: Array, at_bound: NDArray[np.bool_]
 ) -> Iterator[Record]:
     """A record for each parameter (p,) of an effect, SI; ``stderr`` None if unidentifiable."""
-    for name, unit, value, error, bound in zip(
-        layout.names, layout.units, values, stderr, at_bound, strict=True
-    ):
+    rows = zip(layout.names, layout.units, values, stderr, at_bound, strict=True)
+    for name, unit, value, error, bound in rows:
         seen: Any = float(error) if np.isfinite(error) else None
         yield {
             "effect": layout.name,

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.effects.registration import turn_of_points
+from crosscheck.fit.registration import turn_of_points
 from crosscheck.measurements.dwells import mean_rotation
 from seecr.counted import counted
 from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate, rotvec_from_quat

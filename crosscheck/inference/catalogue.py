@@ -13,14 +13,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
+from math import lgamma, log
 
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.least_squares.known import known_readings
-from crosscheck.fit.least_squares.problem import Problem
-from crosscheck.fit.least_squares.state import State, derivatives
+from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Reason, Why
+from crosscheck.fit.state import State, derivatives, known_readings
 from crosscheck.inference.evidence import Linear, MemberColumns, Solved, best_widths, log_gain
 from crosscheck.inference.fields import Varying, fields_about
 from crosscheck.inference.fit import FLAT, TRACKER, Data, Fit
@@ -128,10 +128,11 @@ def candidates(problem: Problem) -> list[tuple[Layout, Reason | None]]:
     out = list[tuple[Layout, Reason | None]]()
     for effect in catalogue().values():
         layout = layout_of(effect, problem.robot)
-        why = Reason(Why.EXCLUDED) if layout.name not in problem.considered else None
-        if why is None and (len(layout) > min(problem.n_readings, rows) or rows < 2):
+        why = lacking(problem, layout)
+        is_long = len(layout) > min(problem.n_readings, rows) or rows < 2
+        if is_long and (why is None or why.why is not Why.EXCLUDED):
             why = Reason(Why.TOO_MANY_PARAMETERS, parameters=len(layout), rows=rows)
-        out.append((layout, why or input_lacking(problem.data, layout)))
+        out.append((layout, why))
     return out
 
 
@@ -239,9 +240,7 @@ class Catalogue:
 
 def log_choices(count: int, of: int) -> float:
     """ln prior of one set of ``count`` out of ``of`` effects."""
-    from scipy.special import gammaln
-
-    return float(-np.log(of + 1) - gammaln(of + 1) + gammaln(count + 1) + gammaln(of - count + 1))
+    return -log(of + 1) - lgamma(of + 1) + lgamma(count + 1) + lgamma(of - count + 1)
 
 
 def _key_of(layout: Layout) -> str:
@@ -336,17 +335,14 @@ class About:
             if own is None:
                 continue
             if keys.get(layout.name, layout.name) != layout.name:  # the fit has another form of it
-                count = own.shape[1] // len(self._layout_in_fit(layout.name).parts)
+                form = self.fit.terms[layout.name].layout
+                assert isinstance(form, ApartLayout)
+                count = own.shape[1] // len(form.parts)
                 own = own.reshape(len(own), -1, count).sum(axis=1)
             if isinstance(layout, ApartLayout):
                 part = self.problem.data.parts[layout.kind][self.problem.row_of]
                 own = np.hstack([own * (part == name)[:, None] for name in layout.parts])
             self._take(member.key, member.term, own, np.zeros(own.shape[1]))
-
-    def _layout_in_fit(self, name: str) -> ApartLayout:
-        layout = self.fit.terms[name].layout
-        assert isinstance(layout, ApartLayout)
-        return layout
 
     def _late_columns(self, member: Member) -> None:
         """An effect that waits, at the shape that promises most."""

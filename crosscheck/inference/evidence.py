@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from crosscheck.fit.least_squares.definite import inverse_of
+from crosscheck.fit.algebra import inverse_of
 from seecr.pose import Array
 
 Widths = Mapping[str, float]
@@ -218,11 +218,7 @@ class _Axes:
 
 
 def log_positive(values: Array, variance: Array) -> Array:
-    """(...) ln of what half a Gaussian as prior changes, for parameters (..., q).
-
-    Args:
-        values: their most probable values without the bound. variance: of these.
-    """
+    """ln of what half a Gaussian as prior changes, by values (..., q) without the bound."""
     chance = special.log_ndtr(values / np.sqrt(variance))
     return np.asarray(np.sum(np.log(2.0) + chance, axis=-1))
 
@@ -230,12 +226,7 @@ def log_positive(values: Array, variance: Array) -> Array:
 def log_gain(
     normal: Array, gradient: Array, widths: ArrayLike, one_sided: ArrayLike = False
 ) -> float:
-    """ln evidence that a group gains, averaged over its widths.
-
-    Args:
-        normal: (p, p) its normal matrix after all others are eliminated. gradient: (p,) likewise.
-        widths: (k,) prior standard deviations. one_sided: (p,) parameters that cannot be negative.
-    """
+    """ln evidence, averaged over widths (k,), from what others leave of a group's equations."""
     return averaged(_Axes.of(normal, gradient, widths).gains(np.asarray(one_sided, bool)))
 
 
@@ -245,12 +236,7 @@ def averaged(gains: Array) -> float:
 
 
 def best_widths(linear: Linear, start: Widths, price: float = 0.0) -> Solved:
-    """The set with the widths that maximise its evidence, by coordinate ascent.
-
-    Args:
-        linear: normal equations of all groups. start: the set with its initial widths.
-        price: a width is only changed if that gains more than this ln evidence.
-    """
+    """The set with the widths of greatest evidence; a change must gain more than ``price``."""
     solved = linear.solved(start)
     for _ in range(_ROUNDS):
         before = solved.chosen

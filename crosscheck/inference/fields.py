@@ -17,9 +17,9 @@ from enum import StrEnum
 
 import numpy as np
 
-from crosscheck.fit.least_squares.problem import KINDS, POSITION, Rms, rms_by_kind
-from crosscheck.fit.least_squares.state import derivatives
-from crosscheck.fit.noise.smooth import monomials, waves
+from crosscheck.fit.algebra import monomials, waves
+from crosscheck.fit.problem import KINDS, POSITION, Rms, rms_by_kind
+from crosscheck.fit.state import derivatives
 from crosscheck.inference.fit import Data, Fit
 from crosscheck.inference.priors import FIELD_WIDTHS, UNKNOWN
 from seecr.effects import Term, Terms, catalogue, layout_of
@@ -111,17 +111,13 @@ class Varying(StrEnum):
 
 
 def fields_about(fit: Fit) -> list[tuple[Varying, Array]]:
-    """All candidates that move a reading: what varies, and columns (N, k) in units of the noise.
-
-    Args:
-        fit: a model, whose poses and sensitivities the columns are taken from.
-    """
-    about = _About(fit)
+    """What may vary, each with columns (N, k) in units of the noise, about a fit."""
+    about = _FieldColumns(fit)
     parts = (about.readings, about.image, about.session, about.forces, about.lengths, about.drifts)
     return [(what, columns) for part in parts for what, columns in part() if np.any(columns)]
 
 
-class _About:
+class _FieldColumns:
     """The columns about a model."""
 
     def __init__(self, fit: Fit) -> None:
@@ -274,16 +270,9 @@ def in_units_of_noise(columns: Array) -> Array:
 def detectable_size(fit: Fit) -> Rms | None:
     """The rms size, by kind of reading, from which on a smooth unknown effect would be seen.
 
-    Fields over the workspace are drawn at random, all of one size in units of the noise. The part
-    of them that the fit's effects can imitate is subtracted; what is left earns evidence, more for
-    larger fields.
-
-    Args:
-        fit: a fit and its noise.
-
-    Returns:
-        Median rms errors of fields of which nine in ten would be called unknown; None if no size
-        that was tried is seen.
+    Fields over the workspace are drawn at random, all of one size in units of the noise. What the
+    fit's effects can imitate is subtracted, and what is left earns evidence. The size is the median
+    of fields of which nine in ten would be called unknown; None if none that was tried is seen.
     """
     data, problem = fit.data, fit.data.problem
     shapes = monomials(fit.state.prediction.pose[:, :3], 3)[problem.row_of]

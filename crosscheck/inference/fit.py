@@ -22,10 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from crosscheck.fit.least_squares.definite import inverse_of, root_beside_one
-from crosscheck.fit.least_squares.known import free_derivatives, known_left, known_readings
-from crosscheck.fit.least_squares.problem import KINDS, Problem
-from crosscheck.fit.least_squares.state import State, evaluate
+from crosscheck.fit.algebra import inverse_of, root_beside_one
+from crosscheck.fit.problem import KINDS, Problem
+from crosscheck.fit.state import State, evaluate, free_derivatives, known_left, known_readings
 from crosscheck.inference.noise import (
     STATED_NOISE,
     Chain,
@@ -34,6 +33,7 @@ from crosscheck.inference.noise import (
     estimate,
     log_det,
     mixture,
+    outliers,
     whitened,
 )
 from seecr.effects import Terms
@@ -152,8 +152,7 @@ class Fit:
     """A fit of effects, with its own noise.
 
     Attributes:
-        data: what was fitted.
-        state: the model at its best values.
+        data: what was fitted. state: the model at its best values.
         jacobian: (N, p) derivatives of the prediction by z at or near them.
         width: (p,) prior standard deviations of z; 0 for values that are held.
         noise: the noise. weight: (N,) weight of each reading.
@@ -202,6 +201,11 @@ class Fit:
         terms = self.terms
         out = (terms.vector <= terms.lower) | (terms.vector >= terms.upper)
         return np.asarray(out & ~terms.knowledge.fixed)
+
+    @property
+    def outlying(self) -> NDArray[np.bool_]:
+        """(n,) rows in which some kind of reading hardly counts."""
+        return outliers(self.data.chain, self.weight, self.data.problem.data.n_rows)
 
     @property
     def free(self) -> NDArray[np.bool_]:
@@ -276,11 +280,7 @@ class Fit:
         return np.sqrt(np.diag(self.covariance))
 
     def with_idle(self, covariance: Array) -> Array:
-        """A covariance (p, p) in which no value is unknown only because it moves no reading.
-
-        A force across the plane of a planar robot is never seen, nor is it felt. The error of such
-        a value is its plausible size.
-        """
+        """A covariance (p, p) in which what moves no reading has its plausible size as error."""
         out, moves = covariance.copy(), np.linalg.norm(self.jacobian, axis=0)
         idle = np.isinf(np.diag(out)) & (moves < _IDLE)
         out[idle, idle] = self.terms.scale[idle] ** 2
@@ -307,8 +307,7 @@ def fit(
     """Fit a model from a valid state, with its own noise.
 
     Args:
-        data: what is fitted.
-        start: the model at its starting values; must be valid.
+        data, start: what is fitted, and the model at its starting values.
         widths: prior widths of its effects, in plausible sizes; 1 by default.
         field: (N, k) columns of an unknown effect in units of their width, or None.
         noise: where to begin; by default white and as large as the median residual.
@@ -383,36 +382,23 @@ def _noise_of(fit: Fit) -> Noise:
 def _settle(
     data: Data, state: State, width: Array, metric: Metric, jacobian: Array, steps: int = _STEPS
 ) -> tuple[State, Array, bool]:
-    """Gauss-Newton steps until nothing is gained: the state, its derivatives, whether it settled.
-
-    ``jacobian`` has the derivatives at the start or very near to it.
-    """
+    """Gauss-Newton until nothing is gained: the state, its derivatives, whether it settled."""
     damping = 1e-4
     for _ in range(steps):
         step = _step(data, state, jacobian, width, metric, damping)
         if step is None:
             return state, jacobian, True
-        state, damping = step.state, step.damping
-        if step.gain < max(_PART * step.before, _GAIN):
+        before, gain, state, damping = step
+        if gain < max(_PART * before, _GAIN):
             return state, jacobian, True  # so near that the derivatives are still accurate
         jacobian = data.derivatives(state)
     return state, jacobian, False
 
 
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """A step that lowers the objective: by how much, the objective before, and the new state."""
-
-    gain: float
-    before: float
-    damping: float
-    state: State
-
-
 def _step(
     data: Data, state: State, jacobian: Array, width: Array, metric: Metric, damping: float
-) -> _Step | None:
-    """A step that lowers the objective; None if there is none."""
+) -> tuple[float, float, State, float] | None:
+    """The objective, by how much a step lowers it, the state then and the next damping, or None."""
     terms, z = state.terms, state.terms.sizes
     known, off = known_readings(terms)[0], known_left(terms)
     normal, gradient = metric.normal(jacobian, state.white)
@@ -435,7 +421,7 @@ def _step(
         trial = data.state(terms.with_vector(moved), state, trial=True)
         after = _cost(metric, trial, width) if trial.valid else np.inf
         if after < before:
-            return _Step(before - after, before, max(0.1 * damping, 1e-9), trial)
+            return before, before - after, trial, max(0.1 * damping, 1e-9)
         damping = max(10.0 * damping, 1e-4)
     return None
 

@@ -12,7 +12,7 @@ from itertools import zip_longest
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.least_squares.problem import Problem, Rms, rms_by_kind
+from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.inference.fit import Fit, without_rows
 from seecr.counted import counted
 from seecr.pose import Array
@@ -31,8 +31,7 @@ class HeldOut:
     Attributes:
         raw: (n, 6 + m) residuals, each row predicted by a model that was not fitted to its block.
         chi2: (blocks,) sum of squares of each held-out block, in units of the stated noise.
-        readings: (blocks,) number of readings in each.
-        rms: errors of the held-out rows, by kind.
+        readings: (blocks,) number of readings in each. rms: errors of the held-out rows, by kind.
         valid: whether every block could be predicted.
     """
 
@@ -95,8 +94,8 @@ def blocks_of(problem: Problem) -> list[NDArray[np.bool_]]:
         none = np.zeros_like(problem.use)
         return [np.any(blocks, axis=0) for blocks in zip_longest(*every, fillvalue=none)]
     run = problem.data.run_index
-    if _enough_runs(problem):
-        return [(run == k) & problem.use for k in _runs(problem)]
+    if len(runs := _runs(problem)) >= _LEAST_RUNS:
+        return [(run == k) & problem.use for k in runs]
     rows = np.flatnonzero(problem.use)
     index = np.arange(len(run))
     return [np.isin(index, part) for part in np.array_split(rows, _count(problem))]
@@ -109,9 +108,9 @@ def blocks_note(problem: Problem) -> str:
             "cross-validation leaves out a part of each file or run, because each has values of "
             "its own"
         )
-    if _enough_runs(problem):
-        return ""
     runs = len(_runs(problem))
+    if runs >= _LEAST_RUNS:
+        return ""
     word = "a single run" if runs == 1 else f"only {counted(runs, 'run')}"
     blocks = counted(_count(problem), "block")
     return f"{word}: cross-validation leaves out {blocks} of time instead of runs"
@@ -119,10 +118,6 @@ def blocks_note(problem: Problem) -> str:
 
 def _runs(problem: Problem) -> NDArray[np.int64]:
     return np.unique(problem.data.run_index[problem.use])
-
-
-def _enough_runs(problem: Problem) -> bool:
-    return len(_runs(problem)) >= _LEAST_RUNS
 
 
 def _count(problem: Problem) -> int:

@@ -19,13 +19,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import special
 
-from crosscheck.fit.effects.possible import can_be
-from crosscheck.fit.least_squares.definite import inverse_of, solved
-from crosscheck.fit.least_squares.known import known_left, known_readings
+from crosscheck.fit.algebra import inverse_of, solved
+from crosscheck.fit.state import can_be, known_left, known_readings
 from crosscheck.inference.catalogue import Catalogue, Key, is_field, log_shares, widths_for
-from crosscheck.inference.evidence import Linear, MemberColumns, averaged, best_widths, log_evidence
+from crosscheck.inference.evidence import Linear, MemberColumns, best_widths, log_evidence, log_gain
 from crosscheck.inference.fit import Fit
 from crosscheck.inference.noise import NoisePrior, log_det
 from crosscheck.inference.priors import EQUAL, FIELD_WIDTHS, WIDTHS, WITHIN
@@ -62,11 +60,7 @@ class Hypothesis:
 
 
 def scored(every: Catalogue, key: Key, fit: Fit, widths: Mapping[str, float]) -> Hypothesis:
-    """A fit as a hypothesis, linearised about its own optimum.
-
-    Args:
-        every: the catalogue. key: members. fit: their fit. widths: the prior widths of that fit.
-    """
+    """A fit with these prior widths as a hypothesis, linearised about its own optimum."""
     linear, z = _own_linear(every, key, fit)
     held = {k: widths.get(k, group.middle) for k, group in linear.groups.items()}
     best = best_widths(linear, held)
@@ -186,13 +180,6 @@ def _log_absent(every: Catalogue, fit: Fit, widths: Mapping[str, float]) -> floa
     total = 0.0
     for k, p, a in zip(held, np.maximum(power, 0.0), along, strict=True):
         own = widths.get(owners[k])
-        total += averaged(_half_gaussian(p, a, np.array(WIDTHS if own is None else [own])))
+        of = WIDTHS if own is None else [own]
+        total += log_gain(np.array([[p]]), np.array([a]), of, one_sided=True)
     return total
-
-
-def _half_gaussian(power: float, along: float, width: Array) -> Array:
-    """ln evidence gained by a parameter that cannot be negative, with half a Gaussian as prior."""
-    square = width**2
-    grown = 1.0 + square * power
-    gain = 0.5 * (square * along**2 / grown - np.log(grown))
-    return np.asarray(gain + np.log(2.0) + special.log_ndtr(along * np.sqrt(square / grown)))

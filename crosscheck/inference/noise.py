@@ -27,18 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, special
 
-from crosscheck.fit.least_squares.definite import root_beside_one
-from crosscheck.fit.least_squares.problem import KINDS, Problem, kinds_read
-from crosscheck.inference.priors import (
-    FAR,
-    MISJUDGED,
-    MISJUDGED_BY,
-    MISJUDGED_MOST,
-    OUTLIERS,
-    SLOW,
-    STATED,
-    UNSTATED,
-)
+from crosscheck.fit.algebra import root_beside_one
+from crosscheck.fit.problem import KINDS, Problem, kinds_read
+from crosscheck.inference import priors
 from seecr.pose import Array
 
 # Gap of readings that are so far apart that they are not correlated.
@@ -254,16 +245,12 @@ def _likelihood(
 
 
 def mixture(chain: Chain, noise: Noise, residual: Array) -> tuple[Array, float]:
-    """Weights (N,) of readings if each row's noise has one of three sizes, and what that adds.
+    """Weights (N,) of residuals (N,) if a row's noise has one of three sizes, and what that adds.
 
-    Args:
-        chain, noise: the noise. residual: (N,) in units of the stated noise.
-
-    Returns:
-        The weights, and what the mixture adds to the ln likelihood with these weights (a bound).
-        While a fit is far off, the bulk of the residuals stands for the noise.
+    It adds so much to the ln likelihood with these weights (a bound). While a fit is far off, the
+    bulk of the residuals stands for the noise.
     """
-    chance, sizes = np.log(OUTLIERS), np.array(FAR)
+    chance, sizes = np.log(priors.OUTLIERS), np.array(priors.FAR)
     weight, total = np.ones(len(residual)), 0.0
     for k in np.unique(chain.kind):
         mine = np.flatnonzero(chain.kind == k)
@@ -331,7 +318,8 @@ class NoisePrior:
 
         It is if it is larger than stated and slow, or larger than anybody misjudges.
         """
-        no_noise = (noise.rho[self.kinds] >= SLOW) | (noise.scale[self.kinds] > MISJUDGED_MOST)
+        rho, scale = noise.rho[self.kinds], noise.scale[self.kinds]
+        no_noise = (rho >= priors.SLOW) | (scale > priors.MISJUDGED_MOST)
         return float(np.max(self.misjudged(noise) * no_noise, initial=0.0))
 
     def _parts(self, off: Array) -> Array:
@@ -340,11 +328,11 @@ class NoisePrior:
         def normal(width: Array) -> Array:
             return np.asarray(-0.5 * (off / width) ** 2 - np.log(width))
 
-        as_stated = normal(np.where(self.stated, STATED, UNSTATED))
-        as_stated += np.where(self.stated, np.log1p(-MISJUDGED), 0.0)
-        misjudged = np.log(MISJUDGED) + normal(np.full(len(off), MISJUDGED_BY))
+        as_stated = normal(np.where(self.stated, priors.STATED, priors.UNSTATED))
+        as_stated += np.where(self.stated, np.log1p(-priors.MISJUDGED), 0.0)
+        misjudged = np.log(priors.MISJUDGED) + normal(np.full(len(off), priors.MISJUDGED_BY))
         # above a lower bound, what is not its own noise is as probable as anything
         above = self.bound & (off > 0.0)
         as_stated = np.where(above, -np.inf, as_stated)
-        misjudged = np.where(above, normal(np.full(len(off), MISJUDGED_BY)), misjudged)
+        misjudged = np.where(above, normal(np.full(len(off), priors.MISJUDGED_BY)), misjudged)
         return np.stack([as_stated, np.where(self.stated, misjudged, -np.inf)])

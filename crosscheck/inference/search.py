@@ -20,10 +20,9 @@ from functools import cached_property
 
 import numpy as np
 
-from crosscheck.fit.effects.possible import can_be
-from crosscheck.fit.effects.registration import registered, registered_each
-from crosscheck.fit.least_squares.problem import KINDS
-from crosscheck.fit.least_squares.state import State
+from crosscheck.fit.problem import KINDS
+from crosscheck.fit.registration import registered, registered_each
+from crosscheck.fit.state import State, can_be
 from crosscheck.inference.catalogue import (
     About,
     Catalogue,
@@ -37,7 +36,7 @@ from crosscheck.inference.catalogue import (
 from crosscheck.inference.evidence import Solved, best_widths, log_evidence
 from crosscheck.inference.fit import TRACKER, Data, Fit, fit, unfitted
 from crosscheck.inference.hypothesis import Hypothesis, scored, wider
-from crosscheck.inference.noise import Noise, NoisePrior, outliers
+from crosscheck.inference.noise import Noise, NoisePrior
 from crosscheck.inference.priors import EQUAL, FEW, MAY_BE_UNKNOWN, WITHIN
 from seecr.effects import Knowledge, Term
 from seecr.pose import Array
@@ -108,6 +107,10 @@ class Scores:
         """Scores of all hypotheses met so far; those that were not solved are approximate."""
         return self.near | {key: score for key, (score, _solved) in self.solved.items()}
 
+    def meet(self, scores: Mapping[Key, float]) -> None:
+        """Keep approximate scores of hypotheses that were not solved."""
+        self.near |= {k: s for k, s in scores.items() if k not in self.solved}
+
     def neighbours(self, key: Key) -> dict[Key, float]:
         """Approximate scores with one effect more, one less or, of small sets, one exchanged."""
         base, out = self.score(key), self.larger(key)
@@ -149,12 +152,8 @@ class Scores:
         for k in self.about.linear.groups:
             if part_of(k) and k not in key:
                 rest = frozenset(other for other in key if name_of(other) != name_of(k))
-                out[rest | {k}] = (
-                    self.score(rest)
-                    + self.gain(rest, k)
-                    - self.prior(rest)
-                    + self.prior(rest | {k})
-                )
+                gain = self.gain(rest, k) - self.prior(rest) + self.prior(rest | {k})
+                out[rest | {k}] = self.score(rest) + gain
         return out
 
     def climb(self, start: Key, moves: int = _MOVES, without: Key = frozenset()) -> Key:
@@ -162,8 +161,8 @@ class Scores:
         at = self._thinned(start)
         for _ in range(moves):
             around = {k: s for k, s in self.neighbours(at).items() if without.isdisjoint(k)}
-            self.near |= {k: s for k, s in around.items() if k not in self.solved}
-            for key in sorted(around, key=lambda k: (-around[k], sorted(k)))[:2]:
+            self.meet(around)
+            for key in _ranked(around)[:2]:
                 if self.score(key, self.widths(at)) > self.score(at) + 1e-6:
                     at = key
                     break
@@ -184,8 +183,7 @@ class Scores:
             if key is None or seen[key] < self.score(start) - WITHIN:
                 return
             done.add(key)
-            around = {k: s for k, s in self.neighbours(key).items() if len(k) <= len(start)}
-            self.near |= {k: s for k, s in around.items() if k not in self.solved}
+            self.meet({k: s for k, s in self.neighbours(key).items() if len(k) <= len(start)})
 
     def _thinned(self, start: Key) -> Key:
         """A set without its least valuable members, while it is large and they are worth little."""
@@ -205,7 +203,7 @@ class Scores:
     def best(self, count: int) -> list[Key]:
         """The best hypotheses met so far, at most WITHIN worse than the best of all."""
         scores = self.seen
-        order = sorted(scores, key=lambda k: (-scores[k], sorted(k)))
+        order = _ranked(scores)
         return [k for k in order if scores[k] >= scores[order[0]] - WITHIN][:count]
 
 
@@ -214,8 +212,7 @@ class Search:
     """The search of one diagnosis, with its cache of fitted hypotheses.
 
     Attributes:
-        data: what is fitted. every: the catalogue.
-        report: called with what is being fitted.
+        data: what is fitted. every: the catalogue. report: called with what is being fitted.
         cache: fitted hypotheses; None for one that has no solution.
     """
 
@@ -223,7 +220,6 @@ class Search:
     every: Catalogue
     report: Callable[[str], None] = lambda _text: None
     cache: dict[Key, Hypothesis | None] = field(default_factory=dict)
-    fits: int = 0
     _centres: list[Key] = field(default_factory=list)
     _again: set[tuple[Key, Key]] = field(default_factory=set)
     _challenged: dict[Key, tuple[Key, float]] = field(default_factory=dict)
@@ -256,7 +252,12 @@ class Search:
     @cached_property
     def none_about(self) -> About:
         """What every member does about the model as it stands."""
-        return self.every.about(self._at(self.stood).fit)
+        return self.every.about(self.none.fit)
+
+    @property
+    def none(self) -> Hypothesis:
+        """The hypothesis that nothing is missing, as fitted."""
+        return self._at(self.stood)
 
     def _at(self, key: Key) -> Hypothesis:
         found = self.cache[key]
@@ -288,9 +289,8 @@ class Search:
         The given values are a hypothesis of their own, without a parameter that the data chose
         (Akaike's criterion).
         """
-        none = self.cache[self.stood]
-        assert none is not None
-        return bool(self.unfitted.cost > none.fit.cost + 2.0 * len(none.fit.terms))
+        fitted = self.none.fit
+        return bool(self.unfitted.cost > fitted.cost + 2.0 * len(fitted.terms))
 
     def contradicted(self, term: Term) -> Term | None:
         """A known effect of the model as it would be fitted if nothing were known of it.
@@ -323,16 +323,16 @@ class Search:
 
     def _ask_rows_far_off(self, found: Hypothesis) -> None:
         """Try what outliers ask for: they may be no outliers, but what is missing in some rows."""
-        if np.any(outliers(self.data.chain, found.fit.weight, self.data.problem.data.n_rows)):
+        if found.fit.outlying.any():
             self._singles(_with_rows_alike(found), forms=True)
 
     def _ask_fields_of_rows_far_off(self) -> None:
         """Try beside the best what something unknown would do in rows that now hardly count."""
-        best, rows = self.best, self.data.problem.data.n_rows
-        if best.field is None and np.any(outliers(self.data.chain, best.fit.weight, rows)):
+        best = self.best
+        if best.field is None and best.fit.outlying.any():
             scores = self.scores_about(_with_rows_alike(best))
             near = scores.with_fields(best.key)
-            for key in sorted(near, key=lambda k: (-near[k], sorted(k)))[:_FIELDS]:
+            for key in _ranked(near)[:_FIELDS]:
                 self.fit(scores, key)
 
     def run(self) -> Hypothesis:
@@ -340,8 +340,8 @@ class Search:
         none = self.begin()
         self.every = self.every.with_fields(none.fit)
         self._general_fields(none)
-        alone = sorted(self.fitted.values(), key=lambda h: (-h.score, sorted(h.key)))
-        for one in [h for h in alone if h is not none and h.score > none.score + WITHIN][:_BEAM]:
+        alone = {k: h.score for k, h in self.fitted.items() if h.score > none.score + WITHIN}
+        for one in [self.fitted[key] for key in _ranked(alone)[:_BEAM]]:
             self.look_about(one)
         self._settle()
         if self.is_open:
@@ -421,7 +421,6 @@ class Search:
     def _fitted(
         self, key: Key, start: State, widths: Mapping[str, float], noise: Noise | None = None
     ) -> Fit:
-        self.fits += 1
         self.report(" + ".join(sorted(key)) or "the model as it is")
         by_name = {name_of(k): w for k, w in widths.items() if not is_field(k)}
         kind = next((k for k in key if is_field(k)), None)
@@ -450,14 +449,8 @@ class Search:
             member = self.every.members.get(key)
             if member is None:
                 continue
-            if part_of(key):
-                every = np.ones(len(member.layout), dtype=bool)
-                term = registered_each(self.data.problem, self.plain.prediction, member.term, every)
-            else:
-                found = registered(self.data.problem, self.plain.prediction)
-                if found is None:
-                    continue
-                term = found
+            every = np.ones(len(member.layout), dtype=bool)
+            term = registered_each(self.data.problem, self.plain.prediction, member.term, every)
             state = self._state(self.stood | {key}, {key: term})
             if state.valid and state.chi2 < self.plain.chi2:
                 self._fit_from(self.stood | {key}, state, {key: 10.0})
@@ -486,7 +479,7 @@ class Search:
         scores = self.scores_about(none)
         near = scores.with_fields(self.stood)
         general = [k for k, kind in self.every.kinds.items() if kind.name == "READINGS"]
-        likely = sorted(near, key=lambda k: (-near[k], sorted(k)))[:_FIELDS]
+        likely = _ranked(near)[:_FIELDS]
         for key in dict.fromkeys([*(self.stood | {k} for k in general), *likely]):
             self.fit(scores, key)
         if self.best.field is not None:
@@ -503,7 +496,11 @@ class Search:
         if frame is not None and TRACKER not in self.every.stood:
             turned = self._state(key, {TRACKER: frame})
             state = turned if turned.valid and turned.chi2 < state.chi2 else state
-        found = fit(self.data, state)
+        return self._together(key, state)
+
+    def _together(self, key: Key, state: State, noise: Noise | None = None) -> Hypothesis:
+        """A hypothesis fitted with plausible sizes as priors."""
+        found = fit(self.data, state, noise=noise)
         return scored(self.every, key, found, dict.fromkeys(key, 1.0))
 
     @cached_property
@@ -521,9 +518,8 @@ class Search:
             values = self._by_key({t.name: t for t in self.best.fit.terms}, key)
             state = self._state(key, values)
             if state.valid:
-                found = fit(self.data, state, noise=self.best.fit.noise)
-                other = scored(self.every, key, found, dict.fromkeys(key, 1.0))
-                best = max(best, self._whole(other), key=lambda h: h.score)
+                other = self._whole(self._together(key, state, self.best.fit.noise))
+                best = max(best, other, key=lambda h: h.score)
         return best
 
     def _whole(self, whole: Hypothesis) -> Hypothesis:
@@ -539,8 +535,7 @@ class Search:
                 values |= {k: inside(about.starts[k]) for k in some}
                 state = self._state(key, self._by_key(values, key))
                 if state.valid:
-                    other = fit(self.data, state, noise=whole.fit.noise)
-                    more = scored(self.every, key, other, dict.fromkeys(key, 1.0))
+                    more = self._together(key, state, whole.fit.noise)
                     whole = max(whole, more, key=lambda h: h.score)
         widths = wider(self.every, whole)
         named = {name_of(k): w for k, w in widths.items()}
@@ -563,12 +558,12 @@ class Search:
         fields, forms = dict[Key, float](), scores.with_forms(end)
         for key in {end, self.stood, *(end - {k} for k in end - self.stood)}:
             fields |= scores.with_fields(key)
-        scores.near |= {k: s for k, s in {**fields, **forms}.items() if k not in scores.solved}
-        for key in sorted(forms, key=lambda k: (-forms[k], sorted(k)))[:1]:
+        scores.meet({**fields, **forms})
+        for key in _ranked(forms)[:1]:
             if forms[key] > scores.score(end) - WITHIN:
                 scores.climb(key, _LARGE)
         kinds = list[str]()
-        for key in sorted(fields, key=lambda k: (-fields[k], sorted(k))):
+        for key in _ranked(fields):
             kind = next(k for k in key if is_field(k))
             if kind not in kinds:
                 kinds.append(kind)
@@ -619,7 +614,7 @@ class Search:
             if core != best.key:
                 near[core] = base - 1.0
             done = 0
-            for key in sorted(near, key=lambda k: (-near[k], sorted(k))):
+            for key in _ranked(near):
                 least = EQUAL if key > best.key else WITHIN
                 if near[key] > base - least and done < _FITS:
                     done += self._fit_new(scores, key)
@@ -661,6 +656,11 @@ class Search:
     @cached_property
     def _about_everything(self) -> Scores:
         return self.scores_about(self.everything)
+
+
+def _ranked(scores: Mapping[Key, float]) -> list[Key]:
+    """Hypotheses, the best first."""
+    return sorted(scores, key=lambda k: (-scores[k], sorted(k)))
 
 
 def _with_rows_alike(found: Hypothesis) -> Hypothesis:

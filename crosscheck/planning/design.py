@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.least_squares.imitation import imitated
+from crosscheck.fit.algebra import imitated
 from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import GivenCommands, commands_of

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.least_squares.problem import Problem
-from crosscheck.fit.least_squares.state import evaluate
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Measurements
 from crosscheck.planning.planned import (
     MORE_POSES,

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.least_squares.problem import Problem
-from crosscheck.fit.least_squares.state import State, evaluate
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import State, evaluate
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.compiled.columns import REST, STRAIN, TENSION
 from seecr.description.robot import Robot

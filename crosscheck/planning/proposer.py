@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.fit.least_squares.state import derivatives
+from crosscheck.fit.state import derivatives
 from crosscheck.measurements.data import Measurements
 from crosscheck.planning.planned import MORE_POSES, Adding, Extension, Planned, slack_at
 from crosscheck.planning.visibility import (

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.fit.least_squares.problem import Problem
-from crosscheck.fit.least_squares.state import State
+from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Reason, Why, by_reason
+from crosscheck.fit.state import State
 from crosscheck.fit.words import belongs
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.proposer import Gain, Suggestion

@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, special
 
-from crosscheck.fit.least_squares import imitation
-from crosscheck.fit.least_squares.imitation import basis, beside
-from crosscheck.fit.least_squares.known import free_derivatives
+from crosscheck.fit.algebra import basis, beside, left_over
 from crosscheck.fit.reasons import Reason, Why
+from crosscheck.fit.state import free_derivatives
 from crosscheck.inference.catalogue import amplitude_columns, candidates
 from crosscheck.planning.planned import Planned
 from seecr.effects.base import Layout
@@ -127,7 +126,7 @@ def _columns(plan: Planned, layout: Layout, shape: dict[str, float]) -> Array:
 
 def signal_left(g: Signal, h: Signal) -> float:
     """lam_gh: squared signal of g that h cannot imitate."""
-    return imitation.left_over(g.columns, h.basis)
+    return left_over(g.columns, h.basis)
 
 
 def signals_together(a: Mapping[str, Signal], b: Mapping[str, Signal]) -> dict[str, Signal]:

@@ -20,7 +20,7 @@ from itertools import combinations, permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.least_squares.problem import TENSION, Problem
+from crosscheck.fit.problem import TENSION, Problem
 from seecr.pose import Array, quat_from_rxyz
 from seecr.prediction.experiment import Prediction
 from seecr.units import short

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.measurements.data import Sigma
 from seecr.description.joints import locked

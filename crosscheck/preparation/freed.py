@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.effects.registration import NAME as TRACKER
-from crosscheck.fit.effects.registration import registered_each
-from crosscheck.fit.least_squares.problem import Problem
-from crosscheck.fit.least_squares.state import State, evaluate
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.registration import NAME as TRACKER
+from crosscheck.fit.registration import registered_each
+from crosscheck.fit.state import State, evaluate
 from crosscheck.fit.words import measured
 from crosscheck.inference.fit import FLAT, Data, Fit, fit, without_rows
 from crosscheck.inference.noise import outliers

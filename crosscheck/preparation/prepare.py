@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.least_squares.problem import Problem, Rms, rms_by_kind
-from crosscheck.fit.least_squares.state import State
-from crosscheck.fit.noise.unstated import estimate_sigma, oversized
+from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.reasons import Refusal, Unfit
+from crosscheck.fit.residual_noise import estimate_sigma, oversized
+from crosscheck.fit.state import State
 from crosscheck.inference.held_out import blocks_note
 from crosscheck.measurements.data import Measurements
 from crosscheck.preparation.fitness import refusal_of

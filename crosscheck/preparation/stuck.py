@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.problem import Problem
 from seecr.counted import counted
 from seecr.pose import Array
 

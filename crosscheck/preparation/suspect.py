@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.least_squares.problem import ORIENTATION, POSITION, TENSION, Problem
+from crosscheck.fit.problem import ORIENTATION, POSITION, TENSION, Problem
 from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.dwells import mean_rotation

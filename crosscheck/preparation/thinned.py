@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.least_squares.problem import Problem, rms_by_kind
+from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.words import rms_words
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.preparation.suspect import without_constants

@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.least_squares.problem import KINDS, Kind, Rms
+from crosscheck.fit.problem import KINDS, Kind, Rms
 from crosscheck.fit.words import value_lines
 from seecr.effects.base import Layout
 from seecr.pose import Array

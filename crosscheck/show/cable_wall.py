@@ -15,8 +15,8 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from crosscheck.comparison.quantities import cable_errors, cable_lengths, channels, travel
-from crosscheck.diagnosis.path import Drawn
-from crosscheck.fit.least_squares.problem import KINDS, TENSION, Problem
+from crosscheck.fit.problem import KINDS, TENSION, Problem
+from crosscheck.show.arrows import Drawn
 from crosscheck.show.figures import MANY, blank, dots, grid, image, styled
 from seecr.pose import Array
 from seecr.prediction.experiment import Prediction

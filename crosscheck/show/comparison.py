@@ -11,8 +11,8 @@ from crosscheck.comparison.limits import Exceeded
 from crosscheck.comparison.quantities import QuantityKind, channels
 from crosscheck.comparison.result import Comparison, WorstRow
 from crosscheck.comparison.result import Group as Rows
-from crosscheck.diagnosis.path import Standing
-from crosscheck.fit.least_squares.problem import Kind
+from crosscheck.fit.problem import Kind
+from crosscheck.show.arrows import Standing
 from crosscheck.show.blocks import (
     Block,
     Bold,

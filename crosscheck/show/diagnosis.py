@@ -18,9 +18,9 @@ from crosscheck.diagnosis.words import (
     removed,
     within_words,
 )
-from crosscheck.fit.least_squares.problem import Kind, Problem
-from crosscheck.fit.noise.whiteness import STRUCTURED
+from crosscheck.fit.problem import Kind, Problem
 from crosscheck.fit.reasons import DiagnosisVerdict, probability_words
+from crosscheck.fit.residual_noise import STRUCTURED
 from crosscheck.fit.words import rms_words, value_lines
 from crosscheck.inference.priors import SURE
 from crosscheck.show.blocks import (

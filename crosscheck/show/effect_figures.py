@@ -12,8 +12,8 @@ from matplotlib.patches import Rectangle
 from crosscheck.diagnosis.path import ModelPath, Stage
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.words import noise_is_other
-from crosscheck.fit.least_squares.imitation import basis, beside, imitated
-from crosscheck.fit.least_squares.problem import Kind, kinds_read
+from crosscheck.fit.algebra import basis, beside, imitated
+from crosscheck.fit.problem import Kind, kinds_read
 from crosscheck.fit.reasons import DiagnosisVerdict, Why
 from crosscheck.inference.catalogue import About
 from crosscheck.inference.held_out import rms_by_block

@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 
-from crosscheck.diagnosis.path import Drawn, drawn, magnification, views_of
-from crosscheck.fit.least_squares.problem import POSITION, Kind, Problem, kinds_read
+from crosscheck.fit.problem import POSITION, Kind, Problem, kinds_read
+from crosscheck.show.arrows import Drawn, drawn, magnification, views_of
 from crosscheck.show.figures import MANY, blank, grid, image, styled
 from seecr.counted import counted
 from seecr.pose import Array

@@ -18,7 +18,7 @@ from crosscheck.comparison.quantities import channels
 from crosscheck.comparison.result import Comparison
 from crosscheck.diagnosis.path import Stage
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.fit.least_squares.problem import Kind, kinds_read
+from crosscheck.fit.problem import Kind, kinds_read
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.show import misfit
 from crosscheck.show.comparison import pose_errors_text, verdict_text

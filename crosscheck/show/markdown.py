@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from crosscheck.fit.least_squares.problem import Kind
+from crosscheck.fit.problem import Kind
 from crosscheck.measurements.data import Measurements
 from crosscheck.show.blocks import (
     Bar,

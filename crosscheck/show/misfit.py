@@ -10,9 +10,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from crosscheck.diagnosis.path import drawn, magnification, views_of
-from crosscheck.fit.least_squares.problem import POSITION, Kind, Problem, kinds_read
-from crosscheck.fit.least_squares.state import State
+from crosscheck.fit.problem import POSITION, Kind, Problem, kinds_read
+from crosscheck.fit.state import State
+from crosscheck.show.arrows import drawn, magnification, views_of
 from crosscheck.show.blocks import Bold
 from seecr.compiled.columns import REST
 from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat

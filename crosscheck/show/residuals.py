@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from crosscheck.comparison.associations import Association
-from crosscheck.diagnosis.path import Drawn
-from crosscheck.fit.least_squares.problem import Problem, kinds_read
+from crosscheck.fit.problem import Problem, kinds_read
+from crosscheck.show.arrows import Drawn
 from crosscheck.show.blocks import (
     Bar,
     Cell,

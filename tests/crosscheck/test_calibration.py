@@ -11,9 +11,9 @@ import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
 from crosscheck.calibration import Calibrated, calibrate
-from crosscheck.fit.effects.registration import registered
-from crosscheck.fit.least_squares.problem import Problem, rms_by_kind
-from crosscheck.fit.least_squares.state import State, evaluate
+from crosscheck.fit.problem import Problem, rms_by_kind
+from crosscheck.fit.registration import registered
+from crosscheck.fit.state import State, evaluate
 from crosscheck.inference.catalogue import Catalogue
 from crosscheck.inference.fit import Data, Metric, without_rows
 from crosscheck.inference.held_out import blocks_of, hold_out

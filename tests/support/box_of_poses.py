@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.description.mjcf import load_robot, model_path
 

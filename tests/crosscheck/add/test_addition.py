@@ -12,7 +12,7 @@ from made_data import SIGMA, measured, term
 from crosscheck.add import add_effect, add_effects, weigh
 from crosscheck.add.result import Addition
 from crosscheck.errors import UnsolvedError
-from crosscheck.fit.noise.whiteness import Whiteness
+from crosscheck.fit.residual_noise import Whiteness
 from crosscheck.model.fitted import Fitted
 from seecr.description.mjcf import load_robot
 from seecr.effects import Term

@@ -16,8 +16,8 @@ from made_data import case, refused, run, term
 
 from crosscheck.cli.diagnose import _keep
 from crosscheck.diagnosis.diagnose import diagnose
-from crosscheck.fit.least_squares.state import State
 from crosscheck.fit.reasons import DiagnosisVerdict, Unfit
+from crosscheck.fit.state import State
 from crosscheck.inference.fit import Data
 from crosscheck.measurements.read import load_measurements
 from crosscheck.measurements.write import write_measurements

@@ -12,7 +12,7 @@ from crosscheck.comparison.limits import RULES, Limits, Rule, exceeded, option
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.least_squares.problem import KINDS
+from crosscheck.fit.problem import KINDS
 
 
 @pytest.fixture(scope="module")

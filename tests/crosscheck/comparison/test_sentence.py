@@ -13,7 +13,7 @@ from crosscheck.comparison.noise import _too_small
 from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import error_size_words, misfit_sentence, noise_sentence
-from crosscheck.fit.noise.whiteness import Whiteness
+from crosscheck.fit.residual_noise import Whiteness
 from crosscheck.measurements.data import Sigma
 from seecr.pose import quat_from_rotvec, quat_multiply, rotvec_from_quat
 

@@ -20,7 +20,7 @@ from crosscheck.comparison.quantities import (
     regions_of,
     travel,
 )
-from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.problem import Problem
 from seecr.effects import Terms
 from seecr.prediction.experiment import Prediction
 

@@ -81,12 +81,12 @@ def test_what_tells_an_effect_from_several_others_is_said_once(
 
     def ways(_plan: object, _options: object, name: str, rival: Any) -> list[Suggestion]:
         return [
-            Suggestion(Adding.TENSIONS, words, (Gain(name, rival, 3.0, then, 15.0),))
-            for words, then in signals[rival].items()
+            Suggestion(Adding.TENSIONS, words, (Gain(name, rival.name, 3.0, then, 15.0),))
+            for words, then in signals[rival.name].items()
         ]
 
     monkeypatch.setattr(what_next, "telling_apart", ways)
-    rivals = [SimpleNamespace(name=name, layout=name) for name in signals]
+    rivals = [SimpleNamespace(name=name) for name in signals]
     effect: Any = SimpleNamespace(effect="stiffness", rivals=rivals)
     nothing: Any = None
     mass, cables, wrench, each = what_next._to_separate(nothing, [], effect)

@@ -11,7 +11,7 @@ from made_data import measured, term
 from made_diagnoses import POINTS, SIGMA, diagnose_with, none, nothing, pulleys, readings, robot
 
 from crosscheck.comparison.residuals import compare
-from crosscheck.diagnosis.model import found_covariance, found_effects
+from crosscheck.diagnosis.found import found_covariance, found_effects
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.model.write import save_model
 from seecr.prediction.experiment import predict

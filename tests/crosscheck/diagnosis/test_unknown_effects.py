@@ -70,6 +70,18 @@ def wavy_target(data: Measurements) -> None:
     data.quat_wxyz[:] = quat_multiply(quat_from_rotvec(turn), data.quat_wxyz)
 
 
+def turning_aside(data: Measurements) -> None:
+    """A target that yaws with the square of the place: much in few rows, as outliers are."""
+    turn = np.outer(0.01 * _centred(data)[:, 1] ** 2, [0.0, 0.0, 1.0])
+    assert data.quat_wxyz is not None
+    data.quat_wxyz[:] = quat_multiply(quat_from_rotvec(turn), data.quat_wxyz)
+
+
+def wave_over_the_room(data: Measurements) -> None:
+    """Rails that ripple: shorter than what a cubic follows, and in no orientation."""
+    data.position[:, 2] += 3e-4 * np.sin(2 * np.pi * _centred(data)[:, 0])
+
+
 # What was found in the place of the unknown: effects of many parameters, and of the time.
 FLEXIBLE = (
     "pulley_radius", "exit_point_error", "anchor_point_error", "drum_gain", "cable_length_offset",
@@ -137,6 +149,16 @@ def test_an_unknown_effect_is_called_unknown_and_shown_where_it_lives(
     assert [f.effect for f in found.missing] == []
     assert found.where
     WHERE.get((change, name), lambda _found: None)(found)
+
+
+@pytest.mark.parametrize("change", [turning_aside, wave_over_the_room], ids=named)
+def test_what_one_kind_of_reading_shows_alone_is_no_noise_and_no_outliers(change: Change) -> None:
+    robot = robot_named("cogiro")
+    data = measured(robot, seed=3)
+    change(data)
+    found = diagnose(robot, data, only=("pulley_radius", "tracker_frame", "stiffness"))
+    assert found.verdict == "unknown_effect" and not found.missing
+    assert found.chances is not None and found.chances.unknown > 0.95
 
 
 @pytest.mark.parametrize(("change", "only"), BESIDE, ids=named)

@@ -9,7 +9,7 @@ import pytest
 from made_data import COGIRO, measured
 from scipy import integrate
 
-from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.problem import Problem
 from crosscheck.inference.noise import (
     STATED_NOISE,
     Chain,

@@ -5,32 +5,41 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from itertools import chain, combinations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from made_data import measured, term
+from made_data import COGIRO, measured, term
 from made_diagnoses import SIGMA, robot
 
 from crosscheck.inference.catalogue import Catalogue, is_field, name_of, part_of
+from crosscheck.inference.evidence import Linear, MemberColumns
 from crosscheck.inference.fit import Data, fit
 from crosscheck.inference.hypothesis import scored
-from crosscheck.inference.posterior import Posterior
-from crosscheck.inference.search import Search
-from crosscheck.inference.verdict import judged
+from crosscheck.inference.priors import WITHIN
+from crosscheck.inference.search import Scores, Search
+from crosscheck.inference.verdict import Posterior, judged
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.read import together
 from crosscheck.preparation.prepare import prepare
-from seecr.effects import ApartLayout, Terms
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.effects import ApartLayout, Term, Terms, layout_of
 
 SOME = ("pulley_radius", "stiffness", "platform_mass", "length_scale", "centre_of_mass")
 HIDDEN = ("pulley_radius", "stiffness")
 
 
+def begun(data: Measurements, some: tuple[str, ...] = SOME, of: Robot | None = None) -> Search:
+    """A search among a few effects before anything is fitted."""
+    ready = prepare(of or robot(), data, Terms(), frozenset(some))
+    fitted = Data.of(ready.problem, ready.terms)
+    return Search(fitted, Catalogue.of(fitted, ready.terms))
+
+
 def searched(data: Measurements, some: tuple[str, ...] = SOME) -> Search:
     """A finished search among a few effects."""
-    ready = prepare(robot(), data, Terms(), frozenset(some))
-    of = Data.of(ready.problem, ready.terms)
-    search = Search(of, Catalogue.of(of, ready.terms))
+    search = begun(data, some)
     search.run()
     return search
 
@@ -64,6 +73,43 @@ def test_the_posterior_is_that_of_all_sets_one_by_one() -> None:
         assert posterior.known.member[name] == pytest.approx(exact, abs=0.1), name
     best = max(scores, key=lambda key: scores[key])
     assert best == search.best.key == frozenset(HIDDEN)
+
+
+def test_of_two_effects_that_do_the_same_only_both_together_are_needed() -> None:
+    hidden = [
+        term(robot(), "platform_mass", added_kg=0.25 * robot().mass),
+        term(robot(), "pulley_radius", radius_m=0.01),
+    ]
+    data = measured(robot(), hidden, points=6, sigma=SIGMA)
+    search = begun(data, ("platform_mass", "stiffness", "pulley_radius", "length_scale"))
+    search.begin()
+    assert search.needed(["platform_mass"]) < WITHIN and search.needed(["stiffness"]) < WITHIN
+    assert search.needed(["platform_mass", "stiffness"]) > WITHIN
+    assert search.needed(["pulley_radius"]) > WITHIN and search.needed(["length_scale"]) < 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "begun_with"),
+    [("exit_point_error", 0.3, 0.01), ("drum_eccentricity", 0.1, 1.0)],
+)
+def test_a_fit_that_wants_other_prior_widths_is_made_again_with_them(
+    name: str, size: float, begun_with: float
+) -> None:
+    """Of many values a wrong width costs so much that the effect would seem to be worth nothing."""
+    cogiro = load_robot(COGIRO)
+    layout = layout_of(name, cogiro)
+    drawn = size * layout.scale * np.random.default_rng(1).standard_normal(len(layout))
+    hidden = Term(layout, np.where(layout.shape, layout.null, layout.null + drawn))
+    search = begun(measured(cogiro, [hidden], points=6), (name,), cogiro)
+    none, key = search.begin(), frozenset([name])
+    search.cache.clear()
+    found = search.fit(search.scores_about(none), key, begun_with)
+    assert found is not None and found.score > none.score + 50.0
+    each = [
+        scored(search.every, key, fit(search.data, found.fit.state, {name: w}), {name: w}).score
+        for w in (0.03, 0.1, 0.3, 1.0)
+    ]
+    assert found.score > max(each) - 3.0
 
 
 def test_the_fields_are_members_like_any_other() -> None:
@@ -137,3 +183,24 @@ def test_columns_of_a_form_are_those_of_the_effect_in_the_rows_of_each_part() ->
     assert not parts[file == 1, : whole.shape[1]].any()
     assert [part_of(k) for k in ("tracker_frame@file", "stiffness")] == ["file", ""]
     assert name_of("tracker_frame@file") == "tracker_frame"
+
+
+def test_sets_that_no_exchange_leads_to_are_met_in_two() -> None:
+    """y = a + b = c + d: each exchange of one loses a little of it, and of both nothing."""
+    a, b, c = np.linalg.qr(np.random.default_rng(0).normal(size=(60, 3)))[0].T
+    x = np.stack([a, b, 0.5 * (a + b) + 0.2 * c, 0.5 * (a + b) - 0.2 * c], axis=1)
+    groups = {
+        name: MemberColumns(np.array([k]), np.array([100.0])) for k, name in enumerate("abcd")
+    }
+    every = SimpleNamespace(log_prior=lambda key: -3.0 * len(key), stood_keys=frozenset())
+    about = SimpleNamespace(
+        linear=Linear.of(x, 4.0 * (a + b), groups), every=every, prices={}
+    )  # fmt: skip
+    scores = Scores(about, SimpleNamespace(key=frozenset(), score=0.0))  # type: ignore[arg-type]
+    best, other = frozenset("ab"), frozenset("cd")
+    assert scores.score(best) > max(scores.score(frozenset(s)) for s in ("ac", "ad", "bc", "bd"))
+    fresh = Scores(about, scores.centre)  # type: ignore[arg-type]
+    fresh.neighbours(best)
+    assert other not in fresh.seen
+    fresh.widen(best)
+    assert fresh.seen[other] == pytest.approx(scores.score(other), abs=1e-6)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from random_robots import random_robot
 
-from crosscheck.fit.least_squares.problem import Problem
-from crosscheck.fit.least_squares.state import evaluate
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_measurements
 from crosscheck.model.write import provenance_of

@@ -11,7 +11,7 @@ from three_cables import THREE
 
 import crosscheck
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.least_squares.state import evaluate
+from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_commands
 from crosscheck.measurements.write import write_measurements

@@ -10,8 +10,8 @@ import pytest
 from made_data import SIGMA, measured, soft_cogiro, term
 from scipy import stats
 
-from crosscheck.fit.least_squares.problem import Problem
-from crosscheck.fit.least_squares.state import evaluate
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import evaluate
 from crosscheck.inference.fit import Data, fit
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import together

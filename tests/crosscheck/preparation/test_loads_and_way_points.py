@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from made_data import soft_cogiro, term
 
-from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Unfit
 from crosscheck.inference.fit import Data, fit
 from crosscheck.inference.held_out import blocks_of

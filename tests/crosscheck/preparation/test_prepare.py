@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from made_data import measured, term
 
-from crosscheck.fit.least_squares.imitation import basis, beside, imitated, left_over
-from crosscheck.fit.least_squares.problem import Problem
-from crosscheck.fit.least_squares.state import evaluate
-from crosscheck.fit.noise.outliers import outlying_rows
+from crosscheck.fit.algebra import basis, beside, imitated, left_over
+from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Reason, Refusal, Unfit, Why
+from crosscheck.fit.residual_noise import outlying_rows
+from crosscheck.fit.state import evaluate
 from crosscheck.inference.catalogue import candidates
 from crosscheck.inference.fit import Data, unfitted
 from crosscheck.measurements.data import Measurements, Sigma

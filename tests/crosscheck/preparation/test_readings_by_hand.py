@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from made_data import measured, soft_cogiro, term
 
-from crosscheck.fit.least_squares.known import known_left, known_readings
-from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import known_left, known_readings
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.preparation.fitness import commands_table
 from crosscheck.preparation.parts import groups_of, laid_out, names_in

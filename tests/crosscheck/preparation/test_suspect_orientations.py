@@ -13,7 +13,7 @@ from made_data import measured, refused, run, soft_cogiro, soft_xml, term
 from scipy.spatial.transform import Rotation
 
 import crosscheck
-from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Unfit
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import together

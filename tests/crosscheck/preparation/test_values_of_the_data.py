@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
-from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Measurements
 from crosscheck.preparation.freed import Freed, freed
 from crosscheck.preparation.parts import LaidOut

@@ -21,16 +21,17 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from PIL import Image
 from written_pages import figures_of, text_of
 
-from crosscheck.diagnosis.path import ModelPath, Stage, drawn, magnification, views_of
-from crosscheck.diagnosis.result import Diagnosis, NotListed, Rival
+from crosscheck.diagnosis.path import ModelPath, Stage
+from crosscheck.diagnosis.result import Diagnosis, NotListed
 from crosscheck.diagnosis.words import removed, within_words
-from crosscheck.fit.least_squares.imitation import basis, imitated
-from crosscheck.fit.least_squares.problem import KINDS
+from crosscheck.fit.algebra import basis, imitated
+from crosscheck.fit.problem import KINDS
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.inference.held_out import rms_by_block
 from crosscheck.inference.noise import Noise
 from crosscheck.preparation.prepare import noise_floor
 from crosscheck.show import error_map
+from crosscheck.show.arrows import drawn, magnification, views_of
 from crosscheck.show.cable_wall import Wall, draw_wall, length_changes, walls_of
 from crosscheck.show.candidates import candidate_rows, untried
 from crosscheck.show.diagnosis import checks, correlations, parameter_table
@@ -376,7 +377,7 @@ def test_the_confusion_map_holds_containments() -> None:
 
 def test_rivals_are_named_and_framed() -> None:
     found = diagnosis("pulleys")
-    rival = Rival("exit_point_error", layout_of("exit_point_error", made.robot()))
+    rival = layout_of("exit_point_error", made.robot())
     finding = replace(found.missing[0], rivals=(rival,))
     assert finding.indistinguishable == (rival.name,)
     assert {row["indistinguishable"] for row in finding.records()} == {rival.name}

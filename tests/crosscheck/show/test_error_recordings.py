@@ -16,7 +16,7 @@ from crosscheck.comparison.residuals import Comparison, compare
 from crosscheck.diagnosis.path import Stage
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.words import removed
-from crosscheck.fit.least_squares.problem import KINDS, POSITION
+from crosscheck.fit.problem import KINDS, POSITION
 from crosscheck.show.diagnosis import step_text
 from crosscheck.show.error_recordings import (
     bars_share,

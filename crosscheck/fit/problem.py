@@ -227,9 +227,8 @@ def in_units_of(factor: Array, table: Array, correlated: bool) -> Array:
 def angle_rates(quat_wxyz: Array) -> Array:
     """d(rx, ry, rz)/d(rotation vector in the base frame), (n, 3, 3).
 
-    With R = Rx Ry Rz, a small rotation w changes the angles by drx, dry, drz such that
-    w = x' drx + y' dry + z' drz, with the axes x' = x, y' = Rx y and z' = Rx Ry z. This is the
-    inverse of that relation. It does not exist at ry = +-90 deg, where cos(ry) is replaced by 1e-9.
+    The inverse of w = x' drx + y' dry + z' drz with the axes x' = x, y' = Rx y and z' = Rx Ry z. It
+    does not exist at ry = +-90 deg, where cos(ry) is replaced by 1e-9.
     """
     angles = rxyz_from_quat(quat_wxyz)
     sx, cx = np.sin(angles[:, 0]), np.cos(angles[:, 0])
@@ -271,8 +270,7 @@ class Kind:
         """(n,) size of each row's error: length of the vector, or the largest tension; SI.
 
         Args:
-            problem: which readings count.
-            raw: (n, 6 + m) residuals.
+            problem: which readings count. raw: (n, 6 + m) residuals.
 
         Returns:
             NaN where nothing of the kind was read or the row does not count.
@@ -322,12 +320,7 @@ def rms_by_kind(problem: Problem, raw: Array) -> Rms:
 
 
 def noise_factors(own: Array, rate: Array) -> Array:
-    """Cholesky factors (n, k, k) of the covariances diag(own^2) + rate rate^T.
-
-    Args:
-        own: (n, k) standard deviations of the readings by themselves.
-        rate: (n, k, m) effect of m common errors on the readings, each of one standard deviation.
-    """
+    """Cholesky factors (n, k, k) of diag(own^2) + rate rate^T: own (n, k), common (n, k, m)."""
     covariance = rate @ np.swapaxes(rate, 1, 2)
     index = np.arange(own.shape[1])
     covariance[:, index, index] += own**2

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit.problem import Problem
 from seecr.effects import ApartLayout, Layout, Term, layout_of
 from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate, rotvec_from_quat
 from seecr.prediction.experiment import Prediction
@@ -45,10 +45,8 @@ def registered_each(problem: Problem, at: Prediction, term: Term, mine: NDArray[
     """The effect with its tracker frame registered, or that of each file or run if separate.
 
     Args:
-        problem: the data.
-        at: the prediction with all frames at null.
-        term: the effect as it stands.
-        mine: (p,) which of its parameters may move.
+        problem: the data. at: the prediction with all frames at null.
+        term: the effect as it stands. mine: (p,) which of its parameters may move.
     """
     values = term.vector.copy()
     for rows, where in _frames(problem, term.layout):

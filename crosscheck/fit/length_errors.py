@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.least_squares.problem import TENSION, Problem, noise_factors
+from crosscheck.fit.problem import TENSION, Problem, noise_factors
 from seecr.compiled.columns import REST, STRAIN
 from seecr.effects.base import Effect
 from seecr.pose import Array
@@ -38,11 +38,8 @@ def with_length_errors(
 ) -> Rows:
     """The rows with the most likely errors of their lengths, and the noise about these.
 
-    Args:
-        problem: readings and noise, that of lengths included.
-        effects: effects of the model.
-        errors: (n, m) [m] errors to start from, or None.
-        near: a prediction to start from; without one, more rounds are made.
+    From ``errors`` (n, m) [m] if there are any, and a prediction near them; without one, more
+    rounds are made.
     """
     if errors is None:
         errors = np.zeros((problem.data.n_rows, problem.data.n_cables))
@@ -106,8 +103,7 @@ class Lines:
     """Residuals of rows as straight lines in the errors of their lengths, about some errors.
 
     Attributes:
-        errors: (n, m) [m].
-        raw: (n, 6 + m) residuals there.
+        errors: (n, m) [m]. raw: (n, 6 + m) residuals there.
         rate: (n, 6 + m, m) derivative of what is read by the lengths.
         pull: (n, m) [N] tensions there.
         factor: (n, 6 + m, 6 + m) Cholesky factors of the noise of readings and lengths together.
@@ -216,12 +212,7 @@ class Kinks:
         return np.asarray(self.at_none + (self.slope * errors).sum(axis=1))
 
     def likeliest(self, problem: Problem, taut: Likely) -> Array:
-        """Most likely errors (k, m): with the cable slack if it then is, or on the kink.
-
-        Args:
-            problem: readings and noise.
-            taut: the most likely errors if the cable could push.
-        """
+        """Most likely errors (k, m): slack, or on the kink; ``taut`` if the cable could push."""
         slack = self._slack(problem, taut)
         is_slack = self.pull(slack) <= 0.0
         return np.where(is_slack[:, None], slack, self._on_kink(taut))

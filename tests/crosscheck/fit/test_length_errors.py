@@ -9,9 +9,9 @@ import pytest
 from made_data import SIGMA, measured
 from scipy import stats
 
-from crosscheck.fit.least_squares import length_errors
-from crosscheck.fit.least_squares.length_errors import Rows, with_length_errors
-from crosscheck.fit.least_squares.problem import Problem
+from crosscheck.fit import length_errors
+from crosscheck.fit.length_errors import Rows, with_length_errors
+from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Sigma
 from seecr.description.mjcf import load_robot, model_path
 from seecr.pose import Array
@@ -73,23 +73,3 @@ def test_a_row_that_is_on_a_kink_stays_there() -> None:
     again = found.lines.likeliest(problem)
     step = np.abs(again - found.lines.errors).max(axis=1) / SOFT[0][1]
     assert np.median(step[on_kink]) < 1e-2
-
-
-def test_a_model_that_cannot_be_solved_in_a_row_is_given_up_at_once(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    problem, _errors = made(*SOFT[0])
-    found = with_length_errors(problem, (), None, None)
-    count = 0
-    predicted = Rows.predicted.__func__  # type: ignore[attr-defined]
-
-    def counted(cls: type[Rows], *args: object) -> Rows:
-        nonlocal count
-        count += 1
-        rows: Rows = predicted(cls, *args)
-        return replace(rows, solved=rows.solved & (np.arange(len(rows.solved)) > 0))
-
-    monkeypatch.setattr(Rows, "predicted", classmethod(counted))
-    off = found.lines.errors + 3.0 * problem.length_sigma
-    assert not with_length_errors(problem, (), off, found.prediction).solved[0]
-    assert count == 2

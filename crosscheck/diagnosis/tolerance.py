@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.least_squares.problem import KINDS, Problem, Rms
+from crosscheck.fit.problem import KINDS, Problem, Rms
 from crosscheck.fit.words import rms_words
 from crosscheck.given import check_above_zero
 from crosscheck.measurements.data import SI, Sigma, parse_kind
@@ -72,7 +72,7 @@ class LeftOver:
     """What a model leaves that noise does not explain.
 
     Attributes:
-        size: rms by kind, with the keys of :class:`crosscheck.fit.least_squares.problem.Kind`; 0 if
+        size: rms by kind, with the keys of :class:`crosscheck.fit.problem.Kind`; 0 if
             noise explains all, None where nothing was read.
         limit: from where on it matters; None if neither tolerance nor noise was stated.
         important: whether the size exceeds the limit for some kind, by more than chance.
@@ -108,13 +108,8 @@ def remainder_of(
 ) -> LeftOver:
     """How far errors exceed the noise, and whether that matters.
 
-    Args:
-        rms: errors of the model, by kind. noise: what noise alone would leave.
-        tolerance: the user's tolerance.
-        stated: the noise that the user stated. Estimated noise sets no limit, because it may
-            contain some of the remainder.
-        doubt: by kind, the relative standard error of a mean square of noise, see
-            :func:`doubt_of`. What chance may add to the noise does not count as important.
+    Noise that was not stated sets no limit, because it may contain some of the remainder. What
+    chance may add to the noise, see :func:`doubt_of`, is not important.
     """
     size: Rms = {}
     limit: Rms = {}

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from crosscheck.fit.least_squares.definite import (
+from crosscheck.fit.algebra import (
     inverse_of,
     root_beside_one,
     root_of,
     solved,
+    waves,
 )
 
 
@@ -64,3 +65,16 @@ def test_the_root_beside_one_is_exact_where_rounding_would_swallow_the_one() -> 
     root = np.abs(np.diag(root_beside_one(x)))
     assert np.prod(root[[0, 3]]) ** 2 == pytest.approx(2.0 * float(x[:, 0] @ x[:, 0]), rel=1e-6)
     assert root[3] == pytest.approx(np.sqrt(2.0), rel=1e-3)
+
+
+@pytest.mark.parametrize("count", [120, 700])
+def test_waves_are_those_of_a_process_that_forgets_itself(count: int) -> None:
+    """Of all places or of some as centres; an axis that never moves is left out."""
+    place = np.random.default_rng(3).uniform(-1.0, 1.0, (count, 3)) * [2.0, 0.5, 0.0] + 7.0
+    shapes = waves(place, 0.3)
+    half = 0.5 * np.ptp(place[:, :2], axis=0)
+    apart = (place[:, None, :2] - place[None, :, :2]) / half
+    wanted = np.exp(-np.sum(apart**2, axis=-1) / (2.0 * 0.3**2))
+    off = np.abs(shapes @ shapes.T - wanted)
+    assert np.quantile(off, 0.9999) < 0.06 and np.sqrt(np.mean(off**2)) < 0.01
+    assert np.mean(np.sum(shapes**2, axis=1)) == pytest.approx(1.0, abs=0.015)

@@ -7,8 +7,8 @@ import pytest
 from box_of_poses import box_of_poses
 from scipy import stats
 
-from crosscheck.fit.least_squares.problem import Problem
-from crosscheck.fit.noise.whiteness import STRUCTURED, agreement, best_of, whiteness
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.residual_noise import STRUCTURED, agreement, best_of, whiteness
 from seecr.pose import Array
 
 pytestmark = pytest.mark.slow
@@ -86,10 +86,8 @@ def test_structure_in_one_channel_does_not_drown_in_the_others(problem: Problem)
     table[:, 2] += 2.0 * wave
     found = whiteness(problem, table.ravel(), 0)
     assert found.structured and found.lag_errors > STRUCTURED
-    quiet = np.delete(np.arange(6), 2)
     table[:, 2] = noise(problem, 2)[: len(table)]
     assert not whiteness(problem, table.ravel(), 0).structured
-    assert len(quiet) == 5
 
 
 def test_too_few_pairs_say_nothing() -> None:

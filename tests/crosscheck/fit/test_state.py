@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from made_data import SIGMA, measured
 
-from crosscheck.fit.least_squares.problem import Problem
-from crosscheck.fit.least_squares.state import State, evaluate
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import State, evaluate
 from crosscheck.measurements.data import Measurements
 from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Terms

@@ -1,16 +1,25 @@
-"""A model at given values: its predictions for a problem, their residuals and derivatives."""
+"""A model at given values: what is known of these, what they predict, residuals and derivatives.
+
+A value z = (value - null)/scale that was measured independently with the standard error s counts as
+one more reading: y = z_measured/s, with the derivative 1/s and unit noise. It adds
+((z_measured - z)/s)^2 to the objective. Many rows outweigh it, and then the values that explain the
+data are not those that were measured: one of the two is wrong. A fixed value has zero derivatives.
+A fit may pass through sizes that no robot can have, a result may not.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.least_squares.length_errors import with_length_errors
-from crosscheck.fit.least_squares.problem import Problem, in_units_of
-from seecr.effects import Terms
+from crosscheck.fit.length_errors import with_length_errors
+from crosscheck.fit.problem import Problem, in_units_of
+from seecr.counted import some
+from seecr.description.robot import Robot
+from seecr.effects import Term, Terms
 from seecr.pose import Array
 from seecr.prediction.experiment import Experiment, Prediction
 from seecr.prediction.parted import rates
@@ -18,6 +27,8 @@ from seecr.prediction.parted import rates
 # A row is far off if the mean square of its whitened residuals exceeds _FAR_OFF. It may then rest
 # in another equilibrium, but only if no more than _FEW_ROWS of all rows are far off.
 _FAR_OFF, _FEW_ROWS = 25.0, 0.25
+# So many of its standard errors, a value measured independently is contradicted.
+CONTRADICTED = 3.0
 
 
 @dataclass(eq=False)
@@ -29,8 +40,7 @@ class State:
         prediction: prediction of all rows; if commanded lengths are noisy, at their most likely
             errors.
         raw: (n, 6 + m) residuals at the commanded lengths, in SI units; NaN where nothing was read.
-        table: (n, 6 + m) whitened residuals.
-        white: (N,) whitened residuals that count.
+        table: (n, 6 + m) whitened residuals. white: (N,) whitened residuals that count.
         factor: (n, 6 + m, 6 + m) Cholesky factors of the noise.
         chi2: sum of squares of ``white``; inf if a counted row was not solved.
         log_det: log determinant of the counted rows' noise over that of the readings alone.
@@ -66,17 +76,14 @@ def evaluate(
 ) -> State:
     """Predict with the terms, and compare with the readings.
 
-    If commanded lengths are noisy, their most likely errors are found row by row (Gauss-Newton on
-    errors in variables), and the noise is propagated from there: a cable that is slack at the
-    commanded length may have been taut at the true one.
+    If commanded lengths are noisy, their most likely errors are found row by row, and the noise is
+    propagated from there: a cable that is slack as commanded may have been taut at its true length.
 
     Args:
-        problem: readings and noise.
-        terms: effects with values.
+        problem, terms: the readings, and the effects with values.
         factor: :meth:`Problem.noise`; only used if commanded lengths are exact.
         near: a state to start from.
-        trial: the state is dropped unless it is valid: where a counted row with history is lost,
-            the others need not be solved.
+        trial: the rest need not be solved once a counted row with history is lost.
     """
     effects = terms.effects
     experiment = problem.experiment if near is None else near.experiment
@@ -178,3 +185,75 @@ def derivatives(
     """(N, p) whitened derivatives of the prediction by the terms' parameters."""
     change = rates(state.experiment, state.terms, state.prediction, columns, frozen)
     return problem.whiten(state.factor, problem.as_read(change, state.prediction.readings))
+
+
+def free_derivatives(problem: Problem, state: State, frozen: bool = False) -> Array:
+    """(N, p) whitened derivatives of the prediction by z; 0 for fixed values."""
+    terms = state.terms
+    if not len(terms):
+        return np.zeros((len(state.white), 0))
+    rates = derivatives(problem, state, frozen=frozen)
+    return np.asarray(rates * np.where(terms.knowledge.fixed, 0.0, terms.scale))
+
+
+# --- what is known of values ---------------------------------------------------------------------
+
+
+def known_readings(terms: Terms) -> tuple[Array, Array]:
+    """Independent measurements with unit noise: derivatives by z (k, p), and readings (k,)."""
+    known = terms.knowledge
+    own = np.flatnonzero(known.measured)
+    columns = np.zeros((len(own), len(terms)))
+    columns[np.arange(len(own)), own] = (terms.scale / known.stderr)[own]
+    return columns, ((known.value - terms.null) / known.stderr)[own]
+
+
+def known_left(terms: Terms) -> Array:
+    """(k,) measured minus current values of those measured independently, in standard errors."""
+    columns, readings = known_readings(terms)
+    return np.asarray(readings - columns @ terms.sizes)
+
+
+def contradictions(terms: Iterable[Term]) -> list[str]:
+    """A sentence for each effect with values far from their independent readings."""
+    return [text for text in map(_contradiction, terms) if text]
+
+
+def _contradiction(term: Term) -> str:
+    off = np.abs(term.vector - term.knowledge.value) / term.knowledge.stderr
+    against = term.knowledge.measured & (off > CONTRADICTED)
+    if not against.any():
+        return ""
+    names = np.array(term.layout.names)[against].tolist()
+    verb = "is" if len(names) == 1 else "are up to"
+    return (
+        f"{term.name}: {some(names)} {verb} {off[against].max():.3g} standard errors from "
+        "what was measured independently: check that measurement, and what else was taken for known"
+    )
+
+
+def can_be(robot: Robot, terms: Terms, stood: Terms) -> bool:
+    """Whether a robot can have these values (no negative mass, no wheel larger than its cable).
+
+    A fit that is stopped by a bound other than nothing wants more than any robot has, and is no
+    optimum. What was impossible in the model as it ``stood`` is the user's own.
+    """
+
+    def may_be(term: Term) -> bool:
+        return term.is_possible(robot) and not _is_stopped(term)
+
+    own = {term.name for term in stood if not may_be(term)}
+    return all(term.name in own or may_be(term) for term in terms)
+
+
+def _is_stopped(term: Term) -> bool:
+    """Whether a fitted amplitude is at a bound that is not nothing."""
+    layout, value = term.layout, term.vector
+    at_bound = (value <= layout.lower) | (value >= layout.upper)
+    fitted = ~layout.shape & ~term.knowledge.fixed
+    return bool(np.any(at_bound & (value != layout.null) & fitted))
+
+
+def largest_size(term: Term) -> float:
+    """The largest absolute value of an effect's parameters in plausible sizes, without shapes."""
+    return float(np.max(np.abs(term.sizes[~term.layout.shape]), initial=0.0))

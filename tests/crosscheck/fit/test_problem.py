@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
-from crosscheck.fit.least_squares.problem import Problem, angle_rates, noise_factors, rms_by_kind
-from crosscheck.fit.least_squares.state import evaluate
-from crosscheck.fit.noise.whiteness import whiteness
+from crosscheck.fit.problem import Problem, angle_rates, noise_factors, rms_by_kind
+from crosscheck.fit.residual_noise import whiteness
+from crosscheck.fit.state import evaluate
 from crosscheck.inference.fit import Data, fit
 from crosscheck.inference.noise import Noise
 from crosscheck.measurements.data import Sigma

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from crosscheck.fit.effects.registration import turn_of_points
+from crosscheck.fit.registration import turn_of_points
 from seecr.pose import quat_from_rotvec, quat_rotate
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.3, 0.0], [0.1, 0.2, 0.4]])

@@ -11,7 +11,7 @@ import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
 import crosscheck
-from crosscheck.fit.noise.unstated import overestimated
+from crosscheck.fit.residual_noise import overestimated
 from crosscheck.inference.noise import chain_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.preparation.prepare import prepare

@@ -1,1 +1,0 @@
-"""Measurements as a least-squares problem: residuals, derivatives, and their linear algebra."""
