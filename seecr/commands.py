@@ -311,11 +311,8 @@ class Path:
 def waypoints_of(robot: Robot, commands: Commands, waypoints: float | None = None) -> Path:
     """The waypoints of commands: straight from the reference pose, straight between rows.
 
-    Args:
-        robot: as described.
-        commands: n rows.
-        waypoints: largest motion of the command between them [robot's length]; by default a
-            twentieth, with two to eight waypoints on the way to each row.
+    The command moves from one to the next by at most ``waypoints`` [robot's length]; by default a
+    twentieth, with two to eight on the way to each row.
     """
     n = len(commands)
     ways, fresh = _ways(robot, commands), commands.starts

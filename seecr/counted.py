@@ -9,8 +9,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["between", "counted", "figures", "plural", "rows_words", "some"]
-
 # An end of a range that is smaller than this part of the other one is what rounding leaves of 0.
 _ROUNDING = 1e-12
 

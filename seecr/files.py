@@ -30,26 +30,6 @@ import numpy as np
 from seecr import __version__
 from seecr.errors import InputError, InputFileError
 
-__all__ = [
-    "Made",
-    "Toml",
-    "check_replaces",
-    "check_writable",
-    "digits_of",
-    "json_text",
-    "no_text",
-    "plain",
-    "read_bytes",
-    "read_text",
-    "read_toml",
-    "staged",
-    "with_toml",
-    "write_text",
-    "write_texts",
-    "written",
-]
-
-
 _BEGINNINGS = (
     (b"\x89PNG", "a PNG picture"),
     (b"\xff\xd8\xff", "a JPEG picture"),
@@ -72,11 +52,7 @@ def no_text(data: bytes) -> str:
 
 
 def read_bytes(path: Path, expected: str) -> bytes:
-    """The bytes of a file.
-
-    Args:
-        path: the file.
-        expected: what it should be, for the error.
+    """The bytes of a file; an error says what was expected.
 
     Raises:
         InputFileError: the file is missing or unreadable.
@@ -166,9 +142,7 @@ def read_toml(path: Path, expected: str) -> Toml:
 def written(*paths: Path, failure: str = "cannot be written") -> Iterator[tuple[Path, ...]]:
     """Temporary files that replace others, all together, if the block ends without an error.
 
-    Args:
-        paths: the files to be written, renamed in that order; errors name the last.
-        failure: the beginning of the error if writing fails, such as "cannot write the report".
+    Errors begin with ``failure`` and name the last file.
 
     Raises:
         InputFileError: one of them cannot be written; all are then as they were.
@@ -254,11 +228,9 @@ def check_replaces(
 
 @contextmanager
 def staged(
-    out: str | Path,
-    option: str = "--out",
-    sometimes: Iterable[str] = (),
+    out: str | Path, option: str = "--out", sometimes: Iterable[str] = (),
     read: Iterable[Path | None] = (),
-) -> Iterator[Path]:
+) -> Iterator[Path]:  # fmt: skip
     """A temporary folder whose files move into ``out`` if the block ends without an error.
 
     It lies inside ``out``, so that moving is renaming; if the block fails, ``out`` is as it was.
@@ -300,8 +272,9 @@ def staged(
         done = True
     finally:
         shutil.rmtree(folder, ignore_errors=True)
-        if not done:
-            _remove_empty(made)
+        for above in () if done else made:
+            if above.is_dir() and not any(above.iterdir()):
+                above.rmdir()
 
 
 def _check_not_read(path: Path, read: Iterable[Path | None], option: str) -> None:
@@ -322,12 +295,6 @@ def with_toml(path: Path | None) -> list[Path]:
 def _missing(path: Path) -> list[Path]:
     """The folders that do not exist yet, innermost first."""
     return [folder for folder in (path, *path.parents) if not folder.exists()]
-
-
-def _remove_empty(folders: list[Path]) -> None:
-    for folder in folders:
-        if folder.is_dir() and not any(folder.iterdir()):
-            folder.rmdir()
 
 
 def json_text(document: Mapping[str, Any], indent: int | None = 1) -> str:

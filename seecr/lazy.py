@@ -10,12 +10,8 @@ from typing import Any
 def lazily(
     package: str, where: Mapping[str, str], modules: Collection[str] = ()
 ) -> Callable[[str], Any]:
-    """The package's ``__getattr__``.
-
-    Args:
-        package: its full name.
-        where: public names, each with the module of the package that defines it.
-        modules: of the package, themselves available by name.
+    """The package's ``__getattr__``: public names, each with the module that defines it, and
+    modules that are themselves available by name.
     """
 
     def get(name: str) -> Any:

@@ -22,15 +22,6 @@ from typing import TYPE_CHECKING, TypeVar
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-__all__ = [
-    "in_parts",
-    "processes",
-    "processors",
-    "run_parts",
-    "run_tasks",
-    "undivided",
-]
-
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -125,21 +116,14 @@ if hasattr(os, "register_at_fork"):
 
 
 def run_tasks(
-    function: Callable[[T], R],
-    items: Sequence[T],
-    executor: Executor | None = None,
-    order: Sequence[int] | None = None,
-    tell: Callable[[R], None] = lambda _result: None,
-) -> list[R]:
-    """Call a function with each item.
+    function: Callable[[T], R], items: Sequence[T], executor: Executor | None = None,
+    order: Sequence[int] | None = None, tell: Callable[[R], None] = lambda _result: None,
+) -> list[R]:  # fmt: skip
+    """Call a function with each item, in this process or by an executor.
 
-    Args:
-        function: of a module, or a ``partial`` of one, so that it can be sent to a process.
-        items: its arguments.
-        executor: calls the function; this process does by default.
-        order: in which the executor gets the items, the longest task first so that none is left
-            over at the end.
-        tell: called in this process with each result as it comes.
+    The executor gets them in ``order``, the longest first so that none is left over at the end; the
+    function must be of a module so that it can be sent to a process. Each result is told here as it
+    comes.
 
     Returns:
         the results in the order of the items.

@@ -16,32 +16,6 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "LARGEST",
-    "NORM_TOLERANCE",
-    "Array",
-    "all_finite",
-    "changes_between",
-    "cross",
-    "deviated",
-    "moved_by",
-    "pose_add",
-    "pose_difference",
-    "products",
-    "quat_conjugate",
-    "quat_from_rotvec",
-    "quat_from_rxyz",
-    "quat_multiply",
-    "quat_rotate",
-    "quat_to_matrix",
-    "rotated",
-    "rotation_vectors",
-    "rotvec_from_quat",
-    "rxyz_from_quat",
-    "transform_points",
-]
-
-
 Array = NDArray[np.float64]
 
 LARGEST = 1e30

@@ -15,21 +15,6 @@ import numpy as np
 from seecr.counted import figures
 from seecr.pose import Array
 
-__all__ = [
-    "UNITS",
-    "Unit",
-    "chance",
-    "in_unit",
-    "joules",
-    "millimetres",
-    "of_columns",
-    "parameter_name",
-    "short",
-    "significant",
-    "with_error",
-    "without_rounding",
-]
-
 Numbers = TypeVar("Numbers", float, Array)
 
 # Digits before the point from which on numbers have an exponent, and those with an error.

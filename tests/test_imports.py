@@ -19,7 +19,7 @@ from sources import ROOT, imports, imports_of, modules, name_of, tree_of
 # The rooms, folders or files, floor by floor from the lowest up.
 TABLE = (
     "seecr: errors lazy counted parallel compiled",
-    "seecr: files pose arguments curves result units",
+    "seecr: files pose arguments result units",
     "seecr: description commands columns",
     "seecr: effects statics prediction",
     "seecr: tensions equilibrium inverse workspace exported",

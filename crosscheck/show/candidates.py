@@ -9,10 +9,7 @@ from numpy.typing import NDArray
 
 from crosscheck.diagnosis.path import ModelPath
 from crosscheck.diagnosis.result import PROBABLE, Diagnosis, NotListed
-from crosscheck.diagnosis.words import (
-    probability_name,
-    within_words,
-)
+from crosscheck.diagnosis.words import probability_name, within_words
 from crosscheck.fit.reasons import Why, probability_words
 from crosscheck.show.blocks import (
     Bar,

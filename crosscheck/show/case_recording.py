@@ -18,8 +18,7 @@ from seecr.pose import Array, pose_difference
 from seecr.show import colours, layout, plots
 from seecr.show.colours import COMMAND, MUJOCO, SEECR, Rgba
 from seecr.show.plots import Legend, legend_of
-from seecr.show.scene import Scene, write_legend
-from seecr.show.shapes import States
+from seecr.show.scene import Scene, States, write_legend
 from seecr.show.stream import (
     Index,
     Recording,
@@ -68,12 +67,8 @@ _WIDTH, _HEIGHT = 640.0, 1000.0
 def write_case_recording(result: CaseResult, path: str | Path) -> None:
     """Write the recording of a case: scene, plots, lanes, text, layout.
 
-    Args:
-        result: of :func:`crosscheck.suite.run.run_case`.
-        path: the ``.rrd`` file, written through a temporary one.
-
     Raises:
-        CrosscheckError: the file cannot be written.
+        InputFileError: the file cannot be written.
     """
     drawn = _gathered(result)
     with recording_file(path, result.case.name, _layout(drawn)) as recording:
@@ -207,13 +202,8 @@ def _worth_watching(result: CaseResult) -> int | None:
 def record_motion(
     settler: Settler, pose: Array, rest_lengths: Array, *, max_frames: int = _FRAMES
 ) -> Motion:
-    """Settle from a pose (7,) and keep the motion, including the last state.
-
-    Args:
-        settler: the robot.
-        pose: (7,) start pose.
-        rest_lengths: (m,) [m].
-        max_frames: frames kept, spread evenly over the steps.
+    """Settle from a pose (7,) with rest lengths (m,) [m], and keep at most so many frames, evenly
+    spread, with the last state.
     """
     frames: list[tuple[float, Array, float, Array]] = []
     clock = 0.0

@@ -51,12 +51,9 @@ _MOST_POSES, _MOST_NOTES = 6, 5
 
 
 def print_comparison(
-    found: Comparison,
-    exceeded: Sequence[Exceeded],
-    limited: bool,
-    out: Path,
+    found: Comparison, exceeded: Sequence[Exceeded], limited: bool, out: Path,
     console: Console | None = None,
-) -> None:
+) -> None:  # fmt: skip
     """Print the tables, the verdict, what exceeds its limit, and where the files are."""
     show(_on_terminal(found, exceeded, limited, out), console)
 
@@ -118,11 +115,8 @@ def page_of_comparison(found: Comparison) -> Page:
 
 
 def verdict_text(found: Comparison, kinds: Sequence[Kind], scene: Sequence[str]) -> str:
-    """The text of the recording: the verdict, and how to read the views.
-
-    Args:
-        found: the comparison. kinds: of readings.
-        scene: what is drawn, in words; empty if nothing is.
+    """The text of the recording: the verdict, and how to read the views, of which ``scene`` says
+    what is drawn, if anything is.
     """
     blocks: list[Block | None] = [Line(found.sentence)]
     if found.terms:

@@ -369,7 +369,11 @@ def checks(found: Diagnosis) -> list[Check]:
     if not any(stage.added for stage in listed):
         return out
     better, blocks = _better_runs(listed)
-    worst, largest = max((_largest_size(stage), stage.added) for stage in listed if stage.added)
+    worst, largest = max(
+        (float(np.max(np.abs(stage.fit.terms[stage.added].sizes))), stage.added)
+        for stage in listed
+        if stage.added
+    )
     bound = _at_bounds(listed[-1])
     return [
         *out,
@@ -389,10 +393,6 @@ def _better_runs(stages: Sequence[Stage]) -> tuple[int, int]:
     falls = [a - b for a, b in pairs if len(a) == len(b)]
     least = np.min(falls, axis=0) if falls else np.zeros(0)
     return int(np.sum(least > 0)), len(least)
-
-
-def _largest_size(stage: Stage) -> float:
-    return float(np.max(np.abs(stage.fit.terms[stage.added].sizes)))
 
 
 def _at_bounds(stage: Stage) -> list[str]:
@@ -431,11 +431,8 @@ def diagnosis_text(found: Diagnosis, scene: Sequence[str]) -> str:
 def step_text(
     found: Diagnosis, stages: Sequence[Stage], k: int, kinds: Sequence[Kind], line: int
 ) -> str:
-    """One model: its errors, and its last effect.
-
-    Args:
-        found: the diagnosis. stages: the models. k: which one. kinds: of readings.
-        line: of the worst pose in the data.
+    """The k-th model: its errors, and its last effect; ``line`` is that of the worst pose in the
+    data.
     """
     stage = stages[k]
     fitted = stage.rms

@@ -77,13 +77,17 @@ def _panel(axes: Axes, found: Diagnosis, stages: Sequence[Stage], kind: Kind) ->
         color=GREY, fontsize=7.5, va="top",
     )  # fmt: skip
     for row, (stage, value, runs) in enumerate(zip(stages, values, blocks, strict=True)):
-        in_sample = _in_sample(stage, kind)
-        (_point if logarithmic else _bar)(axes, row, stage, value, _colour(stage, found))
+        in_sample = stage.rms[kind.key]
+        (_point if logarithmic else _bar)(axes, row, value, _colour(stage, found))
         # beside a dot, which would hide it, and on a bar
         _runs(axes, row + 0.3 * logarithmic, runs)
         if stage.added and in_sample is not None:
             axes.plot(
-                [in_sample] * 2, [row - 0.3, row + 0.3], color="#b9c0c7", linewidth=1.4, zorder=4
+                [in_sample * kind.factor] * 2,
+                [row - 0.3, row + 0.3],
+                color="#b9c0c7",
+                linewidth=1.4,
+                zorder=4,
             )
         reach = max(value, float(np.nanmax(runs, initial=0.0)))
         words = f"{short(value)} {kind.unit}"
@@ -105,18 +109,13 @@ def _is_noise(found: Diagnosis) -> bool:
     return found.verdict in (DiagnosisVerdict.EFFECTS_FOUND, DiagnosisVerdict.NO_EFFECT_MISSING)
 
 
-def _in_sample(stage: Stage, kind: Kind) -> float | None:
-    value = stage.rms[kind.key]
-    return None if value is None else value * kind.factor
-
-
 def _colour(stage: Stage, found: Diagnosis) -> str:
     if not stage.added:
         return CALM if found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING else BEFORE
     return AFTER
 
 
-def _point(axes: Axes, row: int, stage: Stage, value: float, colour: str) -> None:
+def _point(axes: Axes, row: int, value: float, colour: str) -> None:
     """Where the axis has no zero to begin a bar at."""
     axes.plot(
         value, row, marker="o", markersize=11, markeredgewidth=1.6, zorder=2,
@@ -124,12 +123,8 @@ def _point(axes: Axes, row: int, stage: Stage, value: float, colour: str) -> Non
     )  # fmt: skip
 
 
-def _bar(axes: Axes, row: int, stage: Stage, value: float, colour: str) -> None:
-    axes.barh(
-        row, value, height=0.52, zorder=2,
-        color=colour, edgecolor=colour,
-        linewidth=0.8,
-    )  # fmt: skip
+def _bar(axes: Axes, row: int, value: float, colour: str) -> None:
+    axes.barh(row, value, height=0.52, zorder=2, color=colour, edgecolor=colour, linewidth=0.8)
 
 
 def _runs(axes: Axes, row: float, runs: np.ndarray) -> None:

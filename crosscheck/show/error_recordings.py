@@ -20,15 +20,16 @@ from crosscheck.diagnosis.path import Stage
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.fit.problem import Kind, kinds_read
 from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.fit.state import State
 from crosscheck.show import misfit
 from crosscheck.show.comparison import pose_errors_text, verdict_text
 from crosscheck.show.diagnosis import diagnosis_text, pose_of_step_text, step_text
 from crosscheck.show.misfit import MEASURED, Misfit
 from seecr.pose import Array
-from seecr.show import colours, layout, plots, shapes
+from seecr.show import colours, layout, plots
 from seecr.show.colours import Rgba
 from seecr.show.plots import Legend, legend_of
-from seecr.show.scene import Scene
+from seecr.show.scene import Scene, extent
 from seecr.show.stream import MODEL_STEP, Index, Recording, pose_index, recording_file
 from seecr.units import short
 
@@ -54,22 +55,32 @@ def _texts(*shares: float) -> rrb.Vertical:
 
 def _scene_view(shown: Misfit, name: str, aspect: float) -> rrb.Spatial3DView:
     robot = shown.problem.robot
-    low, high = shapes.extent(robot, shown.seen)
+    low, high = extent(robot, shown.seen)
     return layout.scene_view(robot, low, high, name, aspect)
+
+
+def _pose_by_pose(recording: Recording, scene: Scene, shown: Misfit, state: State) -> rr.TimeColumn:
+    """What was measured and a model at each pose, and the maps, on which a ring follows."""
+    problem, states = shown.problem, misfit.states_of(state)
+    index = pose_index(problem.data.n_rows)
+    measured = np.where(problem.use[:, None], shown.measured, np.nan)
+    scene.platform("measured", index, measured, MEASURED)
+    predicted = np.where(states.known[:, None], misfit.predicted_poses(state), np.nan)
+    scene.platform("model", index, predicted, colours.SEECR, solid=True)
+    scene.cables("model", index, states)
+    misfit.maps(recording, pose_index(1), shown, [shown.first])
+    misfit.cursor(recording, index, shown)
+    return index
 
 
 # --- comparison -----------------------------------------------------------------------------------
 
 
 def write_comparison_recording(found: Comparison, path: str | Path) -> None:
-    """Write the recording of a comparison.
-
-    Args:
-        found: the comparison; if nothing could be compared, there is only text.
-        path: the ``.rrd`` file, written through a temporary one.
+    """Write the recording of a comparison; if nothing could be compared, there is only text.
 
     Raises:
-        CrosscheckError: the file cannot be written.
+        InputFileError: the file cannot be written.
     """
     problem = found.problem
     name = f"comparison of {problem.robot.name}, {problem.data.name}"
@@ -78,20 +89,12 @@ def write_comparison_recording(found: Comparison, path: str | Path) -> None:
         return
     shown = Misfit(problem, found.state)
     n, kinds = problem.data.n_rows, shown.kinds
-    index, begin = pose_index(n), pose_index(1)
     with recording_file(path, name, _comparison_layout(found, shown, name)) as recording:
         top = colours.round_up(float(np.nanmax(found.state.prediction.tensions, initial=0.0)))
         scene = Scene(recording, problem.robot, shown.seen, top)
         scene.surroundings()
-        misfit.arrows(recording, begin, shown, [found.state], scene.size)
-        misfit.maps(recording, begin, shown, [found.state])
-        misfit.cursor(recording, index, shown)
-        measured = np.where(problem.use[:, None], shown.measured, np.nan)
-        scene.platform("measured", index, measured, MEASURED)
-        states = misfit.states_of(found.state)
-        predicted = np.where(states.known[:, None], misfit.predicted_poses(found.state), np.nan)
-        scene.platform("model", index, predicted, colours.SEECR, solid=True)
-        scene.cables("model", index, states)
+        misfit.arrows(recording, pose_index(1), shown, [found.state], scene.size)
+        index = _pose_by_pose(recording, scene, shown, found.state)
         for kind in kinds:
             _reading_plots(recording, index, found, kind)
         recording.texts(NOW, index, [pose_errors_text(found, k) for k in range(n)])
@@ -146,14 +149,10 @@ def _reading_plots(recording: Recording, index: Index, found: Comparison, kind: 
 
 
 def write_diagnosis_recording(found: Diagnosis, path: str | Path) -> None:
-    """Write the recording of a diagnosis.
-
-    Args:
-        found: the diagnosis; without a search (no verdict) there is only text.
-        path: the ``.rrd`` file, written through a temporary one.
+    """Write the recording of a diagnosis; without a search (no verdict) there is only text.
 
     Raises:
-        CrosscheckError: the file cannot be written.
+        InputFileError: the file cannot be written.
     """
     if found.path is None:
         _words_alone(path, "diagnosis", diagnosis_text(found, ()))
@@ -199,7 +198,8 @@ def _over_steps(
     states = [stage.state for stage in stages]
     misfit.arrows(recording, index, shown, states, scene.size)
     misfit.maps(recording, index, shown, states)
-    _write_bars(recording, index, found, stages)
+    for block, kind in enumerate(shown.kinds):
+        _bars_of(recording, index, found, stages, kind, block * _block_height(count))
     scene.platform("measured", index, np.tile(shown.measured[worst], (count, 1)), MEASURED)
     predicted = np.stack([misfit.predicted_poses(state)[worst] for state in states])
     scene.platform("model", index, predicted, colours.SEECR, solid=True)
@@ -211,19 +211,12 @@ def _over_steps(
 
 def _over_poses(recording: Recording, scene: Scene, stages: Sequence[Stage], shown: Misfit) -> None:
     """The measured poses one by one, under the first and the last model."""
-    problem, last = shown.problem, stages[-1].state
-    n = problem.data.n_rows
-    index = pose_index(n)
-    measured = np.where(problem.use[:, None], shown.measured, np.nan)
-    scene.platform("measured", index, measured, MEASURED)
-    scene.platform("model", index, misfit.predicted_poses(last), colours.SEECR, solid=True)
-    scene.cables("model", index, misfit.states_of(last))
+    index = _pose_by_pose(recording, scene, shown, stages[-1].state)
     if len(stages) > 1:
         scene.platform("first", index, misfit.predicted_poses(shown.first), colours.PINK)
-    misfit.maps(recording, pose_index(1), shown, [shown.first])
-    misfit.cursor(recording, index, shown)
     for kind in shown.kinds:
         _model_plots(recording, index, stages, shown, kind)
+    problem, n = shown.problem, shown.problem.data.n_rows
     texts = [pose_of_step_text(problem, stages, shown.kinds, k) for k in range(n)]
     recording.texts(NOW, index, texts)
 
@@ -263,15 +256,6 @@ _DIM, _LABEL = 0.45, 2.2
 _POINTS, _TITLE, _COLUMN, _MOST = 5.2, 32.0, 1010.0, 0.6
 
 
-def _write_bars(
-    recording: Recording, index: rr.TimeColumn, found: Diagnosis, stages: Sequence[Stage]
-) -> None:
-    """One block per kind of reading: bars from half the noise to the error on held-out runs."""
-    assert found.path is not None
-    for block, kind in enumerate(kinds_read(found.path.problem)):
-        _bars_of(recording, index, found, stages, kind, block * _block_height(len(stages)))
-
-
 def _bars_view(found: Diagnosis, stages: Sequence[Stage]) -> rrb.Spatial2DView:
     """The bars' view."""
     assert found.path is not None
@@ -302,13 +286,10 @@ def _block_height(rows: int) -> float:
 
 
 def _bars_of(
-    recording: Recording,
-    index: rr.TimeColumn,
-    found: Diagnosis,
-    stages: Sequence[Stage],
-    kind: Kind,
-    top: float,
-) -> None:
+    recording: Recording, index: rr.TimeColumn, found: Diagnosis, stages: Sequence[Stage],
+    kind: Kind, top: float,
+) -> None:  # fmt: skip
+    """A block: bars of one kind of reading, from half the noise to the error on held-out runs."""
     values = np.array([kind.factor * (s.held_out.rms[kind.key] or 0.0) for s in stages])
     floor = kind.factor * (found.floor.get(kind.key) or 0.0)
     ends = _bar_ends(values, values, floor)

@@ -66,11 +66,8 @@ def styled() -> Iterator[None]:
 
 
 def blank(height: float, width: float = WIDTH, *, constrained: bool = True) -> Figure:
-    """An empty figure that fills the page's width, so high [in].
-
-    Args:
-        height, width: [in].
-        constrained: let Matplotlib find room for all labels, which takes its time.
+    """An empty figure, so high and wide [in], in which Matplotlib finds room for all labels if it
+    is ``constrained``, which takes its time.
     """
     layout = ConstrainedLayoutEngine(w_pad=_ROOM) if constrained else None
     figure = Figure(figsize=(width, height), layout=layout)
@@ -108,12 +105,7 @@ def _keep(figure: Figure, svg: bytes, words: str) -> None:
 
 
 def image(figure: Figure, words: str) -> str:
-    """The figure as an element of the page, with nothing outside of it.
-
-    Args:
-        figure: drawn.
-        words: what it shows, for those who cannot see it.
-    """
+    """The figure as an element of the page; ``words`` say what it shows to who cannot see it."""
     buffer = io.BytesIO()
     if (layout := figure.get_layout_engine()) is not None:
         # else Matplotlib draws all of it once more, to find that out

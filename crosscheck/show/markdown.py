@@ -98,11 +98,8 @@ def kinds_table(
     kinds: Iterable[Kind], values: Iterable[Sequence[float | None]], names: Iterable[str],
     corner: str = "rms error",
 ) -> TextTable:  # fmt: skip
-    """Errors with a row for each kind of reading.
-
-    Args:
-        kinds: the kinds. values: for each, its errors, SI; None where there is none.
-        names: what the columns are. corner: what the rows are.
+    """Errors (SI, None where there is none) with a row for each kind and a named column for each
+    value.
     """
     rows = [
         [

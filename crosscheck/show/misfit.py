@@ -18,14 +18,15 @@ from seecr.compiled.columns import REST
 from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
 from seecr.show import colours, layout, plots
 from seecr.show.plots import Legend
-from seecr.show.shapes import States
+from seecr.show.scene import States
 from seecr.show.stream import Index, Recording
 
 MEASURED: colours.Rgba = colours.MUJOCO
 # Top of a colour scale: this percentile of the errors.
 _LARGEST = 95.0
-# Radii of arrows relative to the robot's size, of dots in points of the screen.
-_ARROW, _DOT, _RING, _THIN = 0.0021, 5.0, 9.0, 0.8
+# Radii of arrows relative to the robot's size; of dots, rings and thin arrows in points of the
+# screen at any zoom, which Rerun expects as negative numbers.
+_ARROW, _DOT, _RING, _THIN = 0.0021, -5.0, -9.0, -0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,13 +163,12 @@ def maps(recording: Recording, index: Index, misfit: Misfit, states: list[State]
         shade = np.concatenate([misfit.shades(state, kind) for state in states])
         columns = rr.Points2D.columns(positions=points, colors=shade)
         recording.rows(entity, index, columns.partition(count))
-        radius = _on_screen(_DOT)
-        recording.always(entity, rr.Points2D.from_fields(radii=[radius]))
+        recording.always(entity, rr.Points2D.from_fields(radii=[_DOT]))
         if kind.name == "position" and misfit.magnify:
             vectors = [_flat(misfit, _vectors(misfit, state))[rows] for state in states]
             thin = rr.Arrows2D.columns(vectors=np.concatenate(vectors), origins=points)
             recording.rows(f"map/{kind.name}/arrows", index, thin.partition(count))
-            style = rr.Arrows2D.from_fields(radii=[_on_screen(_THIN)], colors=[colours.SILVER])
+            style = rr.Arrows2D.from_fields(radii=[_THIN], colors=[colours.SILVER])
             recording.always(f"map/{kind.name}/arrows", style)
 
 
@@ -187,17 +187,11 @@ def panels(misfit: Misfit, legends: Sequence[Legend]) -> rrb.Tabs:
 def cursor(recording: Recording, index: Index, misfit: Misfit) -> None:
     """A ring around the dot of the current row, on every map."""
     points = _flat(misfit, misfit.place)
-    radius = _on_screen(_RING)
     for kind in misfit.kinds:
         entity = f"map/{kind.name}/here"
         recording.rows(entity, index, rr.Points2D.columns(positions=points))
-        white = rr.Points2D.from_fields(radii=[radius], colors=[(255, 255, 255, 120)])
+        white = rr.Points2D.from_fields(radii=[_RING], colors=[(255, 255, 255, 120)])
         recording.always(entity, white)
-
-
-def _on_screen(points: float) -> float:
-    """A radius in points of the screen at any zoom, which Rerun expects as a negative one."""
-    return -points
 
 
 def _flat(misfit: Misfit, vectors: Array) -> Array:
@@ -211,20 +205,17 @@ def map_views(misfit: Misfit) -> list[rrb.Spatial2DView]:
     points = _flat(misfit, misfit.place)[misfit.rows]
     across, down = bounds(points)
     plane = ", ".join("xyz"[k] for k in views_of(misfit.place[misfit.rows])[0])
+    arrows = f", arrows {drawn(misfit.magnify)}" if misfit.magnify else ""
     return [
         rrb.Spatial2DView(
             name=f"{kind.name.capitalize()} error [{kind.unit}] over {plane} [m]"
-            f"{_arrow_words(misfit, kind)}",
+            + arrows * (kind.name == "position"),
             origin=f"map/{kind.name}",
             background=rrb.Background(color=layout.GROUND),
             visual_bounds=rrb.VisualBounds2D(x_range=across, y_range=down),
         )
         for kind in misfit.kinds
     ]
-
-
-def _arrow_words(misfit: Misfit, kind: Kind) -> str:
-    return f", arrows {drawn(misfit.magnify)}" if kind.name == "position" and misfit.magnify else ""
 
 
 def misfit_words(misfit: Misfit) -> Sequence[str]:
@@ -260,11 +251,8 @@ def bounds(points: Array) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def draw_axes(recording: Recording, entity: str, points: Array, words: str) -> None:
-    """Two axes with round numbers in metres, for points (n, 2) whose second axis points down.
-
-    Args:
-        recording: where. entity: under which. points: what is in the map.
-        words: at the end of the bar, such as "5 mm".
+    """Two axes with round numbers in metres, for points (n, 2) whose second axis points down; the
+    bar of colours ends at ``words``, such as "5 mm".
     """
     low, high, size = _box(points)
     corner = np.array([low[0], high[1]])

@@ -34,12 +34,7 @@ _MIDDLE = Markup('<span class="middle"><i style="{}: 50%; width: {:.1f}%"></i></
 def write_page(
     found: Comparison | Diagnosis | Plan, path: str | Path, made: Made | None = None
 ) -> None:
-    """Write a result as one self-contained page.
-
-    Args:
-        found: the result.
-        path: the ``.html`` file; a temporary one takes its place when complete.
-        made: how it came about, for the page's foot.
+    """Write a result as one self-contained page; how it came about stands at the page's foot.
 
     Raises:
         InputFileError: the file cannot be written.

@@ -67,7 +67,7 @@ def map_section(
     title: str, problem: Problem, before: Drawn, after: Drawn, more: str = ""
 ) -> Panel | None:
     """Where the errors are."""
-    from crosscheck.show.error_map import caption, failure_map
+    from crosscheck.show.error_figures import caption, failure_map
 
     figure = Figure(failure_map(problem, before, after))
     return section(title, figure, Line(caption(problem, before) + more, "dim"))
@@ -77,14 +77,10 @@ def wall_section(
     title: str, problem: Problem, before: Drawn, after: Drawn, alone: str, key: Words = (),
     noise: str = "noise",
 ) -> Panel | None:  # fmt: skip
-    """What the errors of each cable look like.
-
-    Args:
-        title: of the section. problem, before, after: what is drawn.
-        alone: colour of errors that no effect accounts for. key: to the colours, if any.
-        noise: what the noise is called.
+    """What the errors of each cable look like, with a key to their colours; ``alone`` is that of
+    errors that no effect accounts for.
     """
-    from crosscheck.show.cable_wall import draw_wall, walls_of
+    from crosscheck.show.error_figures import draw_wall, walls_of
 
     walls = [Figure(draw_wall(wall, alone)) for wall in walls_of(problem, before, after)]
     words = (

@@ -31,11 +31,7 @@ if TYPE_CHECKING:
     from crosscheck.suite.results import CaseResult
     from crosscheck.suite.run import Run
 
-_STYLE = {
-    Outcome.AGREE: "green",
-    Outcome.DIFFER: "bold red",
-    Outcome.NOT_CONVERGED: "bold yellow",
-}
+_STYLE = {Outcome.AGREE: "green", Outcome.DIFFER: "bold red", Outcome.NOT_CONVERGED: "bold yellow"}
 # Failures told on the terminal; summary.md and results.json have them all.
 _MOST = 5
 # Columns of words, of the case's result, and those shown on any terminal.
@@ -72,13 +68,7 @@ _LOGARITHM = (
 
 
 def print_run(run: Run, out: Path, console: Console | None = None) -> None:
-    """Print the table, what needs a look, the verdict, and where the files are.
-
-    Args:
-        run: what to tell about.
-        out: the folder of results.
-        console: where to; standard output by default.
-    """
+    """Print the table, what needs a look, the verdict, and where the files are."""
     console = console_for(console)
     show(_on_terminal(run, out, console.width), console)
 
@@ -140,10 +130,7 @@ def _first(lines: list[str], name: str) -> Iterator[Block]:
 def guide_text(result: CaseResult, along: str, watched: int | None) -> str:
     """What to look at in a case, and its worst numbers.
 
-    Args:
-        result: the case's.
-        along: the timeline over the poses.
-        watched: the pose, counted from 0, whose settling is shown; None for no settling.
+    Poses are over the timeline ``along``; ``watched`` is the one whose settling is shown, if any.
     """
     case, robot, count = result.case, result.robot, len(result.case.poses)
     marks = _LINES if case.kind == "sweep" else _CROSSES
@@ -208,13 +195,8 @@ def pose_numbers_text(result: CaseResult, i: int, pose: Array) -> str:
 
 
 def instant_text(t_s: float, kinetic: float, distance: Array, slack: str) -> str:
-    """The numbers of one instant of a settling.
-
-    Args:
-        t_s: simulated time [s].
-        kinetic: kinetic energy [J].
-        distance: (2,) [m, rad] from SEECR's answer.
-        slack: names of slack cables.
+    """The numbers of one instant of a settling: time [s], kinetic energy [J], and the distance (2,)
+    [m, rad] from SEECR's answer.
     """
     rows = [
         ("from SEECR's answer", number(1e3 * distance[0], "mm")),

@@ -334,11 +334,7 @@ class CommandFile:
 
 
 def read_commands(path: str | Path, robot: Robot) -> CommandFile:
-    """Read a list of commands for a robot.
-
-    Args:
-        path: the CSV or Parquet file.
-        robot: for its number of cables, and its reference pose where the file states none.
+    """Read a list of commands for a robot from a CSV or Parquet file.
 
     Raises:
         InputFileError: with line and column of the mistake.

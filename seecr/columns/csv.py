@@ -122,19 +122,14 @@ def read_table(path: Path) -> Table:
     """Read a CSV or Parquet file (told apart by content, not by name).
 
     Raises:
-        InputFileError: missing, empty, of another kind, not UTF-8, or rows that do not fit the
-            header.
+        InputFileError: of another kind, not UTF-8, or rows that do not fit the header.
     """
-    data = _read_bytes(path)
+    if path.is_dir():
+        raise InputFileError.at(path, f"is a folder; {EXPECTED_FILE}")
+    data = read_bytes(path, EXPECTED_FILE)
     if data.startswith(_PARQUET_MAGIC):
         return _read_parquet(path)
     return _read_csv(path, data)
-
-
-def _read_bytes(path: Path) -> bytes:
-    if path.is_dir():
-        raise InputFileError.at(path, f"is a folder; {EXPECTED_FILE}")
-    return read_bytes(path, EXPECTED_FILE)
 
 
 def _decode(path: Path, data: bytes) -> str:
@@ -316,11 +311,9 @@ def _cell_fault(cell: str, blank_is_nan: bool) -> str | None:
 
 
 def table_text(columns: Mapping[str, Sequence[Any] | Array], digits: int | None = None) -> str:
-    """A table as CSV; numbers that are missing or not finite are empty cells.
+    """Columns of one length by name as CSV, with so many significant digits, or all.
 
-    Args:
-        columns: the values of each column by its name, all of one length.
-        digits: significant digits of numbers; all of them by default.
+    Numbers that are missing or not finite are empty cells.
     """
     rows = zip(*columns.values(), strict=True)
     lines = [",".join(_cell(value, digits) for value in row) for row in rows]

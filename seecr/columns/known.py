@@ -224,12 +224,7 @@ class Columns:
 
 
 def know_columns(table: Table, n_cables: int, cables: Sequence[str] = ()) -> Columns:
-    """Identify the columns of a table for a robot with ``n_cables`` cables.
-
-    Args:
-        table: the cells.
-        n_cables: how many cables the robot has.
-        cables: their names, which columns may have in place of a number.
+    """Identify the columns of a table; cables may have their names in place of a number.
 
     Raises:
         InputFileError: a missing or unknown unit, a repeated column, a cable that the robot does

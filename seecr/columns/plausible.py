@@ -10,14 +10,10 @@ from numpy.typing import ArrayLike
 from seecr.columns.known import POSITION, Columns
 from seecr.counted import figures
 from seecr.description.joints import off_joints
-from seecr.description.robot import ABSURD, Robot
+from seecr.description.robot import ABSURD as ABSURD  # for those who read commands
+from seecr.description.robot import Robot
 from seecr.pose import Array, quat_conjugate, quat_multiply, rotvec_from_quat
 from seecr.units import of_columns
-
-__all__ = [
-    "ABSURD", "away_from", "check_commands", "refuse_degrees", "scalar_last", "scalar_may_be_last",
-    "turned_from",
-]  # fmt: skip
 
 # Number of commands from which their median is meaningful.
 _SEVERAL = 4
@@ -153,11 +149,8 @@ def turned_from(quat: Array, of: Array) -> Array:
 
 
 def scalar_may_be_last(quat: Array, expected: Array, part: float = 1.0) -> bool:
-    """Whether quaternions (n, 4) are near those expected only if their last number is the scalar.
-
-    Args:
-        quat: as they stand, scalar first. expected: (n, 4).
-        part: of the rows that must be so, at the least.
+    """Whether quaternions (n, 4) are near those expected only with their last number as the scalar,
+    at this part of the rows at the least.
     """
     here = np.quantile(turned_from(quat, expected), 1.0 - part)
     there = np.quantile(turned_from(np.roll(quat, 1, axis=1), expected), part)

@@ -145,22 +145,12 @@ def _all_stated(columns: Columns, robot: Robot) -> bool:
 
 
 def _group(
-    columns: Columns,
-    of: tuple[str, str, str],
-    parts: tuple[str, ...],
-    free: NDArray[np.bool_],
-    reference: Array,
-    *,
-    blank_is_nan: bool = False,
-) -> Array:
+    columns: Columns, of: tuple[str, str, str], parts: tuple[str, ...], free: NDArray[np.bool_],
+    reference: Array, *, blank_is_nan: bool = False,
+) -> Array:  # fmt: skip
     """Three coordinates or angles (n, 3); the reference pose's where they cannot change.
 
-    Args:
-        columns: the file's.
-        of: the columns' prefix, the word for it, and a unit for errors.
-        parts: the coordinates' names.
-        free: (3,) which of them the robot can change. reference: (3,) the reference pose's.
-        blank_is_nan: whether cells may be empty.
+    ``of`` is the columns' prefix, the word for it, and a unit for errors.
 
     Raises:
         InputFileError: a missing column, or radians that must be degrees.

@@ -17,8 +17,6 @@ from seecr.units import millimetres
 if TYPE_CHECKING:
     from seecr.description.robot import Robot
 
-__all__ = ["check_robot", "fingerprint"]
-
 # Points that differ by less than this part of the longest cable are the same.
 _SAME = 1e-6
 # What a change of the other numbers means for a model.
@@ -72,26 +70,14 @@ class _Said:
         return InputFileError.at(self.path, f"[robot] {key}: {words}", line=self.line_of(key))
 
 
-def _nowhere(key: str) -> int | None:
-    """The line of a key in files without lines."""
-    return None
-
-
 def check_robot(
-    path: Path,
-    table: Any,
-    robot: Robot,
-    changed: str = _TWICE,
-    line_of: Callable[[str], int | None] = _nowhere,
-) -> tuple[str, ...]:
-    """Check that a model or a diagnosis was made for this robot.
+    path: Path, table: Any, robot: Robot, changed: str = _TWICE,
+    line_of: Callable[[str], int | None] = lambda _key: None,
+) -> tuple[str, ...]:  # fmt: skip
+    """Check that a file's table ``[robot]``, if any, describes this robot.
 
-    Args:
-        path: the file.
-        table: its ``[robot]``; None if the file has none, which is allowed.
-        robot: the one that it is to be used for.
-        changed: what it means if mass, stiffness and the like have changed.
-        line_of: the line of a key, for errors, in a file that has lines.
+    ``changed`` says what it means that mass or stiffness have changed, ``line_of`` gives a key's
+    line.
 
     Returns:
         notes about mass, stiffness and the like that have changed since.

@@ -9,11 +9,7 @@ from numpy.typing import NDArray
 
 from seecr.description.robot import Robot
 from seecr.errors import InputError
-from seecr.pose import (
-    Array,
-    cross,
-    pose_difference,
-)
+from seecr.pose import Array, cross, pose_difference
 
 # Allowed distance of a commanded pose from what the joints reach [robot's length, or rad].
 _OFF_MANIFOLD = 1e-6

@@ -13,8 +13,6 @@ from seecr.counted import between, counted
 from seecr.errors import InputError, RobotError
 from seecr.pose import LARGEST, Array, all_finite, quat_rotate, transform_points
 
-__all__ = ["ABSURD", "IDENTITY_POSE", "ITS_A_POINT", "Joint", "Robot"]
-
 ABSURD = 10.0
 """Commands and rest lengths beyond this many times the frame's reach are in another unit."""
 

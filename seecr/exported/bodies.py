@@ -140,13 +140,8 @@ def fastest(stiffness: float, mass: float) -> float:
 
 
 def drag(tension: float, length: float, mass: float, part: float) -> float:
-    """Drag coefficient [N s/m] of a part of a cable that damps its first mode critically.
-
-    Args:
-        tension: mean over the cable [N].
-        length: [m] of the cable.
-        mass: [kg] of the cable.
-        part: [kg], mass that the drag acts on.
+    """Drag coefficient [N s/m] that damps the first mode of a cable of this mean tension [N],
+    length [m] and mass [kg] critically, and acts on a part [kg] of it.
     """
     first = np.pi * np.sqrt(tension / (mass * length))
     return float(2.0 * first * part)
@@ -155,10 +150,8 @@ def drag(tension: float, length: float, mass: float, part: float) -> float:
 def take_steps(root: ET.Element, rate: float, damped: bool) -> None:
     """Write the time step of a file whose cables have bodies of their own, and say why.
 
-    Args:
-        root: with all its joints.
-        rate: angular frequency of the fastest motion of cables [1/s]; 0 if they have no bodies.
-        damped: whether they have masses, with drag.
+    Their fastest motion has the angular frequency ``rate`` [1/s], 0 without bodies; masses have
+    drag and are ``damped``.
     """
     if rate == 0.0:
         return
@@ -192,13 +185,7 @@ _ACROSS = "0.7071067811865476 -0.7071067811865476 0 0"
 
 
 def bodies_text(setup: Setup, solution: Solution, comment: str) -> str:
-    """The file at one solved pose.
-
-    Args:
-        setup: one row, as the effects left it.
-        solution: of it; the platform's equilibrium is the keyframe ``rest``.
-        comment: a sentence at the top.
-    """
+    """The file at one solved pose, its keyframe ``rest``, of one row as the effects left it."""
     robot = _described(setup)
     root, world, body = scene(robot, comment)
     tendons = ET.Element("tendon")

@@ -255,7 +255,10 @@ def export(robot: GivenRobot, effects: GivenEffects = (), at: ArrayLike | None =
     )  # fmt: skip
     mujoco_text = None
     if solution is not None:
-        mujoco_text = _for_mujoco(robot, _inside(said), place, solution)
+        inside = _inside(said)
+        setup = setup_with(inside, robot, Commands(place))
+        about = f"{robot.name} with {_names(inside)}; {_ALONE}"
+        mujoco_text = bodies_text(setup, solution, about)
     comment = f"{robot.name} with {_names(said.plain) or 'no effect'}; written by seecr export"
     plain_names, bodies, lengths = (
         tuple(one.name for one in group) for group in (said.plain, said.bodies, said.lengths)
@@ -312,13 +315,6 @@ def _softens(solution: Solution) -> bool:
 
 def _inside(said: Expressed) -> tuple[Effect, ...]:
     return (*said.plain, *said.bodies, *said.lengths)
-
-
-def _for_mujoco(
-    robot: Robot, effects: tuple[Effect, ...], pose: np.ndarray, solution: Solution
-) -> str:
-    comment = f"{robot.name} with {_names(effects)}; {_ALONE}"
-    return bodies_text(setup_with(effects, robot, Commands(pose)), solution, comment)
 
 
 def _names(effects: tuple[Effect, ...]) -> str:

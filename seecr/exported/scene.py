@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seecr.description.robot import Robot
-from seecr.pose import Array, quat_conjugate, quat_rotate
+from seecr.pose import quat_conjugate, quat_rotate
 
 _PLATFORM_COLOUR, _CABLE_COLOUR = "0.13 0.35 0.62 1", "0.10 0.12 0.14 1"
 
@@ -25,10 +25,6 @@ def scene(robot: Robot, comment: str) -> tuple[ET.Element, ET.Element, ET.Elemen
 
     The platform is at the reference pose, with its joints, mass and anchor points. Sites are named
     ``exit1``, ``anchor1`` and so on. Exit points and cables are left to the caller.
-
-    Args:
-        robot: what to write.
-        comment: a sentence at the top.
     """
     root = ET.Element("mujoco", model=robot.name)
     root.append(ET.Comment(f" {comment.replace('--', '- -')} "))
@@ -43,15 +39,9 @@ def scene(robot: Robot, comment: str) -> tuple[ET.Element, ET.Element, ET.Elemen
         rgb1="0.93 0.95 0.97", rgb2="0.6 0.68 0.76", width="64", height="384",
     )  # fmt: skip
     world = ET.SubElement(root, "worldbody")
-    ET.SubElement(
-        world, "light", pos=numbers_text(middle + extent_up(robot)), dir=numbers_text(-robot.up)
-    )
+    above = middle + float(np.linalg.norm(np.ptp(robot.exit_points, axis=0))) * robot.up
+    ET.SubElement(world, "light", pos=numbers_text(above), dir=numbers_text(-robot.up))
     return root, world, _platform(world, robot)
-
-
-def extent_up(robot: Robot) -> Array:
-    """Upward vector (3,) [m], as long as the extent of the exit points."""
-    return float(np.linalg.norm(np.ptp(robot.exit_points, axis=0))) * robot.up
 
 
 def _platform(world: ET.Element, robot: Robot) -> ET.Element:
@@ -93,23 +83,13 @@ def dot(robot: Robot) -> str:
 
 
 def cable(
-    tendons: ET.Element,
-    name: str,
-    path: Sequence[tuple[str, dict[str, str]]],
-    rest: float,
-    stiffness: Sequence[float],
-    width: float,
-) -> None:
-    """A spring that pulls and never pushes.
+    tendons: ET.Element, name: str, path: Sequence[tuple[str, dict[str, str]]], rest: float,
+    stiffness: Sequence[float], width: float,
+) -> None:  # fmt: skip
+    """A spring that pulls and never pushes, through elements with their attributes.
 
-    Args:
-        tendons: the file's ``tendon``.
-        name: of the cable.
-        path: elements that it goes through, with their attributes.
-        rest: its rest length [m].
-        stiffness: [N/m], and the coefficients of the square and cube of its stretch if it is
-            curved.
-        width: of its picture [m].
+    Its rest length and width are in [m]; to its stiffness [N/m] the coefficients of the square and
+    the cube of its stretch are added if it is curved.
     """
     spatial = ET.SubElement(
         tendons, "spatial", name=name, springlength=numbers_text(0.0, rest),

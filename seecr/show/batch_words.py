@@ -9,11 +9,7 @@ from numpy.typing import NDArray
 
 from seecr.counted import counted
 from seecr.inverse.correction import Correction
-from seecr.pose import (
-    Array,
-    pose_difference,
-    rotvec_from_quat,
-)
+from seecr.pose import Array, pose_difference, rotvec_from_quat
 from seecr.prediction.model import DataReach
 from seecr.prediction.uncertainty import Spread
 from seecr.show.pose_words import NO_TURN, SAGS, direction_words, sag_lines, three_figures
@@ -121,16 +117,11 @@ def sweep_lines(
 def chance_lines(
     found: Correction, kept: Array | None, minimum: bool = False, limited: bool = True
 ) -> Iterator[str]:
-    """The probability that tensions stay within their limits, if the model has a covariance.
+    """The probability (n,) that tensions stay within their limits, if the model has a covariance.
 
     Poses that are reached and the nearest of others are counted apart: the latter lie at the edge
-    of what the limits allow, so that no other distribution of tensions helps there.
-
-    Args:
-        found: the correction.
-        kept: (n,) probability of each row.
-        minimum: whether tensions were to be as small as possible.
-        limited: whether there is a highest tension, and so a middle of the limits.
+    of what the limits allow, so that no other distribution of tensions helps there. Tensions may
+    have been as small as possible (``minimum``), and limits without a highest have no middle.
     """
     if kept is None:
         return
@@ -231,13 +222,8 @@ def sag_lines_of(found: Workspace, effects: Collection[str]) -> Iterator[str]:
 def edge_line(
     found: Workspace, edge: Array, tolerance: float, at_least: float | None = None
 ) -> str:
-    """The number of poses on the edge, and how accurately they are known; or why there is none.
-
-    Args:
-        found: the workspace.
-        edge: (k, 7) poses.
-        tolerance: [m].
-        at_least: the probability to which that edge belongs, if any.
+    """The number of poses (k, 7) on the edge, and the tolerance [m]; or why there is none, also of
+    the edge that belongs to a probability.
     """
     if len(edge) == 0 and at_least is not None:
         every = bool(found.likely(at_least).all())

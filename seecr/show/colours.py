@@ -1,6 +1,8 @@
-"""Colours of figures, pages and recordings, distinguishable also with colour blindness."""
+"""Colours of figures, pages and recordings, and curves that coincide, which are drawn once."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,20 +38,10 @@ SLACK: Rgba = (165, 165, 165, 255)
 
 # Viridis (van der Walt and Smith, 2015) at 0.25, 0.35 ... 0.95, 1: even steps of lightness, so that
 # it also works in grey. Its darkest quarter is left out on a dark background.
-_VIRIDIS = np.array(
-    [
-        [59, 82, 139],
-        [46, 109, 142],
-        [37, 132, 142],
-        [30, 155, 138],
-        [45, 178, 125],
-        [86, 198, 103],
-        [136, 213, 72],
-        [195, 223, 35],
-        [253, 231, 37],
-    ],
-    dtype=float,
-)
+_VIRIDIS = np.array([
+    [59, 82, 139], [46, 109, 142], [37, 132, 142], [30, 155, 138], [45, 178, 125],
+    [86, 198, 103], [136, 213, 72], [195, 223, 35], [253, 231, 37],
+], dtype=float)  # fmt: skip
 
 
 def scale_colours(values: Array, top: float) -> Colours:
@@ -76,3 +68,36 @@ def round_up(value: float) -> float:
     power = 10.0 ** np.floor(np.log10(value))
     steps = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
     return float(power * next(s for s in steps if s * power >= value * (1.0 - 1e-12)))
+
+
+# Curves closer to each other than this part of the largest value coincide.
+_ALIKE = 1e-6
+
+
+def alike(curves: Sequence[Array]) -> list[list[int]]:
+    """Groups of indices of curves that coincide on all timelines.
+
+    Args:
+        curves: (n, k) for each timeline.
+    """
+    whole = np.concatenate([np.asarray(values, float) for values in curves])
+    near = _ALIKE * float(np.nanmax(np.abs(whole), initial=0.0))
+    groups: list[list[int]] = []
+    for k in range(whole.shape[1]):
+        for group in groups:
+            if np.allclose(whole[:, group[0]], whole[:, k], 0.0, near, equal_nan=True):
+                group.append(k)
+                break
+        else:
+            groups.append([k])
+    return groups
+
+
+def joined(names: Sequence[str]) -> str:
+    """Several names as one, with a common beginning only once, as in "cable1, 2"."""
+    first, *others = names
+    stem = first.rstrip("0123456789")
+    same = stem and all(
+        name.startswith(stem) and name[len(stem) :].isdigit() for name in (first, *others)
+    )
+    return ", ".join([first, *(name[len(stem) :] if same else name for name in others)])

@@ -19,13 +19,7 @@ STYLE: Any = {
 
 @contextmanager
 def figure(path: Path, rows: int = 1, columns: int = 1, **options: Any) -> Iterator[Any]:
-    """Axes (rows, columns) of a figure that is written to a file when the block ends.
-
-    Args:
-        path: the file; its extension selects the kind: png, svg, pdf.
-        rows, columns: of axes.
-        options: of ``matplotlib.pyplot.subplots``.
-    """
+    """Axes (rows, columns) of a figure that is written when the block ends, as png, svg or pdf."""
     import matplotlib
 
     with matplotlib.rc_context(STYLE):

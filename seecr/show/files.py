@@ -45,11 +45,8 @@ def load_columns(loads: Loads | None) -> dict[str, list[float]]:
 
 
 def toml_beside(told: bool, commands: Commands) -> str:
-    """The TOML that states how lengths are meant and where runs begin; empty for the defaults.
-
-    Args:
-        told: whether the lengths are told lengths.
-        commands: for where their runs begin.
+    """The TOML that states whether lengths are told ones and where runs begin; empty for the
+    defaults.
     """
     lines = []
     if told:
@@ -184,11 +181,8 @@ _WANT = [f"want_{name}" for name in COORDINATES]
 def corrected_csv(found: Correction, wanted: CommandFile) -> str:
     """The wanted poses and the lengths to command, one row per pose with an answer.
 
-    Numbers have all their digits: a length rounded to a micrometre is off by as much.
-
-    Args:
-        found: the correction.
-        wanted: the list that it is for, whose runs, times, temperatures and loads are kept.
+    Runs, times, temperatures and loads are those of the list. Numbers have all their digits: a
+    length rounded to a micrometre is off by as much.
     """
     columns: dict[str, Sequence[object] | Array] = dict(wanted.conditions)
     columns |= dict(zip(_WANT, found.wanted.T, strict=True))

@@ -10,8 +10,7 @@ import rerun.blueprint as rrb
 
 from seecr.description.robot import Robot
 from seecr.pose import Array
-from seecr.show import scene as scenes
-from seecr.show import shapes
+from seecr.show import scene
 from seecr.show.stream import POSE
 
 # Half the viewer's vertical field of view [rad], and the part of it to be filled.
@@ -29,17 +28,13 @@ GROUND = (24, 27, 33)
 def eye(
     robot: Robot, low: Array, high: Array, aspect: float, above: float | None = None
 ) -> rrb.EyeControls3D:
-    """A camera towards the wide side, from above and one side, as near as everything fits.
+    """A camera towards the wide side of a box, from above and one side, as near as everything fits.
 
-    Args:
-        robot: for its vertical.
-        low: (3,) corner of the visible box [m].
-        high: (3,) the opposite corner [m].
-        aspect: width over height of the view.
-        above: height of the camera over its distance; default: low.
+    The view is ``aspect`` times as wide as high; ``above`` is the height of the camera over its
+    distance, low by default.
     """
     up, span = robot.up, high - low
-    across, towards = shapes.front(robot, low, high)
+    across, towards = scene.front(robot, low, high)
     flat = float(np.abs(towards) @ span) < 0.05 * float(np.linalg.norm(span))
     aside, low_above = (0.12, 0.1) if flat else (0.42, 0.34)
     gaze = towards + aside * across + (low_above if above is None else above) * up
@@ -75,27 +70,13 @@ def _aim(low: Array, high: Array, gaze: Array, up: Array, aspect: float) -> tupl
 
 
 def scene_view(
-    robot: Robot,
-    low: Array,
-    high: Array,
-    name: str,
-    aspect: float,
-    contents: Sequence[str] = ("$origin/**",),
-    above: float | None = None,
-) -> rrb.Spatial3DView:
-    """The 3D view of one robot, or of some entities.
-
-    Args:
-        robot: for its vertical and its cables' names.
-        low, high: (3,) corners of the visible box [m].
-        name: of the view.
-        aspect: its approximate width over height.
-        contents: what is shown in it.
-        above: see :func:`eye`.
-    """
-    names, _words = shapes.cable_labels(robot, low, high)
+    robot: Robot, low: Array, high: Array, name: str, aspect: float,
+    contents: Sequence[str] = ("$origin/**",), above: float | None = None,
+) -> rrb.Spatial3DView:  # fmt: skip
+    """The 3D view of one robot in a box (3,), (3,) [m], or of some entities; see :func:`eye`."""
+    names, _words = scene.cable_labels(robot, low, high)
     return rrb.Spatial3DView(
-        origin=scenes.ROOT,
+        origin=scene.ROOT,
         contents=list(contents),
         name=name,
         background=rrb.Background(color=GROUND),
@@ -108,7 +89,7 @@ def scene_view(
         ),
         line_grid=_floor(robot, low, high),
         spatial_information=rrb.SpatialInformation(
-            target_frame=f"tf#/{scenes.ROOT}", show_axes=False
+            target_frame=f"tf#/{scene.ROOT}", show_axes=False
         ),
     )
 
@@ -147,32 +128,23 @@ def scene_and_lanes(
 ) -> rrb.Vertical:
     """The 3D view, its legend, and the lanes of all cables: up to ten, then with a scroll bar.
 
-    Args:
-        robot: the robot. poses: (k, 7) that the view has to contain. name: of the view.
-        root: of the lanes. count: of these.
-        wide: width of the column, relative to one of three.
+    The column is ``wide`` times as wide as one of three.
     """
-    low, high = shapes.extent(robot, poses)
+    low, high = scene.extent(robot, poses)
     share = min(_LANE_HEIGHT * (count + 1.2), 0.5)
     view = scene_view(robot, low, high, name, wide * _COLUMN_ASPECT / (0.87 - share))
     lanes = rrb.StateTimelineView(name="Which cables pull, which are slack", origin=root)
-    return rrb.Vertical(view, legend(scenes.LEGEND), lanes, row_shares=[0.9 - share, 0.1, share])
+    return rrb.Vertical(view, legend(scene.LEGEND), lanes, row_shares=[0.9 - share, 0.1, share])
 
 
 def blueprint(
-    root: rrb.Container,
-    *,
-    playback_speed: float = 1.0,
-    timeline: tuple[str, float] = (POSE, 1.0),
+    root: rrb.Container, *, playback_speed: float = 1.0, timeline: tuple[str, float] = (POSE, 1.0),
     poses_a_second: float = _FPS,
-) -> rrb.Blueprint:
-    """The layout of views, opened at a timeline, without other panels.
+) -> rrb.Blueprint:  # fmt: skip
+    """The layout of views, without other panels.
 
-    Args:
-        root: the views.
-        playback_speed: of timelines in seconds, relative to real time.
-        timeline: the one that it opens with, and its step between two poses.
-        poses_a_second: when playing a timeline of numbers.
+    It opens at a timeline, given with its step between two poses; the playback speed is that of
+    timelines in seconds, relative to real time.
     """
     return rrb.Blueprint(
         root,

@@ -47,25 +47,15 @@ _OUTSTANDING = 4.0
 
 
 def map_figure(
-    path: Path,
-    found: Workspace,
-    most: int = 4,
-    edge: Array | None = None,
+    path: Path, found: Workspace, most: int = 4, edge: Array | None = None,
     at_least: float | None = None,
-) -> None:
+) -> None:  # fmt: skip
     """Slices of a workspace: margins, and in equilibrium slack cables, deviation, rotation, if the
     platform can turn, and the stiffness of the softest direction.
 
-    If the map has probabilities, they come second.
-
-    Args:
-        path: the file.
-        found: the workspace, with two or three axes of more than one value.
-        most: most slices drawn; they are normal to the last axis, or to the one with a single
-            value. The title states how many there are in all.
-        edge: (k, 7) poses at the edge of the workspace; those in a slice are drawn as dots, instead
-            of the line between the poses of the grid.
-        at_least: the probability to which that edge belongs, if any; the line is drawn, too.
+    Probabilities, if there are any, come second. At most ``most`` slices are drawn, normal to the
+    last axis or to the one with a single value. Poses at the edge (k, 7) are dots, instead of the
+    line between the poses of the grid, or beside it if they belong to a probability.
 
     Raises:
         InputError: a grid with fewer than two axes of more than one value.
@@ -91,13 +81,12 @@ def map_figure(
             ax.set_title(f"{found.axis_names[cut.across]} = {at:.4g} {cut.unit}")
         for ax in axes[-1]:
             ax.set_xlabel(f"{found.axis_names[cut.wide]} [{cut.unit}]")
-        words = _UNBROKEN.sub(_on_one_line, "; ".join(_words(cut, edge, at_least)))
+        words = _UNBROKEN.sub(
+            lambda vector: vector[0].replace(" ", "\N{NO-BREAK SPACE}"),
+            "; ".join(_words(cut, edge, at_least)),
+        )
         title = [found.robot.name, *textwrap.wrap(words, int(_LETTERS * size[0]))]
         axes[0, 0].figure.suptitle("\n".join(title), fontsize=9)
-
-
-def _on_one_line(vector: re.Match[str]) -> str:
-    return vector[0].replace(" ", "\N{NO-BREAK SPACE}")
 
 
 @dataclass(frozen=True, eq=False)

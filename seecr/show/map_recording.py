@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from seecr.counted import counted
 from seecr.pose import Array
-from seecr.show import colours, layout, shapes
-from seecr.show.scene import LEGEND, ROOT, Scene, write_scale
+from seecr.show import colours, layout
+from seecr.show.scene import LEGEND, ROOT, Scene, extent, write_scale
 from seecr.show.stream import POSE, Recording, opening, place_index, recording_file
 from seecr.workspace.grid import Workspace, across_of, colour_end, directions_words, evenly_picked
 
@@ -30,12 +30,8 @@ _SURELY_NOT, _SURELY = 0.05, 0.95
 
 
 def write_map_recording(found: Workspace, path: str | Path, edge: Array | None = None) -> None:
-    """Write the robot and the positions at which its platform can be held.
-
-    Args:
-        found: the workspace.
-        path: the ``.rrd`` file.
-        edge: (k, 7) poses at the edge of the workspace.
+    """Write the robot, the positions at which its platform can be held, and the edge (k, 7) of
+    these.
 
     Raises:
         InputFileError: the file cannot be written.
@@ -50,7 +46,7 @@ def write_map_recording(found: Workspace, path: str | Path, edge: Array | None =
     corners = np.tile(robot.reference_pose, (2, 1))
     every = found.places.reshape(-1, 3)
     corners[:, :3] = every.min(axis=0), every.max(axis=0)
-    low, high = shapes.extent(robot, corners)
+    low, high = extent(robot, corners)
     contents = ("$origin/**", f"- /{HIDDEN}")
     view = layout.scene_view(robot, low, high, name, 1.9, contents)
     held = rrb.Vertical(view, layout.legend(LEGEND), row_shares=[0.9, 0.1], name="Can be held")
@@ -309,10 +305,7 @@ class Elastic:
 
 def _lost_words(found: Workspace) -> str:
     """At how many commands the platform is not at rest; nothing if there are none."""
-    whys = {
-        "does not come to rest": ~found.rests & ~found.free,
-        "is free to move": found.free,
-    }
+    whys = {"does not come to rest": ~found.rests & ~found.free, "is free to move": found.free}
     numbers = {why: int(poses.sum()) for why, poses in whys.items()}
     return " and ".join(
         f"{counted(number, 'command')} where it {why}" for why, number in numbers.items() if number

@@ -10,10 +10,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from seecr.curves import alike, joined
 from seecr.pose import Array, pose_difference
 from seecr.show import colours
-from seecr.show.colours import Rgba
+from seecr.show.colours import Rgba, alike, joined
 from seecr.show.stream import Index, Recording, entity_of
 
 MM, DEG = 1e3, 180.0 / np.pi
@@ -40,13 +39,10 @@ def line_by_runs(
     recording: Recording, entity: str, index: Index, values: Array, starts: NDArray[np.bool_],
     name: str, colour: Rgba, width: float,
 ) -> None:  # fmt: skip
-    """Draw numbers (n,) as a line that is interrupted between runs.
+    """Draw numbers (n,) as a line that is interrupted where runs start, (n,) bool.
 
     Every other run is on a second line of the same name: the viewer interrupts lines at gaps, and
     its legend shows the common name once.
-    Args:
-        recording: where. entity: what. index: the timelines. values: (n,).
-        starts: (n,) bool, first rows of runs. name, colour, width: of the line.
     """
     second = np.cumsum(starts) % 2 == 0
     both = np.stack([np.where(second, np.nan, values), np.where(second, values, np.nan)], axis=1)
@@ -72,12 +68,7 @@ def as_crosses(recording: Recording, entity: str, name: str, colour: Rgba, size:
 
 
 def deviation(poses: Array, command: Array) -> dict[str, Array]:
-    """Deviation from the command in millimetres and degrees, by name.
-
-    Args:
-        poses: (k, 7).
-        command: (k, 7) or (7,).
-    """
+    """Deviation of poses (k, 7) from commands (k, 7) or (7,) [mm, deg], by name."""
     change = pose_difference(poses, np.broadcast_to(command, poses.shape))
     parts = {name: change[:, i] * MM for i, name in enumerate(TRANSLATIONS)}
     parts |= {name: change[:, 3 + i] * DEG for i, name in enumerate(TURNS)}
@@ -92,13 +83,7 @@ def log10(values: Array) -> Array:
 def lane_states(
     slack: NDArray[np.bool_], differs: NDArray[np.bool_], known: NDArray[np.bool_]
 ) -> NDArray[np.object_]:
-    """Words (k, m) for each cable: taut, slack, differs between the two physics, no answer.
-
-    Args:
-        slack: (k, m).
-        differs: (k, m) where the two physics disagree.
-        known: (k,) whether there is an answer.
-    """
+    """Words (k, m) for each cable: taut, slack, differs between the two physics, no answer (k,)."""
     words = np.where(slack, SLACK, TAUT).astype(object)
     words[differs] = DIFFER
     words[~known] = NONE
@@ -158,9 +143,8 @@ class Legend:
 def legend_of(curves: Sequence[Array], names: Sequence[str], size: tuple[float, float]) -> Legend:
     """The corner in which a legend covers no curve, with a longer axis if necessary.
 
-    Args:
-        curves: (n, k) for each timeline, at times that are roughly evenly spaced.
-        names: in the legend. size: of the plot, in points of a window of 1920 by 1080.
+    Curves (n, k) of each timeline are at times that are roughly evenly spaced; the plot's size is
+    in points of a window of 1920 by 1080.
     """
     known = [values for values in curves if np.isfinite(values).any()]
     if not known or not names:
@@ -192,13 +176,7 @@ def legend_of(curves: Sequence[Array], names: Sequence[str], size: tuple[float, 
 def plot(
     name: str, contents: Sequence[str], legend: Legend, *, listed: bool = True
 ) -> rrb.TimeSeriesView:
-    """A plot with its legend inside.
-
-    Args:
-        name, contents: of the view.
-        legend: its place, and the range of values.
-        listed: whether there is a legend.
-    """
+    """A plot with its legend inside, if it is ``listed``."""
     axis = None if legend.values is None else rrb.ScalarAxis(range=legend.values)
     return rrb.TimeSeriesView(
         name=name,
@@ -222,10 +200,6 @@ def curves_of_cables(
     curves: Sequence[Array], names: Sequence[str], size: tuple[float, float]
 ) -> tuple[dict[int, str], Legend]:
     """Curves that coincide are drawn once, if their legend has room; else each by itself.
-
-    Args:
-        curves: (n, m) for each timeline. names: of the m cables.
-        size: of the plot, in points of a window of 1920 by 1080.
 
     Returns:
         For each cable that is drawn the names that its curve stands for, and the legend.

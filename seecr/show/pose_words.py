@@ -11,12 +11,7 @@ from seecr.counted import counted, figures
 from seecr.description.robot import Joint, Robot
 from seecr.equilibrium.saddles import NO_BARRIER, TWISTED, Barrier
 from seecr.equilibrium.search import elsewhere
-from seecr.pose import (
-    Array,
-    pose_difference,
-    rotvec_from_quat,
-    rxyz_from_quat,
-)
+from seecr.pose import Array, pose_difference, rotvec_from_quat, rxyz_from_quat
 from seecr.prediction.uncertainty import Spread
 from seecr.statics.solution import Solution, Status
 from seecr.statics.tables import Tables
@@ -48,11 +43,8 @@ _DECIMALS = 9
 
 
 def pose_lines(solution: Solution, spread: Spread | None = None) -> Iterator[str]:
-    """The equilibrium of the first pose, and how far it is from its command.
-
-    Args:
-        solution: of commanded poses.
-        spread: standard deviations, if the model has a covariance.
+    """The equilibrium of the first pose, with standard deviations if the model has a covariance,
+    and how far it is from its command.
     """
     yield f"{solution.robot.name}: {solution.sentence(0)}"
     pose, away = solution.pose[0], solution.deviation[0]
@@ -259,12 +251,8 @@ def bar_lines(at_rest: Bars, at_command: Bars) -> Iterator[str]:
 def other_lines(
     solution: Solution, others: Solution | None, passes: Sequence[Barrier] = ()
 ) -> Iterator[str]:
-    """Where else the platform could rest, and the difference in energy.
-
-    Args:
-        solution: the equilibria found.
-        others: those of the first command.
-        passes: barriers to each of the other equilibria, if they were computed.
+    """Where else the platform could rest at the first command, the difference in energy, and the
+    barriers on the way, if they were computed.
     """
     if others is None or np.isnan(solution.tensions[0]).any():
         return  # there is none to be another of
@@ -280,12 +268,14 @@ def other_lines(
         k, gap = away[n], gaps[n]
         about, angles = _turn(solution.robot, others.pose[k, 3:])
         slack = [c for c, s in zip(solution.robot.cable_names, others.slack[k], strict=True) if s]
+        more = others.energy[k] - solution.energy[0]
+        energy = f"{joules(more, '+.4g')}, " if np.isfinite(more) else ""
         line = (
             f"could also rest {millimetres(np.linalg.norm(gap[:3]))} and "
             f"{np.degrees(np.linalg.norm(gap[3:])):.4g} deg away: at "
             f"{three_figures(np.round(1e3 * others.pose[k, :3], 1), '.7g')} mm, turned {about} "
             f"{three_figures(angles, '.4g')} deg, "
-            f"{_more_energy(others.energy[k] - solution.energy[0])}slack: "
+            f"{energy}slack: "
             f"{' '.join(slack) or 'none'}"
         )
         if passes:
@@ -303,11 +293,6 @@ def unsought_lines(effects: Sequence[str]) -> Iterator[str]:
             f"other equilibria are not sought: with {', '.join(effects)}, what the cables did "
             "before decides where the platform rests"
         )
-
-
-def _more_energy(more: float) -> str:
-    """The difference in energy, if both have one."""
-    return f"{joules(more, '+.4g')}, " if np.isfinite(more) else ""
 
 
 def three_figures(values: Array, form: str) -> str:

@@ -1,21 +1,170 @@
-"""The 3D view and the legend of its colours below it.
-
-It shows frame, platforms and cables, at every pose and at every instant of a settling.
-"""
+"""The 3D view, at every pose and at every instant of a settling, and the legend of its colours."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 
 from seecr.description.robot import Robot
-from seecr.pose import Array, transform_points
-from seecr.show import colours, shapes
-from seecr.show.colours import Rgba
-from seecr.show.shapes import States
+from seecr.pose import Array, quat_rotate, transform_points
+from seecr.show import colours
+from seecr.show.colours import Rgba, joined
 from seecr.show.stream import Index, Recording
+
+# Slack cables are drawn as this many dashes of this many points.
+DASHES, _DASH_POINTS = 12, 3
+# A cable that is far too long is drawn with a sag of no more than this part of its span.
+_DEEPEST = 0.35
+# Thickness of a flat platform, relative to its largest side.
+_FLAT = 0.12
+# Exit points closer than this, relative to the robot's size, share a label; else labels overlap.
+_NEAR = 0.1
+# Points nearer than the centre by more than the first number, relative to the robot's size, are in
+# front; their labels are raised by the second.
+_BEFORE, _LIFT = 0.05, 0.08
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """Poses and cables at k commands, or at k instants.
+
+    Attributes:
+        pose: (k, 7); rows with NaN are not drawn.
+        tensions: (k, m) [N].
+        rest_lengths: (k, m) [m].
+        slack: (k, m).
+    """
+
+    pose: Array
+    tensions: Array
+    rest_lengths: Array
+    slack: NDArray[np.bool_]
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Whether each row has an answer, (k,)."""
+        return np.asarray(np.isfinite(self.pose).all(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """The platform as a box around its anchor points, platform frame.
+
+    Attributes:
+        half_size: (3,) [m].
+        centre: (3,) [m].
+    """
+
+    half_size: Array
+    centre: Array
+
+    def centres(self, poses: Array) -> Array:
+        """Centres (n, 3) [m] in the base frame at poses (n, 7)."""
+        return poses[:, :3] + quat_rotate(poses[:, 3:], self.centre)
+
+
+def platform_box(robot: Robot, size: float) -> Box:
+    """Box around the anchor points; a flat one is given some thickness, a point some of the robot's
+    size [m].
+    """
+    low, high = robot.anchor_points.min(axis=0), robot.anchor_points.max(axis=0)
+    half = (high - low) / 2.0
+    thinnest = max(_FLAT * float(half.max()), 0.006 * size)
+    return Box(np.maximum(half, thinnest), (low + high) / 2.0)
+
+
+def extent(robot: Robot, poses: Array) -> tuple[Array, Array]:
+    """Corners (3,), (3,) [m] of the visible box: exit points and the platform's poses."""
+    seen = poses[np.isfinite(poses).all(axis=-1)]
+    anchors = transform_points(seen, robot.anchor_points).reshape(-1, 3)
+    points = np.concatenate([robot.exit_points, anchors, seen[:, :3]])
+    return points.min(axis=0), points.max(axis=0)
+
+
+def front(robot: Robot, low: Array, high: Array) -> tuple[Array, Array]:
+    """Directions (3,) along the wide side of the visible box, and towards the viewer.
+
+    Args:
+        robot: for its vertical. low, high: (3,) corners of the visible box [m].
+    """
+    span = high - low
+    across = np.eye(3)[int(np.argmax(span - np.abs(robot.up) * span))]
+    towards = np.cross(across, robot.up)
+    return across, towards / max(float(np.linalg.norm(towards)), 1e-9)
+
+
+def cable_labels(robot: Robot, low: Array, high: Array) -> tuple[Array, list[str]]:
+    """Positions (k, 3) [m] and texts of cables' labels, one for exit points close to each other.
+
+    The viewer draws labels below their points. Those in front of the visible box are raised above
+    them, clear of those behind.
+    """
+    points, size = robot.exit_points, float(np.linalg.norm(high - low))
+    groups: list[list[int]] = []
+    for k, point in enumerate(points):
+        apart = [float(np.linalg.norm(points[group[0]] - point)) for group in groups]
+        near = int(np.argmin(apart)) if apart else 0
+        if apart and apart[near] < _NEAR * size:
+            groups[near].append(k)
+        else:
+            groups.append([k])
+    places = np.stack([points[group].mean(axis=0) for group in groups])
+    depth = (places - points.mean(axis=0)) @ front(robot, low, high)[1]
+    places += np.where(depth > _BEFORE * size, _LIFT * size, 0.0)[:, None] * robot.up
+    return places, [joined([robot.cable_names[k] for k in group]) for group in groups]
+
+
+def frame_edges(low: Array, high: Array) -> list[Array]:
+    """Edges of the box between two corners, as strips (2, 3) [m]; a flat one has four."""
+    flat = (high - low) < 1e-3 * float(np.max(high - low))
+    edges = []
+    for axis in range(3):
+        others = [k for k in range(3) if k != axis]
+        for corner in np.ndindex(2, 2):
+            ends = np.array([low, low], dtype=float)
+            ends[1, axis] = high[axis]
+            for k, side in zip(others, corner, strict=True):
+                ends[:, k] = high[k] if side else low[k]
+            doubled = any(flat[k] and side for k, side in zip(others, corner, strict=True))
+            if not flat[axis] and not doubled:
+                edges.append(ends)
+    return edges
+
+
+def taut_strips(robot: Robot, poses: Array, slack: NDArray[np.bool_]) -> list[Array]:
+    """Straight lines (2, 3) [m] of the cables that pull, pose by pose."""
+    anchors = transform_points(poses, robot.anchor_points)
+    exits = np.broadcast_to(robot.exit_points, anchors.shape)
+    return list(np.stack([exits, anchors], axis=2)[~slack])
+
+
+def slack_strips(
+    robot: Robot, poses: Array, slack: NDArray[np.bool_], rest_lengths: Array
+) -> list[Array]:
+    """Dashes of the slack cables (n, m), pose by pose (n, 7); a fixed number per cable.
+
+    A slack cable has no weight in the statics, and thus no shape of its own. It is drawn as the
+    shallow parabola of its length l0 [m], whose sag s over a span d follows from l0 = d + 8 s^2 /
+    (3 d).
+    """
+    anchors = transform_points(poses, robot.anchor_points)
+    start = np.broadcast_to(robot.exit_points, anchors.shape)[slack]
+    end = anchors[slack]
+    span = np.linalg.norm(end - start, axis=-1)
+    loose = np.maximum(rest_lengths[slack] - span, 0.0)
+    sag = np.minimum(np.sqrt(3.0 * span * loose / 8.0), _DEEPEST * span)
+    # fractions along a cable, 0 to 1, of the dashes' points, (dashes, points)
+    begin = np.arange(DASHES) / (DASHES - 0.4)
+    part = begin[:, None] + np.linspace(0.0, 0.6 / (DASHES - 0.4), _DASH_POINTS)
+    part = part[None, :, :, None]
+    chord = start[:, None, None] + part * (end - start)[:, None, None]
+    drop = sag[:, None, None, None] * 4.0 * part * (1.0 - part) * -robot.up
+    return list((chord + drop).reshape(-1, _DASH_POINTS, 3))
+
 
 ROOT, LEGEND = "scene", "legend"
 # Radii of lines, relative to the robot's size.
@@ -39,9 +188,9 @@ class Scene:
 
     def __init__(self, recording: Recording, robot: Robot, poses: Array, top: float) -> None:
         self.recording, self.robot, self.top = recording, robot, top
-        self.low, self.high = shapes.extent(robot, poses)
+        self.low, self.high = extent(robot, poses)
         self.size = float(np.linalg.norm(self.high - self.low))
-        self.box = shapes.platform_box(robot, self.size)
+        self.box = platform_box(robot, self.size)
 
     def surroundings(self) -> None:
         """Draw what does not move: axes, frame, and exit points with the names of cables."""
@@ -50,20 +199,16 @@ class Scene:
         record.always(
             f"{ROOT}/frame",
             rr.LineStrips3D(
-                shapes.frame_edges(self.low, self.high),
+                frame_edges(self.low, self.high),
                 radii=_FRAME * self.size,
                 colors=colours.FRAME,
             ),
         )
         record.always(
             f"{ROOT}/exit_points",
-            rr.Points3D(
-                robot.exit_points,
-                radii=1.5 * _FRAME * self.size,
-                colors=colours.SILVER,
-            ),
+            rr.Points3D(robot.exit_points, radii=1.5 * _FRAME * self.size, colors=colours.SILVER),
         )
-        places, names = shapes.cable_labels(robot, self.low, self.high)
+        places, names = cable_labels(robot, self.low, self.high)
         words = rr.Points3D(
             places, radii=0.0, colors=colours.SILVER, labels=names, show_labels=True
         )
@@ -121,10 +266,10 @@ class Scene:
         poses = np.where(known[:, None], states.pose, self.robot.reference_pose)
         self._taut(f"{ROOT}/{name}/cables/taut", index, states, poses)
         slack = states.slack & known[:, None]
-        strips = shapes.slack_strips(self.robot, poses, slack, states.rest_lengths)
+        strips = slack_strips(self.robot, poses, slack, states.rest_lengths)
         entity = f"{ROOT}/{name}/cables/slack"
         columns = rr.LineStrips3D.columns(strips=strips)
-        counts = slack.sum(axis=1) * shapes.dashes_per_cable()
+        counts = slack.sum(axis=1) * DASHES
         self.recording.rows(entity, index, columns.partition(counts))
         style = rr.LineStrips3D.from_fields(radii=[_LOOSE * self.size], colors=[colours.SLACK])
         self.recording.always(entity, style)
@@ -132,7 +277,7 @@ class Scene:
     def _taut(self, entity: str, index: Index, states: States, poses: Array) -> None:
         pulls = ~states.slack & states.known[:, None]
         columns = rr.LineStrips3D.columns(
-            strips=shapes.taut_strips(self.robot, poses, ~pulls),
+            strips=taut_strips(self.robot, poses, ~pulls),
             colors=colours.scale_colours(states.tensions[pulls], self.top),
         )
         self.recording.rows(entity, index, columns.partition(pulls.sum(axis=1)))
@@ -157,14 +302,8 @@ def write_legend(recording: Recording, top: float, who: Mapping[str, Rgba] = PHY
 def write_scale(
     recording: Recording, top: float, words: str = "", unit: str = "N", entity: str = LEGEND
 ) -> None:
-    """The colour scale from 0 to ``top``, and words on what it means.
-
-    Args:
-        recording: where.
-        top: end of the scale, in the unit; without a unit it counts, in whole numbers.
-        words: on its meaning.
-        unit: of its numbers, "" for counts.
-        entity: the legend's.
+    """The colour scale from 0 to ``top``, and words on what it means; without a unit it counts, in
+    whole numbers.
     """
     left, right, y = _BAR
     steps = _SLICES if unit else round(top) + 1

@@ -120,16 +120,14 @@ def settling_index(t_s: Array) -> rr.TimeColumn:
 def recording_file(path: str | Path, name: str, blueprint: rrb.Blueprint) -> Iterator[Recording]:
     """Write a recording; nothing is left at ``path`` unless all of it was written.
 
-    Args:
-        path: the ``.rrd`` file.
-        name: the recording's name in the viewer; it is also its identity, so that a newer recording
-            of the same case replaces it there.
-        blueprint: the layout, embedded.
+    Its name in the viewer is its identity, too: a newer one of the same case replaces it there.
 
     Raises:
         InputFileError: the file cannot be written.
     """
-    stream = rr.RecordingStream(_application(name), recording_id=name)
+    # the viewer keeps one layout per application, and several recordings may be open together
+    application = "crosscheck-" + re.sub(r"[^A-Za-z0-9_-]", "-", name)
+    stream = rr.RecordingStream(application, recording_id=name)
     with written(Path(path), failure="cannot write the recording") as (partial,):
         try:
             partial.touch()  # Rerun reports a folder that is not writable only in its log
@@ -139,11 +137,3 @@ def recording_file(path: str | Path, name: str, blueprint: rrb.Blueprint) -> Ite
             stream.flush()
         finally:
             stream.disconnect()
-
-
-def _application(name: str) -> str:
-    """An application ID for each recording, in characters that Rerun accepts.
-
-    The viewer keeps one layout per application, and several recordings may be open together.
-    """
-    return "crosscheck-" + re.sub(r"[^A-Za-z0-9_-]", "-", name)

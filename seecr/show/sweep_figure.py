@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr.counted import counted
-from seecr.curves import alike
 from seecr.pose import Array, pose_difference
 from seecr.prediction.uncertainty import Spread
-from seecr.show.colours import COLOURS
+from seecr.show.colours import COLOURS, alike
 from seecr.show.figures import figure
 from seecr.statics.solution import Solution
 from seecr.workspace.bars import BarManifold, Midlines, midline_points
@@ -35,29 +34,16 @@ _JUMP: dict[str, Any] = {"color": "black", "linestyle": (0, (1, 2)), "linewidth"
 
 
 def sweep_figure(
-    path: Path,
-    solution: Solution,
-    commanded: bool = True,
-    wanted: bool = False,
-    runs: ArrayLike | None = None,
-    spread: Spread | None = None,
-    zones: Sequence[SlackSpan] = (),
+    path: Path, solution: Solution, commanded: bool = True, wanted: bool = False,
+    runs: ArrayLike | None = None, spread: Spread | None = None, zones: Sequence[SlackSpan] = (),
     bar: BarManifold | None = None,
-) -> None:
+) -> None:  # fmt: skip
     """Deviation, rotation if it can turn, tensions and slack cables along a sweep.
 
     If it can turn and hangs on two pairs of parallel cables in a plane, also how far the paper's
     point V or H is beside the line of the weight. If it was followed, dotted lines mark its jumps.
-
-    Args:
-        path: the file.
-        solution: of the sweep.
-        commanded: whether poses were commanded, and not lengths.
-        wanted: whether these poses are wanted ones that lengths were commanded for.
-        runs: (n,) run of each pose; lines are interrupted between runs. Default: one run.
-        spread: standard deviations of poses and tensions, drawn as bands.
-        zones: of slack cables, shaded; without them slack cables change half way between poses.
-        bar: tilts beside the manifold, if the robot is a bar on two cables.
+    Lines are interrupted between runs (n,), standard deviations are bands, zones of slack cables
+    are shaded; without zones slack cables change half way between poses.
     """
     at, label = _along(solution, commanded, "wanted" if wanted else "commanded")
     mark: dict[str, Any] = {"marker": "o", "markersize": 2.5, "linewidth": 1.1}
@@ -80,8 +66,12 @@ def sweep_figure(
             panel(ax, whole)
         axes[0, 0].set_title(solution.robot.name)
         axes[-1, 0].set_xlabel(label)
-        if spread is not None:
-            _name_band(axes[0, 0])
+        if spread is not None:  # bands have all colours
+            from matplotlib.patches import Patch
+
+            handles, _names = axes[0, 0].get_legend_handles_labels()
+            band = Patch(color="0.3", label="± one standard\ndeviation", **_BAND)
+            _legend(axes[0, 0], handles=[*handles, band])
 
 
 def _along(solution: Solution, commanded: bool, word: str) -> tuple[Array, str]:
@@ -228,14 +218,6 @@ def _curves(
 def _legend(ax: Any, **more: Any) -> None:
     """A legend beside the axes, where it covers nothing."""
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, **more)
-
-
-def _name_band(ax: Any) -> None:
-    """Add the meaning of bands to the legend of the first axes, since bands have all colours."""
-    from matplotlib.patches import Patch
-
-    handles, _names = ax.get_legend_handles_labels()
-    _legend(ax, handles=[*handles, Patch(color="0.3", label="± one standard\ndeviation", **_BAND)])
 
 
 def _slack(ax: Any, whole: _Sweep) -> None:

@@ -11,8 +11,7 @@ from seecr.pose import Array
 from seecr.show import colours, layout, plots
 from seecr.show.colours import COMMAND, SEECR
 from seecr.show.plots import legend_of
-from seecr.show.scene import Scene, write_legend
-from seecr.show.shapes import States
+from seecr.show.scene import Scene, States, write_legend
 from seecr.show.stream import (
     Index,
     Recording,
@@ -31,12 +30,7 @@ _TITLES = {_AWAY: "Deviation from the command [mm]", _TURN: "Rotation from the c
 
 
 def write_sweep_recording(solution: Solution, path: str | Path, commanded: bool = True) -> None:
-    """Write a sweep for the Rerun viewer.
-
-    Args:
-        solution: of the sweep.
-        path: the ``.rrd`` file.
-        commanded: whether poses were commanded, and not lengths.
+    """Write a sweep, of commanded poses or of lengths, for the Rerun viewer.
 
     Raises:
         InputFileError: the file cannot be written.
@@ -45,8 +39,14 @@ def write_sweep_recording(solution: Solution, path: str | Path, commanded: bool 
     seen = np.concatenate([solution.command, solution.pose])
     top = colours.round_up(float(np.nanmax(solution.tensions, initial=0.0)))
     index = sweep_index(solution.command) if commanded else [pose_index(len(solution))]
-    layouts = _blueprint(solution, seen, name, commanded, opening(index))
-    with recording_file(path, name, layouts) as recording:
+    off = _off_command(solution) if commanded else {}
+    size = _WIDTH, 1000.0 / (1 + len(off)) - 55.0
+    views = [_component_view(root, parts, size) for root, parts in off.items()]
+    views.append(plots.tension_view([solution.tensions], robot.cable_names, size, [_PULL]))
+    left = layout.scene_and_lanes(robot, seen, name, _LANES, robot.n_cables, 1.2)
+    root = rrb.Horizontal(left, rrb.Vertical(*views), column_shares=[6, 5])
+    opens = layout.blueprint(root, timeline=opening(index))
+    with recording_file(path, name, opens) as recording:
         scene = Scene(recording, robot, seen, top)
         scene.surroundings()
         scene.platform("seecr", index, solution.pose, SEECR, solid=True)
@@ -57,25 +57,7 @@ def write_sweep_recording(solution: Solution, path: str | Path, commanded: bool 
             scene.platform("command", index, solution.command, COMMAND)
             who = {"command": COMMAND, **who}
         write_legend(recording, top, who)
-        _plots(recording, index, solution, commanded, _size(solution, commanded))
-
-
-def _blueprint(
-    solution: Solution, seen: Array, name: str, commanded: bool, timeline: tuple[str, float]
-) -> rrb.Blueprint:
-    robot = solution.robot
-    left = layout.scene_and_lanes(robot, seen, name, _LANES, robot.n_cables, 1.2)
-    off = _off_command(solution) if commanded else {}
-    size = _size(solution, commanded)
-    drawn = [_component_view(_TITLES[root], root, parts, size) for root, parts in off.items()]
-    drawn.append(plots.tension_view([solution.tensions], robot.cable_names, size, [_PULL]))
-    root = rrb.Horizontal(left, rrb.Vertical(*drawn), column_shares=[6, 5])
-    return layout.blueprint(root, timeline=timeline)
-
-
-def _size(solution: Solution, commanded: bool) -> tuple[float, float]:
-    """Of a plot, in points of a window of 1920 by 1080."""
-    return _WIDTH, 1000.0 / (2 + solution.robot.turns if commanded else 1) - 55.0
+        _plots(recording, index, solution, off, size)
 
 
 def _off_command(solution: Solution) -> dict[str, dict[str, Array]]:
@@ -86,17 +68,16 @@ def _off_command(solution: Solution) -> dict[str, dict[str, Array]]:
 
 
 def _component_view(
-    title: str, root: str, parts: dict[str, Array], size: tuple[float, float]
+    root: str, parts: dict[str, Array], size: tuple[float, float]
 ) -> rrb.TimeSeriesView:
     curves = np.stack(list(parts.values()), axis=1)
-    return plots.plot(title, [f"{root}/**"], legend_of([curves], list(parts), size))
+    return plots.plot(_TITLES[root], [f"{root}/**"], legend_of([curves], list(parts), size))
 
 
 def _plots(
-    recording: Recording, index: Index, solution: Solution, commanded: bool,
+    recording: Recording, index: Index, solution: Solution, off: dict[str, dict[str, Array]],
     size: tuple[float, float],
 ) -> None:  # fmt: skip
-    off = _off_command(solution) if commanded else {}
     lines = [(root, *line) for root, parts in off.items() for line in parts.items()]
     for (root, name, values), colour in zip(lines, colours.SERIES, strict=False):
         entity = f"{root}/{entity_of(name)}"
@@ -109,6 +90,5 @@ def _plots(
         recording.scalars(entity, index, solution.tensions[:, k])
         plots.as_line(recording, entity, said.get(k, names[k]), colour, 1.5)
     known = np.asarray(np.isfinite(solution.pose).all(axis=1))
-    nowhere = np.zeros(solution.slack.shape, dtype=bool)
-    states = plots.lane_states(solution.slack, nowhere, known)
+    states = plots.lane_states(solution.slack, solution.slack & False, known)
     plots.write_lanes(recording, _LANES, index, names, states)

@@ -22,40 +22,20 @@ if TYPE_CHECKING:
     from seecr.workspace.zones import Zone, feasible, slack_zones, tension_margin
 
 __all__ = [
-    "BarBalance",
-    "BarManifold",
-    "Midlines",
-    "SlackSpan",
-    "Workspace",
-    "Zone",
-    "bar_balances",
-    "bar_manifold",
-    "boundary",
-    "default_axes",
-    "feasible",
-    "held_chance",
-    "kept_chance",
-    "midline_points",
-    "slack_spans",
-    "slack_zones",
-    "tension_margin",
-    "workspace_map",
-]
+    "BarBalance", "BarManifold", "Midlines", "SlackSpan", "Workspace", "Zone", "bar_balances",
+    "bar_manifold", "boundary", "default_axes", "feasible", "held_chance", "kept_chance",
+    "midline_points", "slack_spans", "slack_zones", "tension_margin", "workspace_map",
+]  # fmt: skip
 
 _MODULES = {
     "bars": (
-        "BarBalance",
-        "BarManifold",
-        "bar_balances",
-        "bar_manifold",
-        "Midlines",
-        "midline_points",
+        "BarBalance", "BarManifold", "bar_balances", "bar_manifold", "Midlines", "midline_points",
     ),
     "margins": ("held_chance", "kept_chance", "boundary"),
     "grid": ("Workspace",),
     "maps": ("default_axes", "workspace_map"),
     "spans": ("SlackSpan", "slack_spans"),
     "zones": ("Zone", "feasible", "slack_zones", "tension_margin"),
-}
+}  # fmt: skip
 
 __getattr__ = lazily(__name__, {name: m for m, names in _MODULES.items() for name in names})

@@ -20,16 +20,6 @@ from seecr.statics.solution import Solution, check_solution
 from seecr.statics.starts import commanded_poses
 from seecr.workspace.planar import BarRest, bar_equilibria, bar_tilt, midline_point
 
-__all__ = [
-    "BarBalance",
-    "BarManifold",
-    "Midlines",
-    "bar_balances",
-    "bar_manifold",
-    "midline_points",
-]
-
-
 # Points are in a plane, and the weight in the bar's middle, to this part of the robot's length.
 _OFF = 1e-9
 # A pose is one of the equilibria if its tilt is within this of it [rad].

@@ -17,23 +17,7 @@ from seecr.pose import Array, cross
 from seecr.result import MOTION, Record, Result, named, rows_of
 from seecr.statics.solution import Status
 from seecr.units import millimetres
-from seecr.workspace.margins import is_held
-
-__all__ = [
-    "NEVER",
-    "STATUSES",
-    "Workspace",
-    "across_of",
-    "codes_of",
-    "colour_end",
-    "directions_words",
-    "evenly_picked",
-    "grid_ends",
-    "own_directions",
-    "refuse_other_joints",
-    "refuse_unreached",
-]
-
+from seecr.workspace.zones import is_held
 
 # How far a grid extends: over the exit points, as far below home as above, within the joints.
 #
@@ -93,15 +77,12 @@ def _home(robot: Robot, directions: Array | None) -> Array:
 
 
 def grid_ends(robot: Robot, turned: Array) -> tuple[Array, Array]:
-    """Lowest and highest x, y, z (3,) [m] of a grid over the exit points, or of its own u, v, w.
+    """Lowest and highest x, y, z (3,) [m] of a grid over the exit points, or of its own u, v, w,
+    for poses that are ``turned`` (4,).
 
     It has room for exit points mirrored in the level plane through the reference position, that is,
     against gravity. It ends on the robot's floor, and does not leave the plane or line in which
     joints keep the platform.
-
-    Args:
-        robot: as described.
-        turned: (4,) quaternion of the grid's poses.
     """
     home, directions = robot.reference_pose[:3], own_directions(robot)
     above = robot.exit_points[(robot.exit_points - home) @ robot.up > 0.0]
@@ -247,7 +228,10 @@ class Workspace(Result):
     @property
     def places(self) -> Array:
         """(nx, ny, nz, 3) positions x, y and z [m] of the grid's poses."""
-        own = np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1)
+        return self._in_base(np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1))
+
+    def _in_base(self, own: Array) -> Array:
+        """Values (..., 3) along the grid's axes as positions x, y and z [m]."""
         return own if self.directions is None else np.asarray(own @ self.directions)
 
     def along_axes(self, places: Array) -> Array:
@@ -288,10 +272,9 @@ class Workspace(Result):
         pairs = pairs[inside[pairs[:, 0]] != inside[pairs[:, 1]]]
         pairs = np.where(inside[pairs[:, :1]], pairs, pairs[:, ::-1])
         index = np.unravel_index(pairs, poses.shape)
-        places = np.stack([axis[k] for axis, k in zip(self.axes, index, strict=True)], axis=-1)
-        places = places if self.directions is None else places @ self.directions
+        own = np.stack([axis[k] for axis, k in zip(self.axes, index, strict=True)], axis=-1)
         turned = np.broadcast_to(self.orientation, (*pairs.shape, 4))
-        both = np.concatenate([places, turned], axis=-1)
+        both = np.concatenate([self._in_base(own), turned], axis=-1)
         return both[:, 0], both[:, 1]
 
     @property
@@ -324,8 +307,9 @@ class Workspace(Result):
 
     def _at(self, index: tuple[int, ...]) -> list[float]:
         """x, y and z [m] of a pose of the grid."""
-        own = [float(axis[k]) for axis, k in zip(self.axes, index, strict=True)]
-        return own if self.directions is None else (np.array(own) @ self.directions).tolist()
+        own = [axis[k] for axis, k in zip(self.axes, index, strict=True)]
+        place: list[float] = self._in_base(np.array(own)).tolist()
+        return place
 
     @property
     def cell(self) -> float:
@@ -437,26 +421,22 @@ class Workspace(Result):
 
     def records(self) -> list[Record]:
         """One row per pose of the grid."""
-        places = self.places.reshape(-1, 3)
+        places, names = self.places.reshape(-1, 3), None
+        if self.status is not None:
+            names = np.array([one.name for one in STATUSES], object)[self.status.ravel()]
         columns = {
             **named("{}_m", "xyz", places),
             "margin_N": self.margin.ravel(),
             "feasible": self.feasible.ravel(),
             **({} if self.chance is None else {"probability": self.chance.ravel()}),
             "slack": self.slack.ravel(),
-            **self._statuses(),
+            **({} if names is None else {"status": names}),
             **named("d{}_m", "xyz", self.deviation.reshape(-1, 3)),
             **named("r{}_rad", "xyz", self.rotation.reshape(-1, 3)),
             "smallest_eigenvalue_N_per_m": self.stiffness.ravel(),
             **named("softest_{}", MOTION, self.softest.reshape(-1, 6)),
         }
         return rows_of(columns)
-
-    def _statuses(self) -> dict[str, NDArray[np.object_]]:
-        """The column of names of the statuses, if there are any."""
-        if self.status is None:
-            return {}
-        return {"status": np.array([one.name for one in STATUSES], object)[self.status.ravel()]}
 
     def as_json(self, at_least: float | None = None) -> Record:
         """``map.json``: how much can be held, and the elastic robot's largest errors there.
@@ -467,15 +447,13 @@ class Workspace(Result):
         Returns:
             the document; sizes in m^3, m^2 or m as those of a cell, None for a single pose.
         """
-        alone = self.margin.size == 1
-        likely = None
+        alone, likely = self.margin.size == 1, None
         if at_least is not None:
             some = self.likely(at_least)
-            size = None if alone else self.size(some)
-            sizes = None if alone else self.size_between(some)
             likely = {
-                "at_least": at_least, "poses": int(some.sum()), "size": size,
-                "size_between": sizes,
+                "at_least": at_least, "poses": int(some.sum()),
+                "size": None if alone else self.size(some),
+                "size_between": None if alone else self.size_between(some),
             }  # fmt: skip
         where = self.rests & self.feasible
         worst = {

@@ -37,8 +37,6 @@ from seecr.workspace.margins import asked_chance, check_chance, margins_at, read
 Progress = Callable[[int], None]
 """Called with the number of poses done since the last call."""
 
-__all__ = ["default_axes", "evenly", "with_history", "workspace_map"]
-
 # Poses per part.
 _PART = 5_000
 # Values of the default grid along an axis with an extent; fewer for robots with too few cables.

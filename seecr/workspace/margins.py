@@ -20,7 +20,7 @@ from seecr.prediction.sensitivity import sensitivities
 from seecr.prediction.uncertainty import moving_covariance
 from seecr.statics.starts import Commanded, commanded_poses, commands_from
 from seecr.tensions.distribution import tension_limits
-from seecr.workspace.zones import load_scale, tension_margin
+from seecr.workspace.zones import is_held, load_scale, tension_margin
 
 
 def margins_at(
@@ -43,11 +43,6 @@ def margins_at(
             "wrenches; expected none"
         )
     return margins_in_place(robot, poses, acting, lowest, highest, thorough)
-
-
-def is_held(robot: Robot, margin: Array) -> NDArray[np.bool_]:
-    """Whether margins [N] mean that a pose can be held, to within rounding."""
-    return np.asarray(margin >= -1e-9 * load_scale(robot))
 
 
 def read_once(effects: GivenEffects, robot: Robot) -> GivenEffects:
@@ -166,7 +161,7 @@ def held_chance(
     terms, covariance = known
     places, limits = commanded_poses(poses), (lowest, highest, wrenches)
     vectors = _drawn(terms, covariance, _STAGES[-1][0])
-    edge, solved = -1e-9 * load_scale(robot), robot.n_cables < robot.n_dof
+    solved = robot.n_cables < robot.n_dof
     out, rows = np.zeros(len(places)), np.arange(len(places))
     seen = np.zeros((0, len(places)))
     for count, sure in _STAGES:
@@ -178,7 +173,7 @@ def held_chance(
             hopeful &= np.isfinite(seen).any(axis=0)
         more = [_margins(robot, places[rows], limits, one, hopeful) for one in drawn]
         seen = np.concatenate([seen, more])
-        out[rows] = (seen >= edge).mean(axis=0)
+        out[rows] = is_held(robot, seen).mean(axis=0)
         near = ~(np.isin(out[rows], (0.0, 1.0)) & _far(seen, sure, solved))
         rows, seen = rows[near], seen[:, near]
         if len(rows) == 0:

@@ -257,12 +257,8 @@ def _roots(to_exit: Array, h: float) -> Array:
 
 
 def _most_level(theta: Array, to_exit: Array, h: float) -> float:
-    held = theta[[_rests(t, to_exit, h) for t in theta]] if len(theta) else theta
+    held = theta[[_balance(t, to_exit, h)[1] for t in theta]] if len(theta) else theta
     return float(held[np.argmin(np.abs(held))]) if len(held) else float("nan")
-
-
-def _rests(theta: float, to_exit: Array, h: float) -> bool:
-    return _balance(theta, to_exit, h)[1]
 
 
 def _balance(theta: float, to_exit: Array, h: float) -> tuple[tuple[float, float], bool]:

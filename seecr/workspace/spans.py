@@ -26,8 +26,6 @@ from seecr.statics.solution import Solution, Status, check_solution
 from seecr.statics.starts import Commanded, commands_from
 from seecr.units import millimetres
 
-__all__ = ["SlackSpan", "slack_spans"]
-
 # Most halvings, and most changes that are searched at a time: beyond, rounding decides what is
 # slack.
 _ROUNDS, _MOST = 60, 4096
@@ -94,17 +92,16 @@ class SlackSpan(Result):
 
     def records(self) -> Sequence[Record]:
         """One row."""
+        told = self.as_json()
+        sizes = ("width_m", "turn_rad", "from_within_m", "to_within_m")
         return [
             {
                 "run": self.run,
-                "slack_cables": None if self.slack is None else len(self.slack),
+                "slack_cables": told["slack_cables"],
                 "slack": None if self.slack is None else " ".join(self.slack),
                 **named("from_{}", COORDINATES, self.first),
                 **named("to_{}", COORDINATES, self.last),
-                "width_m": self.width,
-                "turn_rad": self.turn,
-                "from_within_m": self.within[0],
-                "to_within_m": self.within[1],
+                **{size: told[size] for size in sizes},
             }
         ]
 
@@ -236,7 +233,8 @@ class _Way:
             # moved with its command, or from the command where it does not rest
             rest = np.array([c.rest for c in changes])
             step = (middle - np.array([c.a for c in changes]))[:, None] * self.steps[row]
-            start = moved(self.solution.robot, _or_else(rest, trial.pose), step)
+            rest = np.where(np.isfinite(rest).all(axis=1, keepdims=True), rest, trial.pose)
+            start = moved(self.solution.robot, rest, step)
         found = solve(self.solution.robot, trial, effects=self.effects, start=start)
         each = zip(changes, middle.tolist(), _keys(found), found.pose, strict=True)
         for c, at, key, pose in each:
@@ -272,11 +270,6 @@ class _Way:
         if key is not None:
             names = tuple(n for n, s in zip(robot.cable_names, key, strict=True) if s)
         return SlackSpan(run, names, rows, poses[0], poses[-1], float(width), float(turned), within)
-
-
-def _or_else(poses: Array, others: Array) -> Array:
-    """Poses (n, 7), and others where these have NaN."""
-    return np.where(np.isfinite(poses).all(axis=1, keepdims=True), poses, others)
 
 
 def _keys(solution: Solution) -> list[_Key]:

@@ -109,7 +109,7 @@ def feasible(
         robot, poses, wrench=wrench, wrenches=wrenches, lowest=lowest, highest=highest,
         effects=effects,
     )  # fmt: skip
-    return np.asarray(margin >= -_BALANCED * load_scale(robot))
+    return is_held(robot, margin)
 
 
 def tension_margin(
@@ -131,16 +131,11 @@ def tension_margin(
     from what such cables weigh.
 
     Args:
-        robot: as described, or its MJCF; its mass, centre of mass and gravity are the load.
-        poses: (n, 7) or (7,), actual poses of the platform.
-        wrench: (6,) or (n, 6) external force [N] at the platform origin and moment [N m].
+        robot, poses, wrench, lowest, highest: as for :func:`feasible`.
         wrenches: (k, 6) a set of wrenches, each in addition to ``wrench``; the smallest margin
             counts. All wrenches in their convex hull can then be balanced as well.
-        lowest: (m,) or one [N], not negative.
-        highest: (m,) or one [N]; infinite for none.
-        effects: effects of the robot: a model, its file, or effects with values. If cables have
-            weight or yield, their balance is not linear in the tensions; it is then solved in
-            rounds.
+        effects: as there. If cables have weight or yield, their balance is not linear in the
+            tensions; it is then solved in rounds.
 
     Returns:
         (n,) [N]; minus infinity if W is singular or there are too few cables, and no tensions
@@ -182,20 +177,10 @@ def tension_margin(
 
 
 def margins_with(
-    robot: Robot,
-    poses: Array,
-    effects: GivenEffects,
-    lowest: ArrayLike = 0.0,
-    highest: ArrayLike = np.inf,
-    wrenches: ArrayLike | None = None,
-    wrench: Array | None = None,
-) -> Array:
-    """Margins (n,) [N] of :func:`seecr.tension_margin`, of a robot with effects.
-
-    Args:
-        robot, poses, effects, lowest, highest, wrenches: as there.
-        wrench: (6,) or (n, 6) [N, N m], to which each of ``wrenches`` is added.
-    """
+    robot: Robot, poses: Array, effects: GivenEffects, lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf, wrenches: ArrayLike | None = None, wrench: Array | None = None,
+) -> Array:  # fmt: skip
+    """Margins (n,) [N] of :func:`seecr.tension_margin`, of a robot with effects."""
     low, high = tension_limits(robot, lowest, highest)
     told = Commands(poses, lengths=robot.commanded_lengths(poses), told=True)
     tables = assemble(Experiment(robot, told).setup(effects_of(effects, robot)))
@@ -231,11 +216,8 @@ def _pushed(tables: Tables, wrench: Array) -> Tables:
 def margins_from(matrices: Array, loads: Array, low: Array, high: Array, scale: float) -> Array:
     """Margins (n,) [N] of the balance A tau = load, for matrices (n, d, m) and loads (n, k, d).
 
-    Args:
-        matrices, loads: [N], torques over the robot's length; the smallest margin of k loads
-            counts.
-        low, high: (m,) [N].
-        scale: [N] load that rounding is measured against.
+    Torques are over the robot's length; the smallest margin of k loads counts. Rounding is measured
+    against the load ``scale`` [N].
     """
     from seecr.compiled.tensions import margins_of  # takes a while to import
 
@@ -249,6 +231,11 @@ def margins_from(matrices: Array, loads: Array, low: Array, high: Array, scale: 
     if len(odd):
         out[odd] = _by_rank(matrices[odd], loads[odd], low, high, scale)
     return out
+
+
+def is_held(robot: Robot, margin: Array) -> NDArray[np.bool_]:
+    """Whether margins [N] mean that a pose can be held, to within rounding."""
+    return np.asarray(margin >= -_BALANCED * load_scale(robot))
 
 
 def load_scale(robot: Robot) -> float:

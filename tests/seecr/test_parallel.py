@@ -85,6 +85,19 @@ def test_no_part_is_begun_after_an_error(monkeypatch: pytest.MonkeyPatch) -> Non
     assert sorted(part.start for part in begun) == [0, 1]
 
 
+def test_a_part_that_takes_long_holds_up_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parallel, "processors", lambda: 2)
+    others = threading.Semaphore(0)
+
+    def run(part: slice) -> None:
+        if part.start > 0:
+            others.release()
+        elif not all(others.acquire(timeout=60.0) for _ in range(4)):
+            raise TimeoutError("the other parts waited for this one")
+
+    parallel.run_parts(run, [slice(k, k + 1) for k in range(5)])
+
+
 def test_no_more_threads_work_than_there_are_processors(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parallel, "processors", lambda: 2)
     both, seen = threading.Barrier(2, timeout=60.0), set[int]()

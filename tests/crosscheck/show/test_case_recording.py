@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +20,8 @@ from crosscheck.suite.results import CaseResult
 from crosscheck.suite.run import Run, results_json, run_case
 from crosscheck.suite.verdicts import Verdict
 from seecr.description.mjcf import load_robot, model_path
-from seecr.errors import InputFileError
 from seecr.pose import quat_conjugate, quat_multiply
-from seecr.show import plots, shapes
+from seecr.show import scene
 from seecr.show.colours import cable_colours, round_up, scale_colours
 from seecr.statics.solution import Status
 
@@ -61,13 +59,15 @@ def reported(result: CaseResult) -> dict[str, Any]:
     return case
 
 
-def test_both_timelines_and_no_other(back: Readback) -> None:
+def test_poses_are_counted_from_zero_on_one_timeline_and_two_are_of_place_and_time(
+    back: Readback, written: Path
+) -> None:
     assert back.timelines == {"pose", "x_mm", "settling_time"}
-
-
-def test_poses_are_counted_from_zero_as_in_results(back: Readback) -> None:
-    index = back.column("/plot/deviation/seecr/dx", "pose")
-    assert index == list(range(POSES))
+    assert back.column("/plot/deviation/seecr/dx", "pose") == list(range(POSES))
+    assert {"Deviation from the command [mm]", "Rotation from the command [°]"} <= back.views
+    (recording,) = RrdReader(written).recordings()
+    assert recording.recording_id == "parallel-fishing-z0.10"
+    assert recording.application_id == "crosscheck-parallel-fishing-z0-10"
 
 
 @pytest.mark.parametrize("quantity", ["position", "orientation", "tension"])
@@ -80,12 +80,8 @@ def test_differences_are_those_of_results_json(
     np.testing.assert_allclose(drawn, np.maximum(stored, 1e-18), rtol=1e-12)
     limit = 10.0 ** back.scalars(f"/plot/limit/{quantity}")
     np.testing.assert_allclose(limit, reported["allowed"][key[quantity]], rtol=1e-12)
-
-
-def test_plain_settling_is_drawn_too(back: Readback, reported: dict[str, Any]) -> None:
-    stored = reported["difference"]["settled_position_m"]
-    drawn = 10.0 ** back.scalars("/plot/plain_settling/position")
-    np.testing.assert_allclose(drawn, stored, rtol=1e-12)
+    plain = 10.0 ** back.scalars("/plot/plain_settling/position")
+    np.testing.assert_allclose(plain, reported["difference"]["settled_position_m"], rtol=1e-12)
 
 
 @pytest.mark.parametrize("who", ["seecr", "mujoco"])
@@ -98,13 +94,11 @@ def test_deviation_tilt_and_tension_of_both(back: Readback, result: CaseResult, 
     turn = quat_multiply(answer.pose[:, 3:], quat_conjugate(result.case.poses[:, 3:]))
     tilt = 2.0 * np.degrees(np.arccos(np.clip(np.abs(turn[:, 0]), 0.0, 1.0)))
     np.testing.assert_allclose(back.scalars(f"/plot/tilt/{who}/tilt"), tilt, atol=2e-6)
+    # at the end of the paper's sweep
+    assert back.scalars(f"/plot/tilt/{who}/about_y")[0] == pytest.approx(26.5, abs=0.1)
     for k in range(8):
         drawn = back.scalars(f"/plot/tension/{who}/cable{k + 1}")
         np.testing.assert_array_equal(drawn, answer.tensions[:, k])
-
-
-def test_tilt_at_the_end_of_the_papers_sweep(back: Readback) -> None:
-    assert back.scalars("/plot/tilt/mujoco/about_y")[0] == pytest.approx(26.5, abs=0.1)
 
 
 def test_lanes_say_who_is_slack(back: Readback, result: CaseResult) -> None:
@@ -121,7 +115,7 @@ def test_every_cable_is_drawn_taut_or_slack(back: Readback, result: CaseResult) 
     loose = back.column("/scene/seecr/cables/slack", "LineStrips3D:strips")
     for i, slack in enumerate(result.solution.slack):
         assert len(taut[i]) == 8 - slack.sum()
-        assert len(loose[i]) == slack.sum() * shapes.dashes_per_cable()
+        assert len(loose[i]) == slack.sum() * scene.DASHES
     radius = back.static("/scene/seecr/cables/taut", "LineStrips3D:radii")[0]
     assert radius > back.static("/scene/seecr/cables/slack", "LineStrips3D:radii")[0]
 
@@ -181,59 +175,6 @@ def test_the_legend_gives_the_scale_in_newtons(back: Readback, result: CaseResul
         "SEECR",
         "MuJoCo",
     ]
-
-
-def test_a_platform_that_turns_has_a_panel_of_rotations(back: Readback) -> None:
-    assert {"Deviation from the command [mm]", "Rotation from the command [°]"} <= back.views
-    assert any(e.startswith("/plot/tilt") for e in back.entities("pose"))
-
-
-def test_the_layout_is_in_the_file(written: Path) -> None:
-    reader = RrdReader(written)
-    (store,) = reader.blueprints()
-    (recording,) = reader.recordings()
-    assert recording.recording_id == "parallel-fishing-z0.10"
-    assert store.application_id == recording.application_id == "crosscheck-parallel-fishing-z0-10"
-    names, kinds = set(), []
-    for chunk in reader.stream(store=store):
-        batch = chunk.to_record_batch()
-        for component, bag in (("ViewBlueprint:display_name", names),):
-            if component in batch.schema.names:
-                bag.add(batch.column(batch.schema.names.index(component)).to_pylist()[0][0])
-        if "ViewBlueprint:class_identifier" in batch.schema.names:
-            column = batch.column(batch.schema.names.index("ViewBlueprint:class_identifier"))
-            kinds.append(column.to_pylist()[0][0])
-    assert {"Deviation from the command [mm]", "Tension [N]", "Read me"} <= names
-    assert sorted(kinds) == sorted(
-        ["3D", "2D", "StateTimeline", *["TimeSeries"] * 4, *["TextDocument"] * 2]
-    )
-
-
-def test_nothing_half_written(
-    result: CaseResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "case.rrd"
-    path.write_bytes(b"an older one")
-    seen = []
-
-    def fail(*_args: object) -> None:
-        seen.append(sorted(p.name for p in tmp_path.iterdir()))
-        raise RuntimeError("in the middle")
-
-    monkeypatch.setattr(plots, "write_lanes", fail)
-    with pytest.raises(RuntimeError, match="in the middle"):
-        write_case_recording(result, path)
-    assert len(seen[0]) == 2, "written beside its place"
-    assert [p.name for p in tmp_path.iterdir()] == ["case.rrd"]
-    assert path.read_bytes() == b"an older one"
-
-
-def test_a_folder_that_is_none_is_named(result: CaseResult, tmp_path: Path) -> None:
-    path = tmp_path / "missing" / "case.rrd"
-    with pytest.raises(InputFileError) as error:
-        write_case_recording(result, path)
-    assert str(error.value) == f"{path}: cannot write the recording: No such file or directory"
-    assert error.value.exit_status == 2
 
 
 @pytest.fixture(scope="module")
@@ -342,7 +283,7 @@ def test_slack_dashes_hang_below_the_straight_line() -> None:
     slack = np.zeros((1, 8), dtype=bool)
     slack[0, 2] = True
     lengths = 1.02 * robot.nominal_lengths(pose)
-    strips = np.array(shapes.slack_strips(robot, pose, slack, lengths))
+    strips = np.array(scene.slack_strips(robot, pose, slack, lengths))
     points = strips.reshape(-1, 3)
     start, end = robot.exit_points[2], pose[0, :3] + robot.anchor_points[2]
     np.testing.assert_allclose(points[0], start, atol=1e-12)
@@ -361,8 +302,8 @@ def test_tight_slack_cables_are_straight() -> None:
     robot = load_robot(PARALLEL)
     pose = robot.reference_pose[None]
     slack = np.ones((1, 8), dtype=bool)
-    strips = shapes.slack_strips(robot, pose, slack, robot.nominal_lengths(pose))
-    first = np.array(strips[: shapes.dashes_per_cable()]).reshape(-1, 3)
+    strips = scene.slack_strips(robot, pose, slack, robot.nominal_lengths(pose))
+    first = np.array(strips[: scene.DASHES]).reshape(-1, 3)
     chord = first[-1] - first[0]
     assert np.abs(np.cross(first - first[0], chord)).max() < 1e-12
 
@@ -387,21 +328,15 @@ def test_the_top_of_the_scale_is_round(value: float, top: float) -> None:
     assert round_up(value) == pytest.approx(top)
 
 
-@pytest.fixture(scope="module")
-def viewer() -> Iterator[Any]:
-    with headless_viewer() as client:
-        yield client
-
-
-def test_the_viewer_has_nothing_to_complain_about(viewer: Any, written: Path) -> None:
-    viewer.open(str(written))
-    viewer.set_time("pose", sequence=2, play_state="paused")
-    picture = viewer.take_screenshot()
-    state = viewer.get_state()
-    assert picture.startswith(b"\x89PNG")
-    assert len(state.views) == 9
-    assert [(view.name, view.reports) for view in state.views if view.reports] == []
-    viewer.set_time("settling_time", duration=0.1)
-    viewer.take_screenshot()
-    again = viewer.get_state()
-    assert [(view.name, view.reports) for view in again.views if view.reports] == []
+def test_the_viewer_has_nothing_to_complain_about(written: Path) -> None:
+    with headless_viewer() as viewer:
+        viewer.open(str(written))
+        for at in (
+            {"timeline": "pose", "sequence": 2},
+            {"timeline": "settling_time", "duration": 0.1},
+        ):
+            viewer.set_time(**at, play_state="paused")
+            assert viewer.take_screenshot().startswith(b"\x89PNG")
+            views = viewer.get_state().views
+            assert len(views) == 9
+            assert [(view.name, view.reports) for view in views if view.reports] == []

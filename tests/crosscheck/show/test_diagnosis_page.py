@@ -7,6 +7,7 @@ import io
 import itertools
 import re
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
@@ -30,13 +31,12 @@ from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.inference.held_out import rms_by_block
 from crosscheck.inference.noise import Noise
 from crosscheck.preparation.prepare import noise_floor
-from crosscheck.show import error_map
+from crosscheck.show import error_figures
 from crosscheck.show.arrows import drawn, magnification, views_of
-from crosscheck.show.cable_wall import Wall, draw_wall, length_changes, walls_of
 from crosscheck.show.candidates import candidate_rows, untried
 from crosscheck.show.diagnosis import checks, correlations, parameter_table
 from crosscheck.show.effect_figures import confusion_of, waterfall
-from crosscheck.show.error_map import failure_map
+from crosscheck.show.error_figures import Wall, draw_wall, failure_map, length_changes, walls_of
 from crosscheck.show.figures import keeping
 from crosscheck.show.page import render, write_page
 from seecr.effects import Terms, layout_of
@@ -241,39 +241,32 @@ def test_letters_of_a_figure_that_is_kept_are_whole(tmp_path: Path) -> None:
     assert edges.min() == 255
 
 
-def test_the_scale_of_a_map_goes_on_where_errors_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    extends: list[str] = []
-    whole = Figure.colorbar
+@pytest.fixture
+def maps(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Figure]]:
+    """Maps of poses spread so far: of both models, or of the first alone."""
+    kept: list[Figure] = []
+    monkeypatch.setattr(error_figures, "image", lambda figure, _words: kept.append(figure))
 
-    def told(figure: Figure, *args: Any, **named: Any) -> Any:
-        extends.append(named["extend"])
-        return whole(figure, *args, **named)
+    def of(spread: tuple[float, float, float], *alone: bool) -> list[Figure]:
+        found = diagnosis("pulleys")
+        before, after = ends_of(found)
+        for stage in (before, after):
+            pose = stage.state.prediction.pose.copy()
+            pose[:, :3] = np.random.default_rng(1).uniform(size=(len(pose), 3)) * spread
+            monkeypatch.setitem(stage.state.prediction.kept, "pose", pose)
+        for one in alone:
+            failure_map(path_of(found).problem, before, before if one else after)
+        return kept
 
-    monkeypatch.setattr(Figure, "colorbar", told)
-    found = diagnosis("pulleys")
-    before, after = ends_of(found)
-    failure_map(path_of(found).problem, before, after)
-    monkeypatch.setattr(error_map, "_LARGEST", 100.0)
-    failure_map(path_of(found).problem, before, after)
-    assert extends == ["max", "neither"]
+    return of
 
 
 @pytest.mark.parametrize("spread", [(0.01, 0.01, 1.0), (1.0, 0.01, 0.01), (1.0, 0.01, 1.0)])
 def test_the_title_above_a_narrow_map_is_whole(
-    spread: tuple[float, float, float], monkeypatch: pytest.MonkeyPatch
+    spread: tuple[float, float, float], maps: Callable[..., list[Figure]]
 ) -> None:
     """Of poses one above the other the panel stood at the right, and its title beyond the edge."""
-    kept: list[Figure] = []
-    monkeypatch.setattr(error_map, "image", lambda figure, _words: kept.append(figure))
-    found = diagnosis("pulleys")
-    before, after = ends_of(found)
-    for stage in (before, after):
-        pose = stage.state.prediction.pose.copy()
-        pose[:, :3] = np.random.default_rng(1).uniform(size=(len(pose), 3)) * spread
-        monkeypatch.setitem(stage.state.prediction.kept, "pose", pose)
-    failure_map(path_of(found).problem, before, after)
-    failure_map(path_of(found).problem, before, before)
-    for figure in kept:
+    for figure in maps(spread, False, True):
         figure.draw_without_rendering()
         figure.draw_without_rendering()  # as a page and its picture do
         for axes in figure.axes:
@@ -286,19 +279,10 @@ def test_the_title_above_a_narrow_map_is_whole(
 @pytest.mark.parametrize("spread", [(2.0, 0.0, 1.0), (1.0, 0.01, 1.0), (0.1, 0.1, 1.0)])
 @pytest.mark.parametrize("alone", [True, False])
 def test_the_colours_of_a_map_stand_beside_it_and_nothing_is_empty(
-    spread: tuple[float, float, float], alone: bool, monkeypatch: pytest.MonkeyPatch
+    spread: tuple[float, float, float], alone: bool, maps: Callable[..., list[Figure]]
 ) -> None:
     """A quarter of the picture was empty between a wide map and its colours."""
-    kept: list[Figure] = []
-    monkeypatch.setattr(error_map, "image", lambda figure, _words: kept.append(figure))
-    found = diagnosis("pulleys")
-    before, after = ends_of(found)
-    for stage in (before, after):
-        pose = stage.state.prediction.pose.copy()
-        pose[:, :3] = np.random.default_rng(1).uniform(size=(len(pose), 3)) * spread
-        monkeypatch.setitem(stage.state.prediction.kept, "pose", pose)
-    failure_map(path_of(found).problem, before, before if alone else after)
-    (figure,) = kept
+    (figure,) = maps(spread, alone)
     figure.draw_without_rendering()
     *panels, bar = figure.axes
     wide = figure.get_figwidth()

@@ -12,12 +12,11 @@ from made_data import soft_cogiro
 from recordings import Readback
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.show import error_recordings
+from crosscheck.show.misfit import draw_axes
 from seecr.errors import InputFileError
 from seecr.show import layout, plots
 from seecr.show.map_recording import write_map_recording
-from seecr.show.scene import Scene, write_legend
-from seecr.show.shapes import States
+from seecr.show.scene import Scene, States, write_legend
 from seecr.show.stream import opening, pose_index, recording_file, settling_index, sweep_index
 from seecr.workspace.maps import workspace_map
 
@@ -93,12 +92,11 @@ def test_deviations_are_in_millimetres_and_degrees() -> None:
     assert plots.log10(np.array([-1e-3, 0.0])).tolist() == pytest.approx([-3.0, -18.0])
 
 
-def test_bars_end_by_the_logarithm_of_the_error() -> None:
-    values = np.array([1.0, 10.0, 100.0])
-    ends = error_recordings._bar_ends(values, values, 0.5)
-    assert np.all(np.diff(ends) > 0) and np.ptp(np.diff(ends)) == pytest.approx(0.0, abs=1e-9)
-    linear = error_recordings._bar_ends(values, values, 0.0)
-    assert linear[2] - linear[0] == pytest.approx(11.0 * (linear[1] - linear[0]))
+def test_axes_have_round_numbers_and_zero_has_no_sign(tmp_path: Path) -> None:
+    with recording_file(tmp_path / "a.rrd", "a", blueprint()) as recording:
+        draw_axes(recording, "map", np.array([[0.0, 0.0], [1.0, 2.0]]), "mm")
+    labels = Readback(tmp_path / "a.rrd").static("/map/numbers", "Points2D:labels")
+    assert "-0" not in labels and {"0", "0.5", "1"} <= set(labels)
 
 
 def line(start: list[float], end: list[float], count: int) -> np.ndarray:

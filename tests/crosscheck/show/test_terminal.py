@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import made_diagnoses as made
 import pytest
@@ -18,7 +20,6 @@ from crosscheck.comparison.limits import Limits, exceeded
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
-from crosscheck.fit.words import shown
 from crosscheck.measurements.read import together
 from crosscheck.show.candidates import candidate_rows
 from crosscheck.show.comparison import print_comparison
@@ -28,9 +29,10 @@ from seecr.description.mjcf import load_robot
 from seecr.prediction.experiment import predict
 
 
-def console() -> tuple[Console, StringIO]:
+def printed(show: Callable[..., None], *what: Any) -> str:
     out = StringIO()
-    return Console(file=out, highlight=False), out
+    show(*what, Console(file=out, highlight=False))
+    return out.getvalue()
 
 
 @pytest.fixture(scope="module")
@@ -40,9 +42,8 @@ def found() -> Comparison:
 
 
 def test_a_comparison_ends_with_verdict_limits_and_files(found: Comparison) -> None:
-    screen, out = console()
-    print_comparison(found, [], True, Path("here"), screen)
-    lines = out.getvalue().splitlines()
+    text = printed(print_comparison, found, [], True, Path("here"))
+    lines = text.splitlines()
     assert lines[-3:] == [found.sentence, "All limits hold.", "Results in here/"]
     assert sum(line.startswith("worst: line ") for line in lines) == 5
     head = next(line for line in lines if line.startswith("measured minus predicted"))
@@ -57,9 +58,8 @@ def test_of_several_files_it_is_told_which_the_largest_errors_are_in() -> None:
     robot = soft_cogiro()
     days = [replace(measured(robot, seed=k), path=Path(f"{k}.csv")) for k in (1, 2)]
     both = compare(robot, together(days))
-    screen, out = console()
-    print_comparison(both, [], False, Path("here"), screen)
-    row = next(line.split() for line in out.getvalue().splitlines() if line.startswith("z "))
+    text = printed(print_comparison, both, [], False, Path("here"))
+    row = next(line.split() for line in text.splitlines() if line.startswith("z "))
     z = next(c for c in both.coordinates if c.name == "z")
     assert row[-3:-1] == both.problem.data.place(z.row).split() and row[-3] in ("1.csv", "2.csv")
 
@@ -70,26 +70,22 @@ def test_what_rounding_leaves_of_an_error_is_nothing() -> None:
     data = measured(robot)
     told = predict(robot, data).readings
     exact = replace(data, position=told.position + 3e-14, quat_wxyz=told.quat_wxyz)
-    screen, out = console()
-    print_comparison(compare(robot, exact), [], False, Path("here"), screen)
-    row = next(line.split() for line in out.getvalue().splitlines() if line.startswith("x "))
+    text = printed(print_comparison, compare(robot, exact), [], False, Path("here"))
+    row = next(line.split() for line in text.splitlines() if line.startswith("x "))
     assert row[1:5] == ["0", "0", "0", "mm"]
 
 
 def test_a_limit_that_is_exceeded_is_said(found: Comparison) -> None:
-    screen, out = console()
     beyond = exceeded(Limits(max_position=1e-6), found)
-    print_comparison(found, beyond, True, Path("here"), screen)
-    assert beyond[0].words in out.getvalue() and "All limits hold" not in out.getvalue()
+    text = printed(print_comparison, found, beyond, True, Path("here"))
+    assert beyond[0].words in text and "All limits hold" not in text
 
 
 def test_an_addition_tells_values_errors_and_what_was_written() -> None:
     robot = soft_cogiro()
     data = measured(robot, [term(robot, "stiffness", factor=1.4)])
     added = add_effect(robot, data, "stiffness")
-    screen, out = console()
-    print_addition(added, Path("m.toml"), True, screen)
-    text = out.getvalue()
+    text = printed(print_addition, added, Path("m.toml"), True)
     assert "  factor = 1.4 ± " in text or "  factor = 1.39" in text or "  factor = 1.40" in text
     assert "With stiffness, the residuals are noise." in text
     assert text.endswith("Written to m.toml: stiffness\n")
@@ -120,13 +116,12 @@ def test_a_calibration_tells_of_every_effect_how_sure_it_is(sure: bool) -> None:
     data = measured(robot, [term(robot, "stiffness", factor=1.3)], points=6)
     names = ("stiffness", "platform_mass", "length_scale", "tracker_frame")
     found = calibrate(robot, data, only=names[:1] if sure else names)
-    screen, out = console()
-    print_calibration(found, Path("m.toml"), True, screen)
-    rows = [line.split() for line in out.getvalue().splitlines()]
+    text = printed(print_calibration, found, Path("m.toml"), True)
+    rows = [line.split() for line in text.splitlines()]
     sizes = {row[0]: row[2] for row in rows if len(row) == 3 and row[0] in names}
     assert len(sizes) == len(found.fitted) and "-" not in sizes.values()
     assert any(float(size) > 3.0 for size in sizes.values()) == sure
-    assert ("No single effect differs from null by 3 standard errors" in out.getvalue()) != sure
+    assert ("No single effect differs from null by 3 standard errors" in text) != sure
 
 
 def test_a_calibration_says_what_it_did_not_fit_and_why() -> None:
@@ -134,11 +129,10 @@ def test_a_calibration_says_what_it_did_not_fit_and_why() -> None:
     robot = load_robot("planar_two_cable")
     data = measured(robot, [term(robot, "stiffness", factor=1.3)], points=6)
     found = calibrate(robot, data, only=["stiffness", "exit_friction", "tension_scale"])
-    screen, out = console()
-    print_calibration(found, Path("m.toml"), True, screen)
+    text = printed(print_calibration, found, Path("m.toml"), True)
     said = {name: why.why for name, why in found.absent.items() if why.why is not Why.EXCLUDED}
     assert said == {"exit_friction": Why.GAINS_NOTHING, "tension_scale": Why.NEEDS_TENSIONS}
-    lines = [line for line in out.getvalue().splitlines() if line.startswith("not fitted: ")]
+    lines = [line for line in text.splitlines() if line.startswith("not fitted: ")]
     assert lines == [
         "not fitted: exit_friction (explains nothing beside the others)",
         "not fitted: tension_scale (needs measured tensions)",
@@ -152,15 +146,15 @@ def test_a_diagnosis_says_how_probable_what_it_does_not_print_is_at_most() -> No
     assert whole.chances is not None
     asked = [row for row in whole.candidates if row.why_not.why is not Why.EXCLUDED]
     effect = dict.fromkeys(whole.chances.effect, 0.02) | {asked[-1].effect: 0.31}
-    for rows, text in (
+    for rows, more in (
         (whole.candidates, f"nor {len(asked) - 6} others (probability 31 % or less): see "),
         (asked[:6], ""),
     ):
-        screen, out = console()
         chances = replace(whole.chances, effect=effect)
-        print_diagnosis(replace(whole, candidates=rows, chances=chances), Path("here"), screen)
-        lines = [line for line in out.getvalue().splitlines() if line.startswith("nor ")]
-        assert lines == ([f"{text}candidates in diagnosis.json"] if text else [])
+        found = replace(whole, candidates=rows, chances=chances)
+        text = printed(print_diagnosis, found, Path("here"))
+        lines = [line for line in text.splitlines() if line.startswith("nor ")]
+        assert lines == ([f"{more}candidates in diagnosis.json"] if more else [])
 
 
 def test_what_is_probable_and_not_listed_is_named_with_its_probability() -> None:
@@ -176,20 +170,18 @@ def test_what_is_probable_and_not_listed_is_named_with_its_probability() -> None
     ]
     likely = {first.effect: 0.999, second.effect: 0.7, other: 0.998}
     effect = dict.fromkeys(whole.chances.effect, 0.02) | likely
-    screen, out = console()
     chances = replace(whole.chances, effect=effect)
-    print_diagnosis(replace(whole, candidates=rows, chances=chances), Path("here"), screen)
-    lines = [line for line in out.getvalue().splitlines() if line.startswith(("not ", "nor "))]
+    text = printed(print_diagnosis, replace(whole, candidates=rows, chances=chances), Path("here"))
+    lines = [line for line in text.splitlines() if line.startswith(("not ", "nor "))]
     assert lines[0].endswith("explains too little (probability > 99 %)")
     assert lines[1] == f"not {second.effect}: probable (70 %) but not certain"
     assert f"(probability: {other} > 99 %, others 2 % or less)" in lines[-1]
 
 
 def test_a_diagnosis_begins_with_what_shows_and_then_its_verdict() -> None:
-    screen, out = console()
     found = made.pulleys()
-    print_diagnosis(found, Path("here"), screen)
-    lines = out.getvalue().splitlines()
+    text = printed(print_diagnosis, found, Path("here"))
+    lines = text.splitlines()
     assert lines[0].startswith("In these data ")
     lines = lines[len(found.sight.lines()) :]
     assert lines[0] == f"effects_found: {found.sentence}"
@@ -200,9 +192,8 @@ def test_a_diagnosis_begins_with_what_shows_and_then_its_verdict() -> None:
 def test_beside_something_unknown_probabilities_say_so() -> None:
     texts = []
     for verdict in (DiagnosisVerdict.EFFECTS_FOUND, DiagnosisVerdict.UNKNOWN_EFFECT):
-        screen, out = console()
-        print_diagnosis(replace(made.pulleys(), verdict=verdict), Path("here"), screen)
-        texts.append(out.getvalue())
+        found = replace(made.pulleys(), verdict=verdict)
+        texts.append(printed(print_diagnosis, found, Path("here")))
     assert "(probability > 99 %)" in texts[0] and "beside something unknown" not in texts[0]
     assert "(probability beside something unknown > 99 %)" in texts[1]
     assert "note: Probabilities beside something unknown assume that it changes what" in texts[1]
@@ -220,9 +211,8 @@ def test_classes_of_equals_are_told_with_their_probability_where_none_is_listed(
     )
     effect = whole.chances.effect | single | {"gravity_tilt": 0.3}
     found = replace(whole, chances=replace(whole.chances, effect=effect, classes=classes))
-    screen, out = console()
-    print_diagnosis(found, Path("here"), screen)
-    told = [line for line in out.getvalue().splitlines() if line.startswith("one of ")]
+    text = printed(print_diagnosis, found, Path("here"))
+    told = [line for line in text.splitlines() if line.startswith("one of ")]
     assert told == ["one of stiffness, platform_mass: probability 80 %"]
     rows = {row["effect"][0]: row["#probability"] for row in candidate_rows(found)}
     assert rows["stiffness"] == ["40 %", "with equivalents 80 %"]
@@ -230,18 +220,13 @@ def test_classes_of_equals_are_told_with_their_probability_where_none_is_listed(
 
 
 def test_what_was_left_out_as_asked_is_not_told_again() -> None:
-    screen, out = console()
-    whole = made.pulleys()
+    text, whole = "", made.pulleys()
     asked = [
         replace(row, why_not=Reason(Why.EXCLUDED)) if row.effect == "creep" else row
         for row in whole.candidates
     ]
     for rows in (asked[:3], [row for row in asked if row.effect == "creep"]):
-        print_diagnosis(replace(whole, candidates=rows), Path("here"), screen)
-    lines = [line for line in out.getvalue().splitlines() if line.startswith("not ")]
+        text += printed(print_diagnosis, replace(whole, candidates=rows), Path("here"))
+    lines = [line for line in text.splitlines() if line.startswith("not ")]
     told = {line.split()[1].rstrip(":") for line in lines}
     assert told == {row.effect for row in asked[:3]} - {"creep"}
-
-
-def test_numbers_are_shown_with_the_unit_that_people_read() -> None:
-    assert shown(0.0105, "m") == "10.5 mm" and shown(1.4, "") == "1.4"

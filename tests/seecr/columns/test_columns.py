@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 from made_columns import columns_of
 from random_robots import random_robot
 
-from seecr.columns.csv import read_table
+from seecr.columns.csv import read_table, table_text
 from seecr.columns.poses import command_lengths, command_poses, measured_orientation
 from seecr.description.robot import Joint, Robot
 from seecr.errors import InputFileError
@@ -83,3 +84,25 @@ def test_whole_angles_become_quaternions_and_parts_stay_angles() -> None:
     assert whole[0] == pytest.approx(quat_from_rxyz(np.array([0.1, 0.2, 0.3])), abs=1e-15)
     none, some = measured_orientation(columns_of("meas_rx_rad,meas_ry_rad", "0.1,0.2"))
     assert none is None and some[0, :2].tolist() == [0.1, 0.2] and np.isnan(some[0, 2])
+
+
+ODD = ("#a", " #b", "a#b", "b, c", 'said "d"', "two\nlines", "two\r\nlines", "1;5", "'", "µ")
+
+
+@pytest.mark.parametrize("last", ["#", "e"])
+def test_odd_names_come_back(tmp_path: Path, last: str) -> None:
+    names = [*ODD, last]
+    path = tmp_path / "rows.csv"
+    text = table_text({"run": names, "x_m": np.arange(len(names)), "note": names[::-1]})
+    path.write_bytes(text.encode())
+    table = read_table(path)
+    assert list(table.cells[0]) == [name.strip() for name in names]
+    assert list(table.cells[2]) == [name.strip() for name in names[::-1]]
+    assert list(table.cells[1]) == [str(k) for k in range(len(names))]
+
+
+def test_numbers_have_all_digits_or_those_asked_for() -> None:
+    values = [0.1 + 0.2, -0.0, math.nan, math.inf, np.float64(1e-9), None, 3, "a"]
+    cells = ["0.30000000000000004", "0.0", "", "", "1e-09", "", "3", "a"]
+    assert table_text({"x": values}).splitlines() == ["x", *cells]
+    assert table_text({"x": values, "y": values}, 4).splitlines()[1:3] == ["0.3,0.3", "0,0"]

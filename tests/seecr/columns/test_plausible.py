@@ -9,7 +9,7 @@ import pytest
 from made_columns import columns_of
 from rectangle import RECTANGLE
 
-from seecr.columns.plausible import away_from, check_commands
+from seecr.columns.plausible import check_commands
 from seecr.description.robot import Joint
 from seecr.errors import InputFileError
 from seecr.pose import Array
@@ -35,15 +35,6 @@ def check_lengths(unit: str, per_metre: float, *lengths: float) -> None:
     rows = [",".join([f"{per_metre * length:.10g}"] * 4) for length in lengths]
     table = np.repeat(np.array(lengths)[:, None], 4, axis=1)
     check_commands(columns_of(header, *rows), RECTANGLE, None, table)
-
-
-def test_poses_are_as_far_away_as_their_coordinates_differ() -> None:
-    assert away_from(RECTANGLE, at((1.5, 1.0, 2.5)), None).tolist() == [[0.0, 1.0, 4.0]]
-
-
-def test_lengths_are_as_far_away_as_they_are_long() -> None:
-    lengths = np.array([[1.0, 2.0, 3.0, 4.0]])
-    assert away_from(RECTANGLE, at((9.0, 9.0, 9.0)), lengths) is lengths
 
 
 def test_commands_in_the_robot_pass_in_any_unit() -> None:

@@ -7,20 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from random_robots import random_robot
+from rectangle import RECTANGLE
 from rejointed import WAYS, rejointed
+from three_cables import THREE
 
 from seecr.description import joints
-from seecr.description.joints import pose_of_values, values_of_pose
+from seecr.description.joints import locked, pose_of_values, values_of_pose
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Joint, Robot
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
-from seecr.pose import (
-    pose_difference,
-    quat_from_rotvec,
-    quat_multiply,
-    quat_rotate,
-)
+from seecr.pose import pose_difference, quat_from_rotvec, quat_multiply, quat_rotate
 
 # Almost half a turn: beyond, a hinge's value is another one.
 _TURN = 3.1
@@ -135,3 +132,19 @@ def test_following_a_planar_robot_searches_no_joint_values(
 
     monkeypatch.setattr(joints, "_by_newton", search)
     assert solve(robot, poses, follow=True).converged.all()
+
+
+def test_joints_lock_what_none_of_them_changes() -> None:
+    assert not locked(RECTANGLE).any()
+    assert locked(THREE).tolist() == [False, True, False, True, False, True]
+    slides = replace(THREE, joints=THREE.joints[:2])
+    assert locked(slides).tolist() == [False, True, False, True, True, True]
+    x, y = np.eye(3)[:2]
+    home = THREE.reference_pose[:3]
+    # two hinges turn the platform about every axis; one beside its origin moves that as well
+    gimbal = replace(
+        THREE, joints=tuple(Joint("hinge", n, a, home) for n, a in (("x", x), ("y", y)))
+    )
+    assert locked(gimbal).tolist() == [True, True, True, False, False, False]
+    door = replace(THREE, joints=(Joint("hinge", "y", y, home + 0.5 * x),))
+    assert locked(door).tolist() == [False, True, False, True, False, True]

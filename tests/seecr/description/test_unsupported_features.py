@@ -9,7 +9,6 @@ import pytest
 from click.testing import CliRunner
 
 from seecr.cli import main
-from seecr.description import mjcf as module
 from seecr.description.mjcf import load_robot, model_names, model_path, unsupported_features
 
 PLANAR = model_path("planar_vertical").read_text(encoding="utf-8")
@@ -71,13 +70,6 @@ def test_what_the_file_switches_off_does_not_count(flag: str, left: tuple[str, .
     assert found(text) == ("joint limits", "dry friction", "contacts")
     option = f'<option><flag {flag}="disable"/></option>'
     assert found(text.replace("<worldbody>", f"{option}<worldbody>")) == left
-
-
-def test_the_flags_are_mujocos() -> None:
-    bits = mujoco.mjtDisableBit
-    names = ("CONSTRAINT", "FRICTIONLOSS", "LIMIT", "CONTACT")
-    for name in names:
-        assert getattr(module, f"_{name}") == int(getattr(bits, f"mjDSBL_{name}"))
 
 
 @pytest.mark.parametrize(

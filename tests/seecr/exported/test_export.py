@@ -61,6 +61,18 @@ def test_a_description_rests_in_mujoco_where_seecr_says(
     assert np.abs(away / np.repeat([1.0, 1.0 / COGIRO.length], 3)).max() < NEAR * COGIRO.length
 
 
+def test_what_edits_nothing_is_in_no_file_and_the_rest_lengths_have_what_winches_pay_out(
+    plain: tuple[Terms, Export],
+) -> None:
+    assert export(COGIRO, [term(COGIRO, "pulley_radius")]).bodies == ()
+    assert set(plain[1].lengths) == {"drum_gain", "initial_pose_error"}
+    assert {*plain[1].plain, *plain[1].lengths} == set(PLAIN)
+    assert plain[1].bodies == plain[1].nowhere == () and plain[1].mujoco_text is None
+    assert export(COGIRO, [term(COGIRO, "cable_length_offset", offset_1_m=1e-3)]).lengths == (
+        "cable_length_offset",
+    )
+
+
 def test_a_description_is_read_back_as_it_was(plain: tuple[Terms, Export], tmp_path: Path) -> None:
     path = tmp_path / "robot.xml"
     for robot, text in (

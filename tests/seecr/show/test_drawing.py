@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from itertools import combinations
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
 from PIL import Image
 
-from seecr.errors import InputFileError
 from seecr.pose import Array
 from seecr.show.colours import COLOURS
 from seecr.show.figures import figure
@@ -37,23 +34,6 @@ def test_a_figure_is_as_large_as_asked_for(tmp_path: Path) -> None:
     drawn(tmp_path / "a.png")
     with Image.open(tmp_path / "a.png") as picture:
         assert picture.size == (300, 150)
-
-
-def test_a_picture_that_cannot_be_written_leaves_the_old_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    old = drawn(tmp_path / "a.png")
-
-    def half(figure: Figure, path: Path, **options: Any) -> None:
-        path.write_bytes(old[:100])
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Figure, "savefig", half)
-    failure = r"a\.png: cannot be written: No space left"
-    with pytest.raises(InputFileError, match=failure), figure(tmp_path / "a.png"):
-        pass
-    assert (tmp_path / "a.png").read_bytes() == old
-    assert [file.name for file in tmp_path.iterdir()] == ["a.png"]
 
 
 def test_what_fails_leaves_no_file(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from recordings import Readback, headless_viewer
 from slab import slides
 
 from seecr.description.mjcf import load_robot, model_path
-from seecr.show import map_figure, map_recording
+from seecr.show import map_recording
 from seecr.show.colours import scale_colours
 from seecr.show.map_recording import Elastic, write_map_recording
 from seecr.statics.solution import Status
@@ -78,7 +78,6 @@ def test_each_slice_has_the_maps_values_as_colours(
 
 
 def test_legends_have_the_figures_ends_and_units(found: Workspace, back: Readback) -> None:
-    assert map_figure.colour_end is map_recording.colour_end
     away = colour_end(found, 1e3 * np.linalg.norm(found.deviation, axis=-1))
     turn = colour_end(found, np.degrees(np.linalg.norm(found.rotation, axis=-1)))
     for name, unit, top in (("away", "mm", away), ("turn", "°", turn)):

@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from kept_figures import keep_figures
 from matplotlib.colors import to_hex
+from PIL import Image
 from slab import slides
 
 from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
+from seecr.errors import InputError
 from seecr.show.batch_words import softest_line
 from seecr.show.map_figure import map_figure
 from seecr.workspace.grid import Workspace
@@ -219,3 +221,59 @@ def test_the_softest_pose_of_a_large_robot_has_no_exponent() -> None:
     robot = load_robot("camera")
     (line,) = softest_line(workspace_map(robot, [52.5, 60.0], [34.0], [20.0]))
     assert line.startswith("softest of these at x y z 52500 34000 20000 mm: ")
+
+
+def test_a_probability_has_a_row_of_its_own_and_one_axis_no_figure(drawn: Drawn) -> None:
+    found = a_map(*[-1.0] * 3, *[1.0] * 6)
+    assert "probability" not in [ax.get_ylabel() for ax in drawn(found).axes]
+    unsure = replace(found, chance=np.where(found.feasible, 0.5, 0.0).astype(np.float32))
+    assert "probability" in [ax.get_ylabel() for ax in drawn(unsure).axes]
+    with pytest.raises(InputError, match="at least two axes"):
+        drawn(workspace_map(found.robot, 0.4, 0.25, [0.1, 0.2], elastic=False))
+
+
+def test_colours_of_a_map_are_those_of_poses_that_can_be_held(drawn: Drawn) -> None:
+    x, y = np.linspace(0.04, 0.76, 9), np.linspace(0.04, 0.46, 7)
+    found = workspace_map(load_robot("demobot_cogiro"), x, y, [0.1])
+    bars = {ax.get_ylabel(): ax.get_ylim()[1] for ax in drawn(found).axes[4:]}
+    away = 1e3 * np.linalg.norm(found.deviation, axis=-1)
+    held = away[found.feasible]
+    assert np.quantile(held, 0.9) < bars["off the command [mm]"] <= held.max() < 0.2 * away.max()
+    turned = np.degrees(np.linalg.norm(found.rotation, axis=-1))
+    assert bars["turned [°]"] <= turned[found.feasible].max() < 0.2 * turned.max()
+
+
+def test_a_map_says_which_slices_it_has_and_what_is_white(drawn: Drawn) -> None:
+    robot = load_robot("demobot_cogiro")
+    x, y = np.linspace(0.04, 0.76, 7), np.linspace(0.04, 0.46, 5)
+    found = workspace_map(robot, x, y, [0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4])
+    one = drawn(found)
+    assert "4 of 7 values of z; white: cannot be held (margin); arrows: " in title(one)
+    assert "orange: the edge" in title(one)
+    for ax in one.axes[:4]:
+        cells, _edge = ax.collections
+        assert cells.get_rasterized(), "lines would show between the cells of an SVG"
+    fallen = replace(found, slack=np.where(found.margin > 0.1, found.slack, -1).astype(np.int8))
+    words = "cannot be held (margin), or does not come to rest (below it)"
+    assert words in title(drawn(fallen))
+    said = title(drawn(workspace_map(robot, [0.3, 0.4], [0.2, 0.3], [0.1])))
+    assert not any(word in said for word in ("white", "values of", "orange"))
+
+
+def test_the_title_of_a_narrow_figure_is_whole(tmp_path: Path) -> None:
+    found = workspace_map(load_robot("demobot_cogiro"), [0.3, 0.4], 0.25, [0.1, 0.2])
+    map_figure(tmp_path / "narrow.png", found)
+    picture = np.asarray(Image.open(tmp_path / "narrow.png").convert("L"))
+    assert picture[:, [0, -1]].min() == 255
+
+
+def test_a_large_robots_map_is_drawn_in_metres_and_its_colours_show_most_margins(
+    drawn: Drawn,
+) -> None:
+    x, y = [0, 30, 52.5, 75, 105], [0, 20, 34, 48, 68]
+    found = workspace_map(load_robot("camera"), x, y, [8, 24.99], elastic=False)
+    panel, bar = drawn(found, most=1).axes
+    said = panel.get_xlabel(), panel.get_ylabel(), panel.get_title()
+    assert said == ("x [m]", "y [m]", "z = 8 m")
+    margins = found.margin[found.feasible]
+    assert margins.max() > 1e4 > 1e3 > bar.get_ylim()[1] > np.median(margins)

@@ -24,6 +24,9 @@ from seecr.show.pose_words import (
 )
 from seecr.workspace.spans import SlackSpan
 
+PARALLEL = seecr.load_robot("demobot_parallel")
+AT_HOME = seecr.solve(PARALLEL, [PARALLEL.reference_pose])
+
 
 def test_rounding_is_no_turn() -> None:
     robot = seecr.load_robot(model_path("demobot_cogiro"))
@@ -65,7 +68,7 @@ def test_a_platform_that_hangs_twisted_is_told_so() -> None:
 
 def test_what_has_no_energy_gets_no_number() -> None:
     """A moment from outside has no energy: no nan is said, here or of what is between two rests."""
-    robot = seecr.load_robot(model_path("demobot_parallel"))
+    robot = PARALLEL
     quat = np.array([0.943, 0.163, -0.288, -0.038])
     tilted = np.array([0.351, 0.216, 0.109, *(quat / np.linalg.norm(quat))])
     free = seecr.solve(robot, tilted, others=True)
@@ -106,8 +109,7 @@ def test_joints_move_along_slides_and_turn_about_hinges() -> None:
 
 def test_other_equilibria_are_told_apart() -> None:
     """Several as far away had been lines of the same words."""
-    robot = seecr.load_robot(model_path("demobot_parallel"))
-    found = seecr.solve(robot, [robot.reference_pose])
+    robot, found = PARALLEL, AT_HOME
     turned = np.tile(robot.reference_pose, (2, 1))
     turned[:, 0] += [0.1, -0.1]
     lines = list(other_lines(found, replace(seecr.solve(robot, turned), energy=np.zeros(2))))
@@ -116,8 +118,7 @@ def test_other_equilibria_are_told_apart() -> None:
 
 def test_why_there_are_no_barriers_is_said_once() -> None:
     """Every line of three had ended with the same 25 words."""
-    robot = seecr.load_robot(model_path("demobot_parallel"))
-    found = seecr.solve(robot, [robot.reference_pose])
+    robot, found = PARALLEL, AT_HOME
     turned = np.tile(robot.reference_pose, (3, 1))
     turned[:, 0] += [0.1, -0.1, 0.05]
     rests = seecr.solve(robot, turned)
@@ -134,7 +135,7 @@ def test_why_there_are_no_barriers_is_said_once() -> None:
 
 def test_the_furthest_is_so_by_position_and_orientation_at_once() -> None:
     """Where positions are right but for rounding, rounding had said which turned most."""
-    robot = seecr.load_robot(model_path("demobot_parallel"))
+    robot = PARALLEL
     found = seecr.solve(robot, np.tile(robot.reference_pose, (2, 1)))
     off = np.array([[0.0, 0.0, 0.0, 0.0, 0.6, 0.0], [1e-15, 0.0, 0.0, 0.0, 0.1, 0.0]])
     line = replace(found, deviation=off).lines()[1]
@@ -143,7 +144,7 @@ def test_the_furthest_is_so_by_position_and_orientation_at_once() -> None:
 
 def test_the_largest_position_error_is_told_beside_the_largest_rotation() -> None:
     """The pose that was turned most had hidden the one that was 30 mm off."""
-    robot = seecr.load_robot(model_path("demobot_parallel"))
+    robot = PARALLEL
     found = seecr.solve(robot, np.tile(robot.reference_pose, (3, 1)))
     off = np.zeros((3, 6))
     off[0, 0], off[1, 4], off[2, 0] = 0.03, 0.6, 0.01
@@ -240,8 +241,7 @@ def test_in_a_plane_the_turn_is_one_angle() -> None:
 
 def test_three_other_equilibria_are_listed_twisted_ones_last() -> None:
     """Ten lines of twisted ones had stood between the pose and what to do next."""
-    robot = seecr.load_robot(model_path("demobot_parallel"))
-    found = seecr.solve(robot, [robot.reference_pose])
+    robot, found = PARALLEL, AT_HOME
     turned = np.tile(robot.reference_pose, (5, 1))
     turned[:, 0] += [0.1, 0.11, 0.12, 0.13, 0.14]
     rests = replace(seecr.solve(robot, turned), energy=np.zeros(5))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -94,25 +93,6 @@ def test_poses_far_from_the_limit_are_decided_by_few_models(
     every = held_chance(ROBOT, poses, model, lowest=0.02)
     assert every is not None
     np.testing.assert_allclose(few, every, atol=0.005)
-
-
-def test_full_searches_are_made_where_there_is_hope(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two cables: one position is found by itself, one by full searches alone, one by none."""
-    asked: list[tuple[int, bool]] = []
-
-    def margins_at(_robot: Robot, at: Array, *_rest: Any, thorough: bool = True) -> Array:
-        asked.append((len(at), thorough))
-        return np.where(at[:, 0] < (1.5 if thorough else 0.5), 1.0, -np.inf)
-
-    monkeypatch.setattr(margins, "margins_at", margins_at)
-    robot: Any = SimpleNamespace(n_cables=2, n_dof=3)
-    places = np.zeros((3, 7))
-    places[:, 0] = [0.0, 1.0, 2.0]
-    for hopeful, found in ((np.ones(3, bool), [1.0, 1.0, -np.inf]), (places[:, 0] < 1, [1.0])):
-        asked.clear()
-        out = margins._margins(robot, places, (0.0, 1.0, None), (), hopeful)
-        assert out[: len(found)].tolist() == found
-        assert asked == [(3, False), *([(2, True)] if hopeful.all() else [])]
 
 
 def test_two_cables_hold_a_position_as_often_as_the_mass_allows(
@@ -225,8 +205,12 @@ def test_the_boundary_is_that_of_the_model_and_of_the_probability_asked_for(tmp_
 
 
 def test_maps_that_can_have_no_probabilities_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="need a model with its covariance; expected a table"):
-        workspace_map(ROBOT, 0.3, 0.2, 0.1, elastic=False, chance=True)
+    def told(_done: int) -> None:
+        raise AssertionError("a part was mapped")
+
+    for effects in ((), model_of(tmp_path, MODEL)):
+        with pytest.raises(InputError, match="need a model with its covariance; expected a table"):
+            workspace_map(ROBOT, 0.3, 0.2, 0.1, effects=effects, chance=True, progress=told)
     plain = workspace_map(ROBOT, 0.3, 0.2, 0.1, elastic=False)
     with pytest.raises(InputError, match="this map has no probabilities"):
         plain.likely(0.9)
@@ -283,12 +267,3 @@ upwards_m_per_N = { value = 0.0, stderr = 1e-3 }
     # out of all reach no pose is held by any of them
     far = POSES + np.array([9.0, 0, 0, 0, 0, 0, 0])
     np.testing.assert_array_equal(held_chance(ROBOT, far, model, lowest=0.02), 0.0)
-
-
-def test_what_can_have_no_probabilities_is_refused_before_the_map(tmp_path: Path) -> None:
-    def told(_done: int) -> None:
-        raise AssertionError("a part was mapped")
-
-    with pytest.raises(InputError, match="need a model with its covariance"):
-        workspace_map(ROBOT, 0.3, 0.2, 0.1, effects=model_of(tmp_path, MODEL), chance=True,
-                      progress=told)  # fmt: skip

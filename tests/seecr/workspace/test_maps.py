@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import json
-import re
 import threading
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from kept_figures import keep_figures
 from margin_by_highs import margin_by_highs
-from PIL import Image
 from random_robots import random_poses, random_robot
 from unbalanced import unbalanced
 
@@ -25,14 +21,10 @@ from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.inverse import correction
 from seecr.inverse.correction import correct, margins_in_place
-from seecr.inverse.in_place import Turned
 from seecr.pose import quat_from_rotvec
 from seecr.show.batch_words import edge_line, softest_line
 from seecr.show.files import write_arrays
-from seecr.show.map_figure import map_figure
-from seecr.show.map_recording import write_map_recording
 from seecr.workspace import maps
-from seecr.workspace.grid import Workspace
 from seecr.workspace.maps import default_axes, workspace_map
 from seecr.workspace.margins import boundary
 from seecr.workspace.planar import bar_tilt
@@ -183,7 +175,7 @@ def test_the_edge_is_looked_for_between_neighbours_of_the_grid() -> None:
 
 
 @pytest.mark.slow
-def test_a_map_is_what_each_pose_says(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_map_is_what_each_pose_says() -> None:
     robot = robot_named("demobot_parallel")
     axes = np.linspace(0.2, 0.6, 5), np.linspace(0.2, 0.3, 2), np.array([0.1, 0.2])
     done: list[int] = []
@@ -207,17 +199,6 @@ def test_a_map_is_what_each_pose_says(monkeypatch: pytest.MonkeyPatch, tmp_path:
     assert len(found.records()) == 20
     assert found.records()[0]["softest_rz_rad"] == found.softest[0, 0, 0, 5]
     assert f"{int(found.feasible.sum())} of 20 poses can be held" in str(found)
-    map_figure(tmp_path / "map.svg", found)
-    text = (tmp_path / "map.svg").read_text()
-    assert all(words in text for words in ("tension margin [N]", "slack cables", "x [mm]"))
-    write_map_recording(found, tmp_path / "map.rrd")
-    assert (tmp_path / "map.rrd").stat().st_size > 1000
-    assert "probability" not in text
-    unsure = replace(found, chance=np.where(found.feasible, 0.5, 0.0).astype(np.float32))
-    chances = figure_of(monkeypatch, tmp_path / "chance.svg", unsure)
-    assert "probability" in [ax.get_ylabel() for ax in chances.axes]
-    with pytest.raises(InputError, match="at least two axes"):
-        map_figure(tmp_path / "no.png", workspace_map(robot, 0.4, 0.25, [0.1, 0.2], elastic=False))
 
 
 @pytest.mark.parametrize(
@@ -269,64 +250,6 @@ def test_a_map_without_the_elastic_robot_has_no_status(tmp_path: Path) -> None:
         assert "status" not in kept
 
 
-def figure_of(monkeypatch: pytest.MonkeyPatch, path: Path, found: Workspace) -> Any:
-    """A map's figure, not written: its panels row by row, and one bar of colours for each row."""
-    with monkeypatch.context() as meanwhile:
-        kept = keep_figures(meanwhile)
-        map_figure(path, found)
-    return kept[0]
-
-
-def title(figure: Any) -> str:
-    return " ".join(figure.get_suptitle().split())
-
-
-@pytest.mark.slow
-def test_colours_of_a_map_are_those_of_poses_that_can_be_held(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    robot = robot_named("demobot_cogiro")
-    found = workspace_map(robot, np.linspace(0.04, 0.76, 9), np.linspace(0.04, 0.46, 7), [0.1])
-    panels = figure_of(monkeypatch, tmp_path / "map.png", found).axes
-    bars = {ax.get_ylabel(): ax.get_ylim()[1] for ax in panels[4:]}
-    away = 1e3 * np.linalg.norm(found.deviation, axis=-1)
-    held = away[found.feasible]
-    assert np.quantile(held, 0.9) < bars["off the command [mm]"] <= held.max() < 0.2 * away.max()
-    turned = np.degrees(np.linalg.norm(found.rotation, axis=-1))
-    assert bars["turned [°]"] <= turned[found.feasible].max() < 0.2 * turned.max()
-
-
-@pytest.mark.slow
-def test_a_map_says_which_slices_it_has_and_what_is_white(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    robot = robot_named("demobot_cogiro")
-    x, y = np.linspace(0.04, 0.76, 7), np.linspace(0.04, 0.46, 5)
-    found = workspace_map(robot, x, y, [0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4])
-    path = tmp_path / "map.svg"
-    map_figure(path, found)
-    assert "4 of 7 values of z; white: cannot be held (margin); arrows: " in path.read_text()
-    assert "orange: the edge" in path.read_text()
-    panels = figure_of(monkeypatch, tmp_path / "again.svg", found).axes[:4]
-    assert all(len(ax.collections) == 2 for ax in panels), "an edge in the margins' panels too"
-    cells = path.read_text().count("<path")
-    assert cells < found.margin.size, "no path for each cell: lines would show between them"
-    fallen = replace(found, slack=np.where(found.margin > 0.1, found.slack, -1).astype(np.int8))
-    words = "cannot be held (margin), or does not come to rest (below it)"
-    assert words in title(figure_of(monkeypatch, path, fallen))
-    inner = workspace_map(robot, [0.3, 0.4], [0.2, 0.3], [0.1])
-    said = title(figure_of(monkeypatch, path, inner))
-    assert not any(word in said for word in ("white", "values of", "orange"))
-
-
-@pytest.mark.slow
-def test_the_title_of_a_narrow_figure_is_whole(tmp_path: Path) -> None:
-    found = workspace_map(robot_named("demobot_cogiro"), [0.3, 0.4], 0.25, [0.1, 0.2])
-    map_figure(tmp_path / "narrow.png", found)
-    picture = np.asarray(Image.open(tmp_path / "narrow.png").convert("L"))
-    assert picture[:, [0, -1]].min() == 255
-
-
 def test_a_map_is_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = robot_named("demobot_parallel")
     axes = np.linspace(0.2, 0.6, 5), np.linspace(0.2, 0.3, 2), np.array([0.1, 0.2])
@@ -345,39 +268,6 @@ def test_a_map_is_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
         assert processors > 1 or done == [3, 3, 3, 3, 3, 3, 2]
         for name in ("margin", "deviation", "rotation", "slack", "stiffness", "softest", "status"):
             np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
-
-
-def test_a_part_that_takes_long_holds_up_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot, others = robot_named("demobot_parallel"), threading.Semaphore(0)
-    own = maps.margins_at
-
-    def slow_at_first(robot: Robot, poses: np.ndarray, *rest: Any) -> np.ndarray:
-        if poses[0, 0] > 0.2:
-            others.release()
-        elif not all(others.acquire(timeout=60.0) for _ in range(4)):
-            raise TimeoutError("the other parts waited for this one")
-        return own(robot, poses, *rest)
-
-    monkeypatch.setattr(maps, "_PART", 1)
-    monkeypatch.setattr(maps, "margins_at", slow_at_first)
-    monkeypatch.setattr(parallel, "processors", lambda: 2)
-    found = workspace_map(robot, np.linspace(0.2, 0.6, 5), 0.25, 0.1, elastic=False)
-    assert found.feasible.any()
-
-
-def test_a_large_robots_map_is_drawn_in_metres_and_its_colours_show_most_margins(
-    tmp_path: Path,
-) -> None:
-    robot = robot_named("camera")
-    found = workspace_map(
-        robot, [0, 30, 52.5, 75, 105], [0, 20, 34, 48, 68], [8, 24.99], elastic=False
-    )
-    map_figure(tmp_path / "map.svg", found, most=1)
-    text = (tmp_path / "map.svg").read_text()
-    assert "x [m]" in text and "y [m]" in text and "z = 8 m" in text
-    margins = found.margin[found.feasible]
-    ticks = [float(tick) for tick in re.findall(r">(\d+(?:\.\d+)?)</text>", text)]
-    assert margins.max() > 1e4 > 1e3 > max(ticks) > np.median(margins)
 
 
 @pytest.mark.slow
@@ -417,25 +307,6 @@ def test_an_orientation_from_which_the_platform_goes_elsewhere_does_not_hold(
     monkeypatch.setattr(correction, "poses_in_place", lambda problem, *_: (problem.wanted, both))
     held = margins_in_place(robot, poses, (), 0.0, 6.0)
     assert held[0] > 0.0 and held[1] == -np.inf
-
-
-def test_few_positions_are_searched_in_earnest(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The others from their neighbours' orientations."""
-    tried, own = [], Turned.search
-
-    def counted(out: Turned, rows: np.ndarray, starts: Any, **how: Any) -> None:
-        if starts[0].shape[1] > 1:
-            tried.append(len(rows))
-        own(out, rows, starts, **how)
-
-    monkeypatch.setattr(Turned, "search", counted)
-    robot = only_cables(robot_named("demobot_parallel"), [0, 2, 4, 6])
-    x, y = np.meshgrid(np.linspace(0.05, 0.75, 12), np.linspace(0.05, 0.45, 12))
-    poses = np.tile([0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0], (x.size, 1))
-    poses[:, :2] = np.column_stack([x.ravel(), y.ravel()])
-    held = margins_in_place(robot, poses, (), 0.0, np.inf) >= 0.0
-    assert held.sum() > 0.5 * len(poses)
-    assert sum(tried) < (~held).sum() + 0.1 * len(poses)
 
 
 @pytest.mark.slow
@@ -594,17 +465,6 @@ def test_effects_with_a_memory_have_no_elastic_map() -> None:
         workspace_map(robot, [0.3, 0.4], 0.25, 0.1, effects=slow)
     held = workspace_map(robot, [0.3, 0.4], 0.25, 0.1, effects=slow, elastic=False)
     assert held.feasible.all()
-
-
-@pytest.mark.slow
-def test_a_figure_promises_an_edge_only_where_it_draws_one(tmp_path: Path) -> None:
-    robot = robot_named("demobot_cogiro")
-    found = workspace_map(robot, np.linspace(0.3, 0.5, 3), np.linspace(0.2, 0.3, 3), 0.1)
-    margin = np.linspace(-1.0, 1.0, 9).reshape(3, 3, 1)
-    for name, margins in (("edge", margin), ("few", np.where(margin < 0.0, -np.inf, 0.0))):
-        path = tmp_path / f"{name}.svg"
-        map_figure(path, replace(found, margin=margins))
-        assert ("orange" in path.read_text()) == (name == "edge")
 
 
 def test_the_default_grid_has_a_zero_and_no_rounding_beside_it() -> None:

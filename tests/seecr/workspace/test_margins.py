@@ -12,10 +12,9 @@ from rectangle import RECTANGLE
 from seecr.description.mjcf import load_robot
 from seecr.effects import Term, Terms
 from seecr.errors import InputError, InputFileError
-from seecr.prediction.model import Model
 from seecr.workspace.maps import workspace_map
-from seecr.workspace.margins import is_held, margins_at, read_once
-from seecr.workspace.zones import feasible, tension_margin
+from seecr.workspace.margins import margins_at
+from seecr.workspace.zones import feasible, is_held, tension_margin
 
 COGIRO = load_robot("demobot_cogiro")
 HOME = COGIRO.reference_pose[None]
@@ -24,10 +23,7 @@ HOME = COGIRO.reference_pose[None]
 def test_a_pose_is_held_to_within_rounding_of_the_load() -> None:
     margins = 20.0 * np.array([0.0, -9e-10, -1.1e-9, np.inf, -np.inf, np.nan])
     assert is_held(RECTANGLE, margins).tolist() == [True, True, False, True, False, False]
-
-
-def test_without_gravity_it_is_the_rounding_of_the_cables() -> None:
-    floating = replace(RECTANGLE, gravity=np.zeros(3))
+    floating = replace(RECTANGLE, gravity=np.zeros(3))  # of the cables, without a load
     margins = 1e-3 * 1000.0 * np.array([-9e-10, -1.1e-9])
     assert is_held(floating, margins).tolist() == [True, False]
 
@@ -39,15 +35,6 @@ def test_a_heavier_platform_is_the_robot_with_that_mass() -> None:
     found = margins_at(COGIRO, HOME, *limits, None, added)
     assert found == pytest.approx(margins_at(heavy, HOME, *limits, None, ()), rel=1e-9)
     assert abs(found[0] - margins_at(COGIRO, HOME, *limits, None, ())[0]) > 1e-3
-
-
-def test_a_model_is_read_once_and_what_is_read_stays_as_it_is(tmp_path: Path) -> None:
-    path = tmp_path / "m.toml"
-    path.write_text('[[effect]]\nname = "platform_mass"\nparameters.added_kg = 0.2\n')
-    for given in (path, str(path)):
-        model = read_once(given, COGIRO)
-        assert isinstance(model, Model) and model.terms["platform_mass"].vector == [0.2]
-        assert read_once(model, COGIRO) is model
 
 
 PUSHES = [[0.3, 0, 0, 0, 0, 0], [-0.3, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0.01, 0]]
@@ -99,9 +86,7 @@ def test_a_wrench_adds_to_effects_and_to_each_of_a_set(acting: str) -> None:
     by_row = tension_margin(COGIRO, poses, wrench=each, effects=effects, **limits)
     alone = tension_margin(COGIRO, poses, effects=effects, **limits)
     np.testing.assert_allclose(
-        by_row,
-        [tension_margin(COGIRO, HOME, effects=outside, **limits)[0], alone[1]],
-        rtol=1e-9,
+        by_row, [tension_margin(COGIRO, HOME, effects=outside, **limits)[0], alone[1]], rtol=1e-9
     )
     assert abs(by_row[0] - by_row[1]) > 1e-3
 

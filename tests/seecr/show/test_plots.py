@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import rerun.blueprint as rrb
+from recordings import Readback
+from slab import slides
 
 from seecr.description.mjcf import load_robot, model_path
+from seecr.description.robot import Robot
+from seecr.equilibrium.solving import solve
+from seecr.show.colours import alike, joined
 from seecr.show.plots import Legend, legend_of
-from seecr.show.shapes import cable_labels, extent
+from seecr.show.scene import cable_labels, extent
+from seecr.show.sweep_recording import write_sweep_recording
 
 SIZE = (600.0, 200.0)
 RIGHT_TOP, LEFT_TOP = rrb.Corner2D.RightTop, rrb.Corner2D.LeftTop
@@ -73,3 +80,42 @@ def test_cables_that_leave_side_by_side_have_one_label_and_those_in_front_stand_
     assert np.ptp(places[lifted][:, 1]) < 0.1 < np.ptp(places[:, 1])
     apart = replace(robot, exit_points=3.0 * robot.exit_points)
     assert len(cable_labels(apart, low, high)[1]) > 4
+
+
+def lines(*ends: tuple[float, float]) -> np.ndarray:
+    """Straight lines over 50 times from their first values to their last ones."""
+    return np.stack([np.linspace(*pair, 50) for pair in ends], axis=1)
+
+
+def test_curves_that_lie_on_each_other_have_one_name() -> None:
+    one = lines((0.0, 1.0), (2.0, 3.0), (0.0, 1.0))
+    assert alike([one]) == [[0, 2], [1]]
+    assert alike([one, lines((0.0, 1.0), (2.0, 3.0), (0.0, 2.0))]) == [[0], [1], [2]]
+    assert joined(["cable1", "cable3"]) == "cable1, 3"
+    assert joined(["left", "right"]) == "left, right"
+    assert joined(["a1", "b1"]) == "a1, b1" and joined(["rope"]) == "rope"
+
+
+AWAY, TURN, PULL = "Deviation from the command [mm]", "Rotation from the command [°]", "Tension [N]"
+
+
+@pytest.mark.parametrize(
+    ("robot", "views"),
+    [(slides(), {AWAY, PULL}), (load_robot("planar_vertical"), {AWAY, TURN, PULL})],
+    ids=["slides", "turns"],
+)
+def test_rotations_have_a_panel_where_the_platform_turns(
+    robot: Robot, views: set[str], tmp_path: Path
+) -> None:
+    commands = np.tile(robot.reference_pose, (4, 1))
+    commands[:, 0] += np.linspace(0.0, 0.06, 4)
+    found = solve(robot, commands)
+    assert found.converged.all()
+    write_sweep_recording(found, tmp_path / "sweep.rrd")
+    back = Readback(tmp_path / "sweep.rrd")
+    assert {name.split(",")[0] for name in back.views} & {AWAY, TURN, PULL} == views
+    drawn = {entity for entity in back.entities("pose") if entity.startswith("/plot/rotation")}
+    assert len(drawn) == (4 if TURN in views else 0)
+    np.testing.assert_allclose(
+        back.scalars("/plot/deviation/dz"), 1e3 * found.deviation[:, 2], atol=1e-9
+    )
