@@ -91,30 +91,22 @@ class Association:
 
 
 def associations(problem: Problem, white: Array, prediction: Prediction) -> list[Association]:
-    """Associations of the residuals, the strongest first.
-
-    Args:
-        problem: the data.
-        white: (N,) whitened residuals.
-        prediction: prediction of the model that leaves them.
-    """
+    """Associations of the whitened residuals (N,) of a prediction, the strongest first."""
     raw = problem.residuals(prediction.readings)
     way = travel(problem, prediction)
     table = as_table(problem, white)
-    names, units = channels(problem)
     tried = [
-        _row(quantity, "readings", table, raw, names, units, 1.0)
+        _row(quantity, "readings", table, raw, *channels(problem), 1.0)
         for quantity in of_rows(problem, prediction, way)
     ]
     tried += _in_cables(problem, raw, prediction, way)
     found = [row for row in tried if row is not None]
     found += _swinging(problem, table, raw, max((row.share for row in found), default=0.0))
     found = [replace(row, p=min(1.0, row.p * len(found))) for row in found]
-    return sorted(found, key=_order)
-
-
-def _order(row: Association) -> tuple[bool, float, float]:
-    return (not row.significant, -row.share if row.significant else row.p, row.p)
+    return sorted(
+        found,
+        key=lambda row: (not row.significant, -row.share if row.significant else row.p, row.p),
+    )
 
 
 def _in_cables(
@@ -122,9 +114,7 @@ def _in_cables(
 ) -> list[Association | None]:
     """Errors of cable length against each cable's own length, tension and motion."""
     errors, noise = cable_errors(problem, raw, prediction)
-    if not np.isfinite(errors).any() or not np.all(noise > 0):
-        return []
-    if not _vary(errors / noise).any():
+    if not np.isfinite(errors).any() or not np.all(noise > 0) or not _vary(errors / noise).any():
         return []  # of one pose all cables have errors; nothing says what these depend on
     part = independent_part(problem, prediction)
     table = (errors / noise).reshape(-1, 1)
@@ -142,8 +132,7 @@ def _swinging(problem: Problem, table: Array, raw: Array, least: float) -> list[
     again, tried = in_time(problem, table)
     if again is None:
         return []
-    names, units = channels(problem)
-    row = _row(again, "readings", table, raw, names, units, 1.0)
+    row = _row(again, "readings", table, raw, *channels(problem), 1.0)
     if row is None or row.share < least + _CLEARLY:
         return []
     return [replace(row, p=min(1.0, row.p * tried))]
@@ -168,8 +157,8 @@ def _row(
     won = np.full(len(counts), len(labels) - (0 if constant else 1)) * (counts > len(labels))
     if lost.sum() <= 0:
         return None
-    each = _p(part * between, won, part * within, lost)
-    whole = _p(
+    each = f_test(part * between, won, part * within, lost)
+    whole = f_test(
         part * between.sum(keepdims=True), won.sum(keepdims=True),
         part * within.sum(keepdims=True), lost.sum(keepdims=True),
     )[0]  # fmt: skip
@@ -192,7 +181,8 @@ def _row(
     )
 
 
-def _p(between: Array, won: Array, within: Array, lost: Array) -> Array:
+def f_test(between: Array, won: Array, within: Array, lost: Array) -> Array:
+    """p-values (k,) of sums of squares between and within bins with these degrees of freedom."""
     good = (won > 0) & (lost > 0)
     safe = np.where(good, lost, 1.0)
     with np.errstate(over="ignore"):  # rows that are identical have no variance within
@@ -238,20 +228,18 @@ def _binned(quantity: Abscissa, some: NDArray[np.bool_]) -> tuple[NDArray[np.int
     levels, place = np.unique(rounded, return_inverse=True)
     if len(levels) <= _BINS:
         index[some] = place
-        return index, [_labelled(v, v, quantity.unit) for v in levels]
+        return index, [labelled(v, v, quantity.unit) for v in levels]
     count = int(min(_BINS, max(2, len(rounded) // _IN_A_BIN)))
     edges = np.unique(np.quantile(rounded, np.linspace(0, 1, count + 1)[1:-1]))
     place = np.searchsorted(edges, rounded, side="right")
     used, place = np.unique(place, return_inverse=True)
     index[some] = place
-    labels = []
-    for b in range(len(used)):
-        inside = rounded[place == b]
-        labels.append(_labelled(float(inside.min()), float(inside.max()), quantity.unit))
-    return index, labels
+    inside = [rounded[place == b] for b in range(len(used))]
+    return index, [labelled(float(b.min()), float(b.max()), quantity.unit) for b in inside]
 
 
-def _labelled(low: float, high: float, unit: str) -> str:
+def labelled(low: float, high: float, unit: str) -> str:
+    """A bin of numbers in words."""
     return f"{between(low, high)} {unit}".strip()
 
 

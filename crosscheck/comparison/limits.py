@@ -134,7 +134,12 @@ def exceeded(limits: Limits, found: Comparison) -> list[Exceeded]:
         limit = getattr(limits, name)
         if limit is None:
             continue
-        _check_measured(found, name, rule.kind)
+        data = found.problem.data
+        if not getattr(data, f"has_{rule.kind.name}"):
+            raise CrosscheckError(
+                f"{option(name)}: {data.path} has no {rule.kind.name} readings; expected limits on "
+                "what was measured"
+            )
         sizes = found.errors_of(rule.kind.name)
         if not np.isfinite(sizes).any():
             continue
@@ -142,20 +147,6 @@ def exceeded(limits: Limits, found: Comparison) -> list[Exceeded]:
         if value is not None and value > limit:
             out.append(Exceeded(name, limit, value, _words(found, rule, limit, value)))
     return out
-
-
-def _check_measured(found: Comparison, name: str, kind: Kind) -> None:
-    data = found.problem.data
-    read = {
-        "position": data.has_position,
-        "orientation": data.has_orientation,
-        "tension": data.has_tension,
-    }
-    if not read[kind.name]:
-        raise CrosscheckError(
-            f"{option(name)}: {data.path} has no {kind.name} readings; expected limits on what "
-            "was measured"
-        )
 
 
 def _words(found: Comparison, rule: Rule, limit: float, value: float) -> str:

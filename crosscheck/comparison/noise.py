@@ -43,9 +43,6 @@ def rows_far_off(problem: Problem, terms: Terms) -> NDArray[np.bool_]:
     """(n,) outliers; none if too many are: they are structure then.
 
     Of more than 400 rows, and of too few readings, those that are far off the others as they are.
-
-    Args:
-        problem: the data with their noise. terms: the model as it stands.
     """
     every = problem.data.n_rows
     none = np.zeros(every, dtype=bool)
@@ -106,18 +103,14 @@ class Coloured:
 
 
 def coloured_noise(problem: Problem, state: State, factor: Array) -> Coloured | None:
-    """The residuals as autocorrelated noise with outliers; None if they are not noise.
-
-    Args:
-        problem: the data. state: the model's predictions. factor: :meth:`Problem.noise`.
-    """
+    """The residuals as autocorrelated noise with outliers; None if they are not noise."""
     if not state.valid or problem.n_readings < _LEAST_READINGS:
         return None
     stated = [kind.name for kind in kinds_stated(problem)]
     data = Data(problem, factor, chain_of(problem))
     left = fit(data, state.of(Terms(term.fixed() for term in state.terms)))
     scale, rho = left.noise.by_kind(problem)
-    if any(scale[name] > _LARGER * _too_small(name in stated, rho[name]) for name in scale):
+    if any(scale[name] > _LARGER * underestimation(name in stated, rho[name]) for name in scale):
         return None
     if NoisePrior.of(problem).is_unknown(left.noise) > MAY_BE_UNKNOWN:
         return None
@@ -142,7 +135,7 @@ def _log_odds(left: Array, columns: Array) -> float:
     return averaged(Linear.of(columns, left, {"field": group}).solved({}).gains("field"))
 
 
-def _too_small(stated: bool, rho: float) -> float:
+def underestimation(stated: bool, rho: float) -> float:
     """How many times too small the assumed noise may be, with correlation rho from row to row.
 
     Stated noise is not. Estimates from third differences, with the weights 1, -3, 3, -1, see only a

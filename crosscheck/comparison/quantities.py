@@ -31,15 +31,9 @@ _CELLS = 16
 
 
 def periodogram(t_s: Array, values: Array, step_Hz: float, count: int) -> Array:
-    """Lomb-Scargle periodogram at ``step_Hz``, 2 ``step_Hz`` ... ``count`` ``step_Hz``.
+    """Lomb-Scargle power (count,) at multiples of a step, scaled as by SciPy's ``lombscargle``.
 
-    Args:
-        t_s: (n,) times [s]. values: (n,) values with mean zero.
-        step_Hz: step of the frequencies, at most the inverse of the span of the times.
-        count: number of frequencies.
-
-    Returns:
-        (count,) power, in the normalisation of :func:`scipy.signal.lombscargle`.
+    Times (n,) are in s, values (n,) have mean zero; the step is at most the inverse of the span.
     """
     size = fft.next_fast_len(_CELLS * count, real=True)
     place = (t_s - t_s.min()) * step_Hz * size
@@ -71,12 +65,9 @@ def _sums(place: Array, values: Array, size: int) -> Array:
 
 
 def cable_errors(problem: Problem, raw: Array, prediction: Prediction) -> tuple[Array, Array]:
-    """Errors of cable length and their noise, each (n, m) [m].
+    """Errors of cable length and their noise, each (n, m) [m], from residuals (n, 6 + m).
 
-    Args:
-        problem: the data.
-        raw: (n, 6 + m) residuals; rows without a complete pose give NaN.
-        prediction: prediction of the model.
+    Rows without a complete pose give NaN.
     """
     unit, arm = _cables(problem, prediction)
     turned = np.cross(raw[:, None, ORIENTATION], arm)
@@ -104,13 +95,8 @@ def independent_part(problem: Problem, prediction: Prediction) -> float:
     """
     unit, arm = _cables(problem, prediction)
     sigma = problem.sigma
-    columns = np.concatenate(
-        [
-            (sigma.position_m or 0.0) * unit,
-            (sigma.orientation_rad or 0.0) * np.cross(arm, unit),
-        ],
-        axis=-1,
-    )
+    turn = (sigma.orientation_rad or 0.0) * np.cross(arm, unit)
+    columns = np.concatenate([(sigma.position_m or 0.0) * unit, turn], axis=-1)
     columns /= np.maximum(np.linalg.norm(columns, axis=-1, keepdims=True), 1e-300)
     m = columns.shape[1]
     together = np.einsum("nik,njk->nij", columns, columns)
@@ -197,12 +183,8 @@ def _levelled(speed: Array, rounding: float) -> Array:
 
 
 def regions_of(problem: Problem, pose: Array) -> Names:
-    """The region of each row, (n,): halves along each axis that is used, such as
+    """The region of each row (n,), by commanded poses: halves along each axis that is used, such as
     "x below 0.4 m, z from 0.15 m".
-
-    Args:
-        problem: the data.
-        pose: (n, 7) commanded poses.
     """
     place = pose[:, :3]
     used = place[problem.use] if problem.use.any() else place
@@ -311,16 +293,14 @@ def of_cables(problem: Problem, prediction: Prediction, way: Travel) -> tuple[Ab
 def in_time(problem: Problem, table: Array) -> tuple[Abscissa | None, int]:
     """The phase in the period that explains most, and how many periods were tried.
 
-    Args:
-        problem: the data. table: (n, c) whitened residuals, NaN where nothing was read.
+    ``table`` (n, c) holds whitened residuals, NaN where nothing was read.
     """
     period, tried = _period(problem, table)
     if period is None or problem.data.t_s is None:
         return None, tried
     phase = 360.0 * (problem.data.t_s / period % 1.0)
-    return Abscissa(
-        QuantityKind.TIME, (f"time, with a period of {period:.3g} s"), phase, "deg"
-    ), tried
+    name = f"time, with a period of {period:.3g} s"
+    return Abscissa(QuantityKind.TIME, name, phase, "deg"), tried
 
 
 def _period(problem: Problem, table: Array) -> tuple[float | None, int]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from crosscheck.comparison.associations import associations
 from crosscheck.comparison.noise import coloured_noise, rows_far_off
@@ -18,14 +17,14 @@ from crosscheck.comparison.result import (
     WorstRow,
     tracking,
 )
-from crosscheck.fit.problem import Problem, Rms, kinds_read, rms_by_kind
+from crosscheck.fit.problem import Problem, kinds_read, rms_by_kind
 from crosscheck.fit.residual_noise import as_table, whiteness
 from crosscheck.fit.state import State, contradictions, evaluate
 from crosscheck.fit.words import rms_words
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
 from crosscheck.measurements.data import Names
 from crosscheck.measurements.read import GivenData, measurements_of
-from crosscheck.preparation.prepare import Prepared, noise_floor, prepare
+from crosscheck.preparation.prepare import noise_floor, prepare
 
 _MOST_WORST = 10
 
@@ -48,7 +47,9 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
     data = measurements_of(data, robot)
     terms, said = model_of(model, robot)
     ready = prepare(robot, data, terms, outliers=rows_far_off)
-    problem, outliers = ready.problem, _outliers_of(ready)
+    problem, outliers = ready.problem, ready.far_off
+    if outliers is None:  # of data without readings nobody looks for any
+        outliers = np.zeros(data.n_rows, dtype=bool)
     # nothing is cross-validated here, so that the note about its blocks is left out
     notes = [*said, *contradictions(terms), *ready.notes]
     terms = ready.terms
@@ -60,7 +61,11 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
     if outliers.any():
         judged = problem.only(~outliers)
         left = evaluate(judged, terms, factor, state)
-        notes.append(_outlier_note(problem, outliers, rms_by_kind(judged, state.raw)))
+        without = rms_words(rms_by_kind(judged, state.raw))
+        notes.append(
+            f"{data.lines_of(outliers)}: possible outliers, included in all errors (without them "
+            f"{without} rms), but not in what these depend on, nor in whether they are noise"
+        )
     some = judged.n_readings > 0
     white = whiteness(judged, left.white, ready.fitted) if some else None
     return Comparison(
@@ -84,20 +89,6 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
         rms_without=rms_by_kind(judged, state.raw),
         refusal=ready.refusal,
         tracking=tracking(problem, state),
-    )
-
-
-def _outliers_of(ready: Prepared) -> NDArray[np.bool_]:
-    """(n,) outliers; of data without readings nobody looks for any."""
-    none = np.zeros(ready.problem.data.n_rows, dtype=bool)
-    return none if ready.far_off is None else ready.far_off
-
-
-def _outlier_note(problem: Problem, outliers: NDArray[np.bool_], without: Rms) -> str:
-    return (
-        f"{problem.data.lines_of(outliers)}: possible outliers, included in all errors (without "
-        f"them {rms_words(without)} rms), but not in what these depend on, nor in whether they are "
-        "noise"
     )
 
 

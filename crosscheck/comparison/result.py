@@ -49,31 +49,11 @@ _HARDLY, _AT_NOISE = 3.0, 1.5
 
 
 def noise_sentence(white: Whiteness, known_as: str, associations: Sequence[Association]) -> str:
-    """That white residuals are noise, and what they depend on all the same.
-
-    Args:
-        white: tests of the residuals. known_as: how the noise is known, "stated" or "estimated".
-        associations: what the residuals are associated with, the strongest first.
-    """
+    """That white residuals are noise, "stated" or "estimated", and what they still depend on."""
     goes = _goes_with(associations)
     but = f", but {goes}" if goes else ""
     times = f"{white.scale:.2f} times the {known_as} noise"
     return f"Model and data agree: the residuals are noise ({times}){but}."
-
-
-def coloured_sentence(noise: str, is_open: bool) -> str:
-    """That residuals are autocorrelated noise or noise with outliers, or may be.
-
-    Args:
-        noise: its size and correlation in words. is_open: whether its size was not stated, so that
-            something that the model misses would look the same.
-    """
-    if not is_open:
-        return f"Model and data agree: the residuals are noise ({noise})."
-    return (
-        f"The residuals may be noise ({noise}), but as its size was not stated, they may as well "
-        "be something that the model misses and that varies as smoothly: state the noise."
-    )
 
 
 def misfit_sentence(
@@ -82,12 +62,9 @@ def misfit_sentence(
     known_as: str,
     associations: Sequence[Association],
 ) -> str:
-    """That residuals are no noise of the stated size, and what they look like.
+    """That residuals are no noise of the "stated" or "estimated" size, and what they look like.
 
-    Args:
-        white: tests of the residuals. times: their rms over the noise, by kind of reading.
-        known_as: how the noise is known, "stated" or "estimated".
-        associations: what the residuals are associated with, the strongest first.
+    ``times`` holds their rms over the noise, by kind of reading.
     """
     size, goes = error_size_words(white.scale, times), _goes_with(associations)
     end = f"; {goes}" if goes else ""
@@ -428,7 +405,14 @@ class Comparison(Result):
         if w.is_noise:
             said = noise_sentence(w, self._known_as, self.associations)
         elif self.coloured is not None:
-            said = coloured_sentence(self.coloured.words, self.coloured.open)
+            noise = self.coloured.words
+            said = f"Model and data agree: the residuals are noise ({noise})."
+            if self.coloured.open:
+                said = (
+                    f"The residuals may be noise ({noise}), but as its size was not stated, they "
+                    "may as well be something that the model misses and that varies as smoothly: "
+                    "state the noise."
+                )
         else:
             said = misfit_sentence(w, self.times_noise, self._known_as, self.associations)
         if not self.outliers.any():

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from crosscheck.importing.logs import Block, FileRows, Logged, Row, check_body, unit_quaternions
+from crosscheck.importing.logs import Block, FileRows, Logged, Row, check_body
 from seecr.columns.csv import VICON
 from seecr.counted import counted
 from seecr.pose import Array
@@ -48,7 +48,9 @@ def read_motive(path: Path) -> Logged:
     if top is None:
         raise rows.error("has no row of labels that begins with Frame; is the file cut off?")
     labels = _labels(rows, top)
-    block = Block(rows, top, _body(rows, top))
+    body = range(top + 1, 1 + max(k for k, row in enumerate(rows.cells) if any(row)))
+    check_body(rows, body)
+    block = Block(rows, top, body)
     block.check_whole()
     _check_count(rows, settings, block)
     time = next((c for c, cell in enumerate(block.labels) if cell.startswith("Time (")), None)
@@ -100,13 +102,6 @@ def _labels(rows: FileRows, top: int) -> _Labels:
     return _Labels(kind, name, quantity)
 
 
-def _body(rows: FileRows, top: int) -> range:
-    last = max(k for k, row in enumerate(rows.cells) if any(row))
-    body = range(top + 1, last + 1)
-    check_body(rows, body, "frames")
-    return body
-
-
 def _check_count(rows: FileRows, settings: Mapping[str, str], block: Block) -> None:
     said = settings.get("Total Exported Frames", "")
     if said.isdigit() and len(block.body) < int(said):
@@ -147,9 +142,7 @@ def _quaternions(
     if said.lower() != "quaternion" or len(given) != 4:
         text = f"expected Rotation Type Quaternion, got {said!r}; export it again with quaternions"
         raise block.rows.error(text, block.rows.first)
-    return unit_quaternions(
-        block.numbers(given), lambda text, row: block.rows.error(text, block.body[row])
-    )
+    return block.quaternions(given)
 
 
 # CSV and text exports of Vicon's Nexus: blocks of segments and of trajectories.
@@ -193,7 +186,9 @@ def read_vicon(path: Path, rotation: str | None = None, *, bodies_too: bool = Tr
     found = [block for block in _blocks(rows) if block.kind in ("segments", "trajectories")]
     if not found:
         raise rows.error("has no block Segments or Trajectories; export it with these", rows.first)
-    frames = [_frames(one) for one in found]
+    frames = [one.block.numbers([0])[:, 0] for one in found]
+    for one, frame in zip(found, frames, strict=True):
+        one.block.check_times(frame / one.rate, "Frame")
     for one, frame in zip(found[1:], frames[1:], strict=True):
         if not np.array_equal(frame, frames[0]):
             text = f"expected the frames of the first block again, got {len(frame)} different ones"
@@ -226,7 +221,7 @@ def _blocks(rows: FileRows) -> list[_Found]:
         while end < len(rows.cells) and any(rows.cells[end]):
             end += 1
         body = range(top + 2, end)
-        check_body(rows, body, "frames")
+        check_body(rows, body)
         block = Block(rows, top, body)
         block.check_whole()
         out.append(_Found(kind, rate, rows.cells[top - 1], rows.cells[top + 1], block))
@@ -242,12 +237,6 @@ def _rate(rows: FileRows, row: int) -> float:
     if not rate > 0.0:
         raise rows.error(f"expected the rate of the block in Hz, got {cell!r}", row)
     return rate
-
-
-def _frames(one: _Found) -> Array:
-    frames = one.block.numbers([0])[:, 0]
-    one.block.check_times(frames / one.rate, "Frame")
-    return frames
 
 
 def _vicon_things(one: _Found) -> dict[str, dict[str, int]]:
@@ -278,16 +267,12 @@ def _lengths(one: _Found, columns: list[int]) -> Array:
 
 def _rotations(one: _Found, columns: dict[str, int], rotation: str | None) -> Array | None:
     if set(_QUATERNION) <= set(columns):
-        quat = one.block.numbers([columns[axis] for axis in _QUATERNION])
-        block = one.block
-        return unit_quaternions(quat, lambda text, row: block.rows.error(text, block.body[row]))
+        return one.block.quaternions([columns[axis] for axis in _QUATERNION])
     if not set(_THREE) <= set(columns):
         return None
     if rotation is None:
-        text = (
-            f"three numbers of a rotation can mean several things; expected --rotation {ROTATIONS}"
-        )
-        raise one.block.rows.error(text, one.block.label_row)
+        text = "three numbers of a rotation can mean several things; expected --rotation"
+        raise one.block.rows.error(f"{text} {ROTATIONS}", one.block.label_row)
     given = [columns[axis] for axis in _THREE]
     unit = of_columns("rad").get(_unit(one, given[0]))
     if unit is None:

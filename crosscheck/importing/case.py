@@ -58,7 +58,7 @@ def without_strays(
     farther than most, and the platform has hardly moved since the dwell before, though it was told
     to. If more than a few of a recording are, it is no matter of single dwells: all stay.
     """
-    told = [_told(robot, take) for take in takes]
+    told = [_told(robot, take)[:, :3] for take in takes]
     off = [_off(take, frames, own) for take, own in zip(takes, told, strict=True)]
     usual = float(np.median(np.concatenate(off)))
     limit = max(LEFT * size_of_cloud(np.concatenate(told)), _USUAL * usual)
@@ -67,7 +67,9 @@ def without_strays(
         far = (own > limit) & _stood_still(take, commands)
         if 0 < far.sum() <= (1.0 - MOST) * len(far) + 1e-9:
             notes.append(_note(take, far, own, usual))
-            take = _without(take, far)
+            number = take.number.copy()
+            number[np.flatnonzero(number >= 0)[far]] = -1
+            take = replace(take, number=number)
         out.append(take)
     return out, notes
 
@@ -80,9 +82,8 @@ def _stood_still(take: Take, told: Array) -> NDArray[np.bool_]:
 
 
 def _told(robot: Robot, take: Take) -> Array:
-    """Commanded positions (n, 3) [m] of the dwells that are used."""
-    rows = take.held.log.rows(take.held.row[take.number >= 0])
-    return commanded(robot, rows)[:, :3]
+    """Commanded poses (n, 7) of the dwells that are used."""
+    return commanded(robot, take.held.log.rows(take.held.row[take.number >= 0]))
 
 
 def _off(take: Take, frames: Frames, told: Array) -> Array:
@@ -92,12 +93,6 @@ def _off(take: Take, frames: Frames, told: Array) -> Array:
         take.dwells.position[take.used], None if quat is None else quat[take.used]
     )
     return np.asarray(np.linalg.norm(place - told, axis=1))
-
-
-def _without(take: Take, far: NDArray[np.bool_]) -> Take:
-    number = take.number.copy()
-    number[np.flatnonzero(number >= 0)[far]] = -1
-    return replace(take, number=number)
 
 
 def _note(take: Take, far: NDArray[np.bool_], off: Array, usual: float) -> str:
@@ -221,8 +216,7 @@ def import_case(
     if len(files) != len(commands):
         raise CrosscheckError(
             f"expected {counted(len(files), 'command log')}, one for each recording, got "
-            f"{len(commands)}; "
-            "give --commands once for each file, in their order"
+            f"{len(commands)}; give --commands once for each file, in their order"
         )
     said: list[str] = []
     logs = [load_commands(log, robot) for log in commands]
@@ -240,12 +234,9 @@ def import_case(
     measured = _one([part for part, _noise in parts])
     sigma = _sigma(takes, [noise for _part, noise in parts])
     measured = replace(
-        measured,
-        sigma=sigma,
-        sigma_source="dwell_scatter",
-        free=frames.free,
+        measured, sigma=sigma, sigma_source="dwell_scatter", free=frames.free,
         stands=np.ones(measured.n_rows, dtype=bool),
-    )
+    )  # fmt: skip
     off = off_commands(frames, *_rests(robot, takes)) if choices.aligned else []
     notes = (*said, *strays, frames.how, *off, _noise(measured))
     found = Imported(robot, measured, frames, tuple(takes), notes)
@@ -283,10 +274,7 @@ def _rests(robot: Robot, takes: Sequence[Take]) -> tuple[Array, Array | None, Ar
     quats = [take.dwells.quat_wxyz for take in takes]
     turned = [q[take.used] for q, take in zip(quats, takes, strict=True) if q is not None]
     quat = np.concatenate(turned) if len(turned) == len(takes) else None
-    told = np.concatenate(
-        [commanded(robot, t.held.log.rows(t.held.row[t.number >= 0])) for t in takes]
-    )
-    return position, quat, told
+    return position, quat, np.concatenate([_told(robot, take) for take in takes])
 
 
 def _frames(robot: Robot, takes: Sequence[Take], choices: ImportChoices) -> Frames:

@@ -56,13 +56,9 @@ def commanded(robot: Robot, log: Measurements) -> Array:
 
 
 def held_commands(log: Measurements, rest_for: float, clock: float, end: float) -> HeldCommands:
-    """The commands of a log that were held long enough.
+    """The commands of a log that were held for ``rest_for`` [s] or longer.
 
-    Args:
-        log: commands with times, or one row per pose without.
-        rest_for: [s] shortest time.
-        clock: [s] tracker's clock minus commands'.
-        end: [s] of the tracker's stream.
+    ``clock`` [s] is the tracker's clock minus the commands', ``end`` [s] the end of its stream.
     """
     command = log.command_pose if log.command_lengths is None else log.command_lengths
     assert command is not None

@@ -94,22 +94,20 @@ class Logged:
 
     def seen_only(self) -> Logged:
         """The same without positions of exactly 0 0 0, which stand for "not seen"."""
-        bodies, markers = dict(self.bodies), dict(self.markers)
         lost: list[str] = []
-        for name, (position, quat) in self.bodies.items():
+
+        def hidden(name: str, position: Array) -> NDArray[np.bool_]:
             rows = _not_seen(position)
             if rows.any():
-                nothing = rows[:, None]
-                bodies[name] = (
-                    np.where(nothing, np.nan, position),
-                    None if quat is None else np.where(nothing, np.nan, quat),
-                )
                 lost.append(f"{name} in {counted(int(rows.sum()), 'row')}")
-        for name, position in self.markers.items():
-            rows = _not_seen(position)
-            if rows.any():
-                markers[name] = np.where(rows[:, None], np.nan, position)
-                lost.append(f"{name} in {counted(int(rows.sum()), 'row')}")
+            return rows[:, None]
+
+        bodies: dict[str, tuple[Array, Array | None]] = {}
+        for name, (place, quat) in self.bodies.items():
+            rows = hidden(name, place)
+            turned = None if quat is None else np.where(rows, np.nan, quat)
+            bodies[name] = (np.where(rows, np.nan, place), turned)
+        markers = {n: np.where(hidden(n, p), np.nan, p) for n, p in self.markers.items()}
         if not lost:
             return self
         note = f"positions of exactly 0 0 0 count as not seen: {some(lost, _MOST_NAMED)}"
@@ -228,14 +226,10 @@ class FileRows:
 
 
 def unit_quaternions(values: Array, refuse: Callable[[str, int], InputFileError]) -> Array:
-    """Unit quaternions (n, 4) of what a file has; rows of zeros, as of a body not seen, are NaN.
-
-    Args:
-        values: (n, 4) as read, NaN if missing.
-        refuse: makes the error of a text and a row, counted from 0.
+    """Unit quaternions (n, 4) of values as read; rows of zeros, as of a body not seen, are NaN.
 
     Raises:
-        InputFileError: a quaternion that is not of length 1.
+        InputFileError: one is not of length 1; ``refuse`` makes it of a text and a row from 0.
     """
     size = np.linalg.norm(values, axis=1)
     size[size == 0.0] = np.nan
@@ -286,6 +280,12 @@ class Block:
             raise self._fault(self.body[k], columns)
         return out
 
+    def quaternions(self, columns: Sequence[int]) -> Array:
+        """Unit quaternions (n, 4) of four columns; see :func:`unit_quaternions`."""
+        return unit_quaternions(
+            self.numbers(columns), lambda text, row: self.rows.error(text, self.body[row])
+        )
+
     def _fault(self, row: int, columns: Sequence[int]) -> InputFileError:
         cells = self.rows.cells[row]
         if len(cells) <= max(columns):
@@ -329,7 +329,7 @@ class Block:
         raise self.rows.error(f"{text}file? Export them one at a time", self.body[k], label)
 
 
-def check_body(rows: FileRows, body: range, what: str) -> None:
+def check_body(rows: FileRows, body: range) -> None:
     """Refuse a block without rows."""
     if len(body) == 0:
-        raise rows.error(f"has labels but no rows of {what}; is the file cut off?", body.start - 1)
+        raise rows.error("has labels but no rows of frames; is the file cut off?", body.start - 1)

@@ -17,7 +17,7 @@ from seecr.columns.commands import began, times_of_day
 from seecr.columns.csv import Table, read_table, show
 from seecr.counted import counted, some
 from seecr.errors import InputError, InputFileError
-from seecr.pose import Array
+from seecr.pose import Array, quat_from_rxyz
 from seecr.units import UNITS, Unit, of_columns
 
 _TIMES = re.compile(r"(t|time|timestamp)(?:_(\w+)|\s*\[(\w+)\])?", re.IGNORECASE)
@@ -82,12 +82,9 @@ def _unread(table: Table, found: Mapping[str, tuple[int, str]]) -> tuple[str, ..
     others = [name for name in names if name not in read and not _TIMES.fullmatch(name)]
     if not others:
         return ()
-    turned = (
-        ""
-        if any(name[0] in "qr" for name in found)
-        else ("; rotations are read from qw qx qy qz or rx_deg ry_deg rz_deg")
-    )
-    return (f"columns not read: {some(others, 6)}{turned}",)
+    turned = any(name[0] in "qr" for name in found)
+    hint = "" if turned else "; rotations are read from qw qx qy qz or rx_deg ry_deg rz_deg"
+    return (f"columns not read: {some(others, 6)}{hint}",)
 
 
 def _columns(table: Table) -> dict[str, tuple[int, str]]:
@@ -159,17 +156,12 @@ def _turns(table: Table, found: dict[str, tuple[int, str]]) -> Array | None:
         return unit_quaternions(values, lambda text, row: table.error(text, row=row, column="qw"))
     if "rx" not in found:
         return None
-    units = of_columns("rad")
     columns = []
     for name in angles:
         column, suffix = found[name]
-        known = _unit(table, column, "rad", suffix) if suffix not in units else units[suffix]
-        columns.append(known.to_si(table.numbers(column, blank_is_nan=True)))
-    values = np.stack(columns, axis=1)
-    out = np.full((len(values), 4), np.nan)
-    seen = np.isfinite(values).all(axis=1)
-    out[seen] = Rotation.from_euler("XYZ", values[seen]).as_quat(scalar_first=True)
-    return out
+        unit = _unit(table, column, "rad", suffix)
+        columns.append(unit.to_si(table.numbers(column, blank_is_nan=True)))
+    return quat_from_rxyz(np.stack(columns, axis=1))
 
 
 # A rigid body from three or more markers, frame by frame.

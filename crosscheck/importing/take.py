@@ -46,8 +46,11 @@ def refuse_still(stream: Stream, export: Logged, log: Measurements, choices: Imp
     others = [name for name in export.bodies if name != choices.body]
     there = f" The file also has {some(others, _MOST_NAMED)}." if others else ""
     within = f"{1e3 * moved:.2g}" if moved > _ROUNDED else "0"
+    name = f"the body {choices.body}" if choices.body else "the body"
+    if choices.markers:
+        name = f"the body of {', '.join(choices.markers)}"
     raise stream.error(
-        f"{_named(choices)} never moves: it stays within {within} mm (rms), while the "
+        f"{name} never moves: it stays within {within} mm (rms), while the "
         f"commands of {log.path.name} move the platform; expected the body on the platform: is it "
         f"another one (--body)?{there}"
     )
@@ -59,12 +62,6 @@ def _told_to_move(log: Measurements, moved: float) -> bool:
     if log.command_pose is not None:
         return size_of_cloud(log.command_pose[:, :3]) > least
     return bool(np.any(np.ptp(np.asarray(log.command_lengths), axis=0) > least))
-
-
-def _named(choices: ImportChoices) -> str:
-    if choices.markers:
-        return f"the body of {', '.join(choices.markers)}"
-    return f"the body {choices.body}" if choices.body else "the body"
 
 
 # Offset between the tracker's clock and that of the commands, found from the resting poses.
@@ -128,29 +125,19 @@ def find_clock(held: HeldCommands, told: Array, rests: Dwells, least: float = 0.
     if best == 0:
         unsteady = float(np.quantile(np.abs(late - shift), _BULK)) > _STEADY * abs(shift)
         small = abs(shift) < max(least, 1e-9)
-        return Clock(0.0, () if small or unsteady else (_late_words(shift),))
+        when = "after" if shift > 0.0 else "before"
+        said = (
+            f"moves begin about {abs(shift):.3f} s {when} they are commanded; if that is the "
+            f"clocks and not the robot, give --clock {shift:.3f}"
+        )
+        return Clock(0.0, () if small or unsteady else (said,))
     sign = "more" if shift > 0.0 else "less"
-    return Clock(
-        shift,
-        (
-            f"the tracker's clock shows {abs(shift):.3f} s {sign} than that of the commands, "
-            f"estimated from {_from_what(n)} (--clock {shift:.3f})",
-        ),
+    moves = f"{counted(n, 'command')} at which the platform starts to move"
+    said = (
+        f"the tracker's clock shows {abs(shift):.3f} s {sign} than that of the commands, estimated "
+        f"from {moves if n else 'where the platform rests'} (--clock {shift:.3f})"
     )
-
-
-def _from_what(moves: int) -> str:
-    if not moves:
-        return "where the platform rests"
-    return f"{counted(moves, 'command')} at which the platform starts to move"
-
-
-def _late_words(shift: float) -> str:
-    when = "after" if shift > 0.0 else "before"
-    return (
-        f"moves begin about {abs(shift):.3f} s {when} they are commanded; if that is the clocks "
-        f"and not the robot, give --clock {shift:.3f}"
-    )
+    return Clock(shift, (said,))
 
 
 def _likely(begin: Array, end: Array) -> Array:
@@ -285,16 +272,13 @@ def _told(take: Take) -> list[str]:
     ]
     none = int((take.number < 0).sum())
     rest = len(dwells) - len(used)
-    out += [
-        (f"{counted(none, 'held command')} without a dwell: passed without a reading, not compared")
-    ] * (none > 0)
-    shorter = (
-        f"{counted(rest, 'shorter dwell')} of the same commands, or outside all commands, left out"
-    )
-    out += [shorter] * (rest > 0)
-    if take.held.passed:
-        passed = counted(take.held.passed, "set point")
-        out.append(f"{passed} between held commands left out: the path is taken as straight")
+    for count, what, words in (
+        (none, "held command", "without a dwell: passed without a reading, not compared"),
+        (rest, "shorter dwell", "of the same commands, or outside all commands, left out"),
+        (take.held.passed, "set point", "between held commands left out: the path is taken as "
+         "straight"),
+    ):  # fmt: skip
+        out += [f"{counted(count, what)} {words}"] if count else []
     return out
 
 

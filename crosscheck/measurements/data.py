@@ -28,27 +28,6 @@ from seecr.pose import Array
 from seecr.result import COORDINATES, Record, Result, rows_of
 from seecr.units import UNITS
 
-# Measurements as the columns of a file, by name and in SI units.
-
-
-def named_columns(data: Measurements) -> Iterator[tuple[str, list[Any]]]:
-    """Names and values (n,) of all columns with content; None if not read."""
-    yield "run", data.run.tolist()
-    cables = range(1, data.n_cables + 1)
-    yield from _columns(["t_s"], data.t_s)
-    yield from _columns([f"cmd_{c}" for c in COORDINATES], data.command_pose)
-    yield from _columns([f"length_{i}_m" for i in cables], data.command_lengths)
-    if data.wanted is not None:
-        stated = np.asarray(np.isfinite(data.wanted).any(axis=0))
-        yield from _columns([f"want_{c}" for c in COORDINATES], data.wanted, stated)
-    yield from _columns([f"meas_{c}_m" for c in "xyz"], data.position, data.position_mask)
-    yield from _columns([f"meas_q{c}" for c in "wxyz"], data.quat_wxyz)
-    yield from _columns([f"meas_r{c}_rad" for c in "xyz"], data.angles_rad, data.angle_mask)
-    yield from _columns([f"tension_{i}_N" for i in cables], data.tensions, data.tension_mask)
-    yield from _columns(["temperature_C"], data.temperature_C)
-    if data.loads is not None:
-        yield from _load_columns(data.loads)
-
 
 def _load_columns(loads: Loads) -> Iterator[tuple[str, list[Any]]]:
     """The columns of payload and wrench with content."""
@@ -134,55 +113,15 @@ def parse_kind(
     return kind, unit.to_si(value)
 
 
-def parsed(texts: Iterable[str]) -> dict[str, float]:
-    """Noise in SI by fields of :class:`crosscheck.Sigma`, such as ``tension_N``.
-
-    Args:
-        texts: each a kind of reading and a quantity, such as ``"tension=0.5N"``.
-
-    Raises:
-        CrosscheckError: an unknown kind, no quantity, one in another unit, or two for one kind.
-    """
-    values: dict[str, float] = {}
-    for text in texts:
-        kind, equals, quantity = text.partition("=")
-        kind = kind.strip()
-        if not equals or kind not in SI:
-            near = difflib.get_close_matches(kind, SI, n=len(SI), cutoff=0.0)
-            raise CrosscheckError(
-                f"--sigma {text}: expected KIND=QUANTITY such as position=0.1mm, KIND one of "
-                f"{', '.join(near)} (nearest first)"
-            )
-        key = f"{kind}_{SI[kind]}"
-        if key in values:
-            raise CrosscheckError(
-                f"--sigma {text}: expected one for the {kind}, got two; leave one out"
-            )
-        values[key] = parse_quantity(f"--sigma {kind}", kind, quantity, LEAST_NOISE)
-    return values
-
-
 Mask = NDArray[np.bool_]
 Names = NDArray[np.str_]
 
 # Default of fields that __post_init__ computes from the others if they are not given.
 _FILLED_IN: Any = None
 _PER_ROW = (
-    "run",
-    "t_s",
-    "command_pose",
-    "command_lengths",
-    "wanted",
-    "position",
-    "quat_wxyz",
-    "angles_rad",
-    "tensions",
-    "temperature_C",
-    "stands",
-    "sigma_ratio",
-    "file",
-    "line",
-)
+    "run", "t_s", "command_pose", "command_lengths", "wanted", "position", "quat_wxyz",
+    "angles_rad", "tensions", "temperature_C", "stands", "sigma_ratio", "file", "line",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -214,7 +153,23 @@ class Sigma:
         Raises:
             CrosscheckError: an unknown kind, no quantity, one in another unit, or two for one kind.
         """
-        return cls(**parsed(texts))
+        values: dict[str, float] = {}
+        for text in texts:
+            kind, equals, quantity = text.partition("=")
+            kind = kind.strip()
+            if not equals or kind not in SI:
+                near = difflib.get_close_matches(kind, SI, n=len(SI), cutoff=0.0)
+                raise CrosscheckError(
+                    f"--sigma {text}: expected KIND=QUANTITY such as position=0.1mm, KIND one of "
+                    f"{', '.join(near)} (nearest first)"
+                )
+            key = f"{kind}_{SI[kind]}"
+            if key in values:
+                raise CrosscheckError(
+                    f"--sigma {text}: expected one for the {kind}, got two; leave one out"
+                )
+            values[key] = parse_quantity(f"--sigma {kind}", kind, quantity, LEAST_NOISE)
+        return cls(**values)
 
     @property
     def stated(self) -> dict[str, float]:
@@ -331,10 +286,9 @@ class Measurements(Result):
     def _check_shapes(self) -> None:
         n, m = len(self.run), self.n_cables
         widths = {"command_pose": 7, "command_lengths": m, "position": 3, "quat_wxyz": 4}
-        widths |= {"angles_rad": 3, "tensions": m, "wanted": 7}
+        widths |= {"angles_rad": 3, "tensions": m, "wanted": 7, "sigma_ratio": len(fields(Sigma))}
         shapes: dict[str, tuple[int, ...]] = {k: (n, width) for k, width in widths.items()}
         shapes |= dict.fromkeys(("t_s", "temperature_C", "line", "stands", "file"), (n,))
-        shapes |= {"sigma_ratio": (n, len(fields(Sigma)))}
         for name, shape in shapes.items():
             value = getattr(self, name)
             if value is not None and np.shape(value) != shape:
@@ -383,6 +337,13 @@ class Measurements(Result):
         tables += [] if self.quat_wxyz is None else [self.quat_wxyz]
         return np.asarray(np.isfinite(np.concatenate(tables, axis=1)).any(axis=1))
 
+    def without_readings(self) -> Measurements:
+        """The commands and loads alone."""
+        names = ("position", "angles_rad", "tensions")
+        masks = ("position_mask", "angle_mask", "tension_mask")
+        nothing: dict[str, Any] = dict.fromkeys((*names, *masks, "quat_wxyz"))
+        return dataclasses.replace(self, **nothing)
+
     def with_notes(self, notes: Iterable[str]) -> Measurements:
         """The same with more notes."""
         return dataclasses.replace(self, notes=(*self.notes, *notes))
@@ -402,9 +363,8 @@ class Measurements(Result):
 
     def place(self, row: int) -> str:
         """The line of one row, with its file if there are several."""
-        return (
-            f"{self.files[self.file[row]]} {self.line[row]}" if self.files else f"{self.line[row]}"
-        )
+        file = f"{self.files[self.file[row]]} " if self.files else ""
+        return f"{file}{self.line[row]}"
 
     def as_commands(self, robot: Robot) -> Commands:
         """The commands and known loads, as the statics takes them.
@@ -449,15 +409,8 @@ class Measurements(Result):
 
     def lines(self) -> list[str]:
         """What was measured, and what was assumed, filled in or left out."""
-        read = [
-            word
-            for word, there in (
-                ("positions", self.has_position),
-                ("orientations", self.has_orientation),
-                ("tensions", self.has_tension),
-            )
-            if there
-        ]
+        kinds = ("position", "orientation", "tension")
+        read = [f"{kind}s" for kind in kinds if getattr(self, f"has_{kind}")]
         what = ", ".join(read) or "commands alone"
         rows, runs = counted(self.n_rows, "row"), counted(len(self.runs), "run")
         return [f"{self.name}: {rows} in {runs}, {what}", *self.notes]
@@ -467,15 +420,27 @@ class Measurements(Result):
         return rows_of(dict(self.columns()))
 
     def columns(self) -> Iterator[tuple[str, list[Any]]]:
-        """The columns of the file, in SI units, by name; None if not read."""
-        return named_columns(self)
+        """Names and values (n,) of the file's columns with content, in SI; None if not read."""
+        yield "run", self.run.tolist()
+        cables = range(1, self.n_cables + 1)
+        yield from _columns(["t_s"], self.t_s)
+        yield from _columns([f"cmd_{c}" for c in COORDINATES], self.command_pose)
+        yield from _columns([f"length_{i}_m" for i in cables], self.command_lengths)
+        if self.wanted is not None:
+            stated = np.asarray(np.isfinite(self.wanted).any(axis=0))
+            yield from _columns([f"want_{c}" for c in COORDINATES], self.wanted, stated)
+        yield from _columns([f"meas_{c}_m" for c in "xyz"], self.position, self.position_mask)
+        yield from _columns([f"meas_q{c}" for c in "wxyz"], self.quat_wxyz)
+        yield from _columns([f"meas_r{c}_rad" for c in "xyz"], self.angles_rad, self.angle_mask)
+        yield from _columns([f"tension_{i}_N" for i in cables], self.tensions, self.tension_mask)
+        yield from _columns(["temperature_C"], self.temperature_C)
+        if self.loads is not None:
+            yield from _load_columns(self.loads)
 
     def rows(self, index: ArrayLike | slice) -> Measurements:
         """Some rows, by index, mask (n,) or slice. The masks of what was read are kept."""
         chosen = np.arange(self.n_rows)[index if isinstance(index, slice) else np.asarray(index)]
-        values: dict[str, Any] = {}
-        for name in _PER_ROW:
-            value = getattr(self, name)
-            values[name] = None if value is None else value[chosen]
-        values["loads"] = None if self.loads is None else self.loads.rows(chosen)
-        return dataclasses.replace(self, **values)
+        there = {k: value for k in _PER_ROW if (value := getattr(self, k)) is not None}
+        values: dict[str, Any] = {name: value[chosen] for name, value in there.items()}
+        loads = None if self.loads is None else self.loads.rows(chosen)
+        return dataclasses.replace(self, loads=loads, **values)

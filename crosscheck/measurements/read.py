@@ -22,7 +22,6 @@ from crosscheck.measurements.data import (
     LEAST_NOISE,
     MOST,
     Measurements,
-    Names,
     Sigma,
     parse_quantity,
 )
@@ -157,10 +156,7 @@ _EXACT = 1e-6
 
 
 def together(parts: Sequence[Measurements]) -> Measurements:
-    """The measurements of several files, with separate runs, clocks and noise.
-
-    Args:
-        parts: each as read from its file.
+    """The measurements of several files, as read, with separate runs, clocks and noise.
 
     Raises:
         InputFileError: a file given twice, or commands of another kind than in the first.
@@ -174,18 +170,23 @@ def together(parts: Sequence[Measurements]) -> Measurements:
     pairs = zip(parts, names, strict=True)
     notes = [f"{name}: {note}" for part, name in pairs for note in part.notes]
     t_s, lost_times = _of_all("t_s", [part.t_s for part in parts], names)
-    free = _free_per_file(parts)
+    free = {
+        name: tuple(k for k, part in enumerate(parts) if name in part.free)
+        for part in parts for name in part.free
+    }  # fmt: skip
     warmth, lost_warmth = _of_all("temperature_C", [part.temperature_C for part in parts], names)
     quat, angles = _orientations(parts)
     whole = Measurements(
         path=Path(" + ".join(names)),
         n_cables=first.n_cables,
-        run=_runs(parts, names),
+        run=np.concatenate(
+            [np.char.add(f"{n}: ", part.run) for part, n in zip(parts, names, strict=True)]
+        ),
         t_s=t_s,
         command_pose=_stack([part.command_pose for part in parts]),
         command_lengths=_stack([part.command_lengths for part in parts]),
         told=first.told,
-        wanted=_wanted(parts),
+        wanted=_filled(parts, "wanted", 7),
         position=np.concatenate([part.position for part in parts]),
         quat_wxyz=quat,
         angles_rad=angles,
@@ -208,12 +209,6 @@ def together(parts: Sequence[Measurements]) -> Measurements:
     # repetitions within a file are in its own notes already
     own = any(twice(part) for part in parts)
     return whole if own else whole.with_notes(twice(whole))
-
-
-def _free_per_file(parts: Sequence[Measurements]) -> dict[str, tuple[int, ...]]:
-    """The files that leave each effect free; each file has values of its own."""
-    names = dict.fromkeys(name for part in parts for name in part.free)
-    return {name: tuple(k for k, part in enumerate(parts) if name in part.free) for name in names}
 
 
 def _check_alike(parts: Sequence[Measurements]) -> None:
@@ -246,23 +241,19 @@ def _short_names(paths: Sequence[Path], least: int = 1) -> list[str]:
     return [str(path) for path in paths]
 
 
-def _runs(parts: Sequence[Measurements], names: Sequence[str]) -> Names:
-    pairs = zip(parts, names, strict=True)
-    return np.concatenate([np.char.add(f"{name}: ", part.run) for part, name in pairs])
-
-
 def _stack(columns: Sequence[Array | None]) -> Array | None:
     there = [column for column in columns if column is not None]
     return np.concatenate(there) if len(there) == len(columns) else None
 
 
-def _wanted(parts: Sequence[Measurements]) -> Array | None:
-    """Wanted poses of all files; NaN in those that state none, None if none does."""
-    if all(part.wanted is None for part in parts):
+def _filled(parts: Sequence[Measurements], name: str, width: int) -> Array | None:
+    """A table (n, width) of all files; NaN in those without it, None if none has it."""
+    tables = [getattr(part, name) for part in parts]
+    if all(table is None for table in tables):
         return None
-    blank = [np.full((part.n_rows, 7), np.nan) for part in parts]
-    pairs = zip(parts, blank, strict=True)
-    return np.concatenate([b if part.wanted is None else part.wanted for part, b in pairs])
+    pairs = zip(parts, tables, strict=True)
+    blank = [np.full((part.n_rows, width), np.nan) if t is None else t for part, t in pairs]
+    return np.concatenate(blank)
 
 
 def _of_all(
@@ -278,22 +269,9 @@ def _of_all(
 def _orientations(parts: Sequence[Measurements]) -> tuple[Array | None, Any]:
     """Quaternions, or angles if some file has only these."""
     if any(part.angle_mask.any() for part in parts):
-        turned = [
-            part.angles_rad if part.quat_wxyz is None else _angles(part.quat_wxyz) for part in parts
-        ]
-        return None, np.concatenate(turned)
-    if all(part.quat_wxyz is None for part in parts):
-        return None, None
-    blank = [np.full((part.n_rows, 4), np.nan) for part in parts]
-    pairs = zip(parts, blank, strict=True)
-    return np.concatenate([b if p.quat_wxyz is None else p.quat_wxyz for p, b in pairs]), None
-
-
-def _angles(quat: Array) -> Array:
-    known = np.asarray(np.isfinite(quat).all(axis=1))
-    out = np.full((len(quat), 3), np.nan)
-    out[known] = rxyz_from_quat(quat[known])
-    return out
+        quats = [(part.angles_rad, part.quat_wxyz) for part in parts]
+        return None, np.concatenate([a if q is None else rxyz_from_quat(q) for a, q in quats])
+    return _filled(parts, "quat_wxyz", 4), None
 
 
 def _loads(parts: Sequence[Measurements]) -> Loads | None:
@@ -321,7 +299,9 @@ def _noise(parts: Sequence[Measurements], names: Sequence[str]) -> tuple[Sigma, 
         ratios[:, k] = [otherwise if v is None else v / common[kind] for v in own]
         without = [names[i] for i in range(len(parts)) if i not in stated]
         if without:
-            notes.append(_taken_over(kind, without, names[stated[0]]))
+            other = f"that of {names[stated[0]]} is used"
+            then = "these lengths are taken as exact" if kind == "length_m" else other
+            notes.append(f"{', '.join(without)} without {kind}: {then}.")
     return Sigma(**common), np.repeat(ratios, [part.n_rows for part in parts], axis=0), notes
 
 
@@ -329,12 +309,6 @@ def _common_source(parts: Sequence[Measurements]) -> str:
     """A lower bound in any file makes the common noise one."""
     found = [part.sigma_source for part in parts if part.sigma.stated]
     return "dwell_scatter" if "dwell_scatter" in found else next(iter(found), "stated")
-
-
-def _taken_over(kind: str, without: Sequence[str], other: str) -> str:
-    if kind == "length_m":
-        return f"{', '.join(without)} without {kind}: these lengths are taken as exact."
-    return f"{', '.join(without)} without {kind}: that of {other} is used."
 
 
 GivenData: TypeAlias = Measurements | str | Path | Sequence[str | Path]
@@ -377,7 +351,6 @@ def load_measurements(
 
 
 def _check_sigma(sigma: Sigma | None) -> None:
-    """Check that it is noise, if anything, before files are read."""
     if sigma is not None and not isinstance(sigma, Sigma):
         raise InputError(
             "sigma: expected a crosscheck.Sigma, such as Sigma(position_m=1e-4), got "
@@ -487,9 +460,8 @@ def _of_one_clock(given: Commands, robot: Robot) -> Measurements:
     )
 
 
-def _open(path: str | Path, robot: Robot) -> Columns:
-    table = read_table(Path(path))
-    return know_columns(table, robot.n_cables, robot.cable_names)
+def _open(path: Path, robot: Robot) -> Columns:
+    return know_columns(read_table(path), robot.n_cables, robot.cable_names)
 
 
 def _load(columns: Columns, robot: Robot, sigma_path: str | Path | None) -> Measurements:
@@ -500,8 +472,8 @@ def _load(columns: Columns, robot: Robot, sigma_path: str | Path | None) -> Meas
     position = columns.readings("meas", POSITION)
     quat, angles = measured_orientation(columns)
     cables = [str(i + 1) for i in range(robot.n_cables)]
-    tensions = columns.readings("tension", cables)
-    beside = _beside(columns.table.path, sigma_path)
+    toml = columns.table.path.with_suffix(".toml") if sigma_path is None else Path(sigma_path)
+    beside = Beside() if sigma_path is None and not toml.exists() else read_beside(toml)
     if beside.told and lengths is None:
         columns.notes.append('lengths = "told" has no effect here: the commands are poses.')
     data = Measurements(
@@ -517,7 +489,7 @@ def _load(columns: Columns, robot: Robot, sigma_path: str | Path | None) -> Meas
         position=position,
         quat_wxyz=quat,
         angles_rad=angles,
-        tensions=tensions,
+        tensions=columns.readings("tension", cables),
         temperature_C=temperature,
         loads=known_loads(columns, robot),
         stands=np.full(columns.n_rows, beside.stands),
@@ -531,18 +503,11 @@ def _load(columns: Columns, robot: Robot, sigma_path: str | Path | None) -> Meas
     return replace(data, notes=tuple(notes))
 
 
-def _beside(path: Path, toml: str | Path | None) -> Beside:
-    if toml is not None:
-        return read_beside(Path(toml))
-    beside = path.with_suffix(".toml")
-    return read_beside(beside) if beside.exists() else Beside()
-
-
 def _way_points(data: Measurements) -> list[str]:
     silent = int(np.sum(~data.read))
     if not 0 < silent < data.n_rows:
         return []
-    rows = counted(silent, "row")
-    if silent == 1:
-        return [f"{rows} has a command but no reading: a way point, which is not compared."]
-    return [f"{rows} have a command but no reading: way points, which are not compared."]
+    has, which = (
+        ("has", "a way point, which is") if silent == 1 else ("have", "way points, which are")
+    )
+    return [f"{counted(silent, 'row')} {has} a command but no reading: {which} not compared."]

@@ -59,14 +59,10 @@ class Kept:
 
 
 def kept(one: Fitted, before: Term | None) -> Kept:
-    """What a model keeps of a fit.
+    """What a model keeps of a fit, beside the same effect in the model before.
 
     For an unknown file or run the mean of the known ones is expected, with a standard error from
     their differences and uncertainties; if only one is known, with a plausible size.
-
-    Args:
-        one: the effect as fitted.
-        before: the same in the model before, if it was there.
     """
     term, layout = one.term, one.term.layout
     if not isinstance(layout, ApartLayout):
@@ -132,12 +128,7 @@ def check_place(path: Path) -> None:
 
 
 def with_remarks(fresh: Any, old: Any) -> Any:
-    """A fresh table with the comments that the old one had: at its beginning, and behind keys.
-
-    Args:
-        fresh: the table that replaces another.
-        old: the other; None if there was none.
-    """
+    """A fresh table with the comments that the old one had: at its beginning, and behind keys."""
     if not isinstance(old, Table):
         return fresh
     table = tomlkit.table()
@@ -222,13 +213,17 @@ def with_fit(
         if name in added:
             _describe(table, provenance, errors)
         elif not by_name[name].usual.term.knowledge.fixed.all():
-            table["refitted"] = with_remarks(_plain(vars(provenance)), table.get("refitted"))
+            table["refitted"] = with_remarks(tomlkit.item(vars(provenance)), table.get("refitted"))
     before = document.get(FIT)
     _forget_covariance(document)
     if covariance is not None:
         same = without_parts(fitted, covariance)
         if same[0] and np.all(np.isfinite(np.diag(same[1]))):
-            document[FIT] = with_remarks(_with_covariance(_together(), *same), before)
+            together = tomlkit.table()
+            together.trivia.indent = "\n"
+            what = "Standard errors of the values above in full, and their correlations."
+            together.add(tomlkit.comment(what))
+            document[FIT] = with_remarks(_with_covariance(together, *same), before)
     return _with_values(replace(model, document=document), [by_name[name].usual for name in order])
 
 
@@ -298,16 +293,6 @@ def _appended(document: Any, one: Kept) -> Any:
         document.append("effect", tomlkit.aot())
     document["effect"].append(table)
     table.trivia.indent = "\n"
-    return table
-
-
-def _together() -> Any:
-    """The table of correlations of the last fit."""
-    table = tomlkit.table()
-    table.trivia.indent = "\n"
-    table.add(
-        tomlkit.comment("Standard errors of the values above in full, and their correlations.")
-    )
     return table
 
 
@@ -425,16 +410,10 @@ def _cell(layout: Layout, i: int, fitted: Fitted) -> dict[str, object]:
 
 
 def _describe(table: Any, provenance: Provenance, errors: Mapping[str, Rms]) -> None:
-    table["provenance"] = with_remarks(_plain(vars(provenance)), table.get("provenance"))
+    table["provenance"] = with_remarks(tomlkit.item(vars(provenance)), table.get("provenance"))
     for name in _ERRORS:
         rms = {k: float(f"{v:.4g}") for k, v in errors[name].items() if v is not None}
-        table[name] = with_remarks(_plain(rms), table.get(name))
-
-
-def _plain(values: Mapping[str, Any]) -> Any:
-    table = tomlkit.table()
-    table.update(values)
-    return table
+        table[name] = with_remarks(tomlkit.item(rms), table.get(name))
 
 
 def renewed(model: Model, robot: Robot, data: Measurements) -> Model:

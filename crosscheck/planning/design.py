@@ -138,7 +138,10 @@ def make_plan(
     full, assumed = expected_sigma(robot, stated, kinds)
     free = [layout_of(name, robot) for name in commands.free]
     plan = planned(robot, commands, full, read, Terms(Term(one, one.null) for one in free))
-    notes = [*robot.notes, *strained(robot), *commands.notes, *assumed, *_unsolved(plan)]
+    notes = [*robot.notes, *strained(robot), *commands.notes, *assumed]
+    if plan.unsolved.any():
+        status = plan.base.prediction.solution().status[int(np.argmax(plan.unsolved))].value
+        notes.append(f"{commands.lines_of(plan.unsolved)} left out: {status}")
     loose = _loose(plan)
     notes += _loose_words(loose, plan)
     if not plan.problem.use.any():
@@ -184,15 +187,6 @@ def _loose_words(loose: Sequence[tuple[int, tuple[str, ...]]], plan: Planned) ->
         f"cables are slack at {len(loose)} of {rows}: {some(lines, _MOST_LINES)}; a lowest tension "
         "above zero leaves such poses out of what is chosen or proposed"
     ]
-
-
-def _unsolved(plan: Planned) -> list[str]:
-    rows = np.flatnonzero(plan.unsolved)
-    if len(rows) == 0:
-        return []
-    lines = plan.problem.data.lines_of(rows)
-    status = plan.base.prediction.solution().status[rows[0]].value
-    return [f"{lines} left out: {status}"]
 
 
 def _confusion(own: Mapping[str, Signal]) -> tuple[tuple[str, ...], Array]:
@@ -269,7 +263,7 @@ def choose_poses(
     progress("looking for poses", 0.0)
     kinds = kinds_of(reads, sigma or Sigma())
     full, _assumed = expected_sigma(robot, sigma or Sigma(), kinds)
-    tried, channels = _candidates(robot, box), Reads.of_kinds(robot.n_cables, kinds)
+    tried, channels = candidate_poses(robot, box), Reads.of_kinds(robot.n_cables, kinds)
     plan, found = None, 0
     if robot.n_cables >= robot.n_dof:
         plan = _usable(robot, held_within(robot, tried, limits), rows, full, channels, limits)
@@ -296,13 +290,11 @@ def choose_poses(
     pose = pose[_way(robot, pose)]
     runs = max(_LEAST_RUNS, round(rows / _ROWS_A_RUN))
     run = np.array([f"run {1 + k * runs // len(pose)}" for k in range(len(pose))])
-    return Measurements(
-        path=Path("poses.csv"), n_cables=robot.n_cables, run=run, command_pose=pose,
-        sigma=sigma or Sigma(),
-    )  # fmt: skip
+    path, noise = Path("poses.csv"), sigma or Sigma()
+    return Measurements(path, robot.n_cables, run, command_pose=pose, sigma=noise)
 
 
-def _candidates(robot: Robot, box: Array | None) -> Array:
+def candidate_poses(robot: Robot, box: Array | None) -> Array:
     frame = upright(robot) if box is None else np.eye(3)
     low, high = _room(robot, frame) if box is None else box
     if robot.joints:
@@ -356,9 +348,7 @@ def _usable(
 
 def _plan(robot: Robot, poses: Array, sigma: Sigma, reads: Reads) -> Planned:
     run = np.array([f"pose {k + 1}" for k in range(len(poses))])
-    data = Measurements(
-        path=Path("poses.csv"), n_cables=robot.n_cables, run=run, command_pose=poses
-    )
+    data = Measurements(Path("poses.csv"), robot.n_cables, run, command_pose=poses)
     return planned(robot, data, sigma, reads)
 
 

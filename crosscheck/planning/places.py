@@ -78,11 +78,8 @@ def more_poses(
 
     Tensions that balance the load are not those that commanded lengths bring about. Where a lowest
     tension is asked for, poses at which these leave a cable slack are left out, if enough others
-    are left; elsewhere they may be what tells effects apart.
-
-    Args:
-        plan: what is planned. limits: lowest and highest tension [N].
-        box: (2, 3) [m] lowest and highest position; by default anywhere near what is planned.
+    are left; elsewhere they may be what tells effects apart. ``limits`` [N] and ``box`` (2, 3) [m]
+    hold the lowest and the highest.
     """
     robot = plan.problem.robot
     poses = _jointed(plan) if robot.joints else _grid(plan, box)
@@ -226,10 +223,7 @@ def extensions(
 ) -> Iterator[Extension]:
     """All that can be added to measurements that were made or planned, one after the other.
 
-    Args:
-        plan: what is read so far, with the model that predicts it.
-        limits: lowest and highest tension [N] of added poses.
-        box: (2, 3) [m] lowest and highest position of added poses.
+    ``limits`` [N] and ``box`` (2, 3) [m] hold the lowest and the highest of added poses.
     """
     ways = ~plan.problem.data.read & ~plan.unsolved
     data = plan.problem.data.rows(plan.problem.use | ways)
@@ -283,10 +277,13 @@ def _heavier(data: Measurements, robot: Robot, mass: float) -> Loads:
 
 
 def _way_back(plan: Planned, data: Measurements) -> Iterator[Extension]:
+    """Each run from its last row to its first, with the same times."""
+    order = np.concatenate([np.flatnonzero(data.run == name)[::-1] for name in data.runs])
+    turned = data.rows(order)
     yield Extension(
         Adding.WAY_BACK,
         "repeat each run in the opposite order, so that poses are reached from the other side",
-        like(plan, _backwards(data)),
+        like(plan, replace(turned, run=_again(turned), t_s=data.t_s)),
     )
 
 
@@ -298,7 +295,7 @@ def _later(plan: Planned, data: Measurements) -> Iterator[Extension]:
     order = np.argsort(np.tile(data.file, 2), kind="stable")
     later, both = order >= n, data.rows(order % n)
     shift = float(np.ptp(data.t_s)) + _AN_HOUR
-    names = np.where(later, named_again(both), both.run)
+    names = np.where(later, _again(both), both.run)
     both = replace(both, run=names, t_s=data.t_s[order % n] + later * shift)
     whole = like(plan, both)
     rest = whole.problem.only(later)
@@ -307,15 +304,8 @@ def _later(plan: Planned, data: Measurements) -> Iterator[Extension]:
     yield Extension(Adding.LATER, "repeat the poses an hour later", again)
 
 
-def named_again(data: Measurements) -> np.ndarray:
+def _again(data: Measurements) -> np.ndarray:
     return np.array([f"{name} again" for name in data.run.tolist()], dtype=np.str_)
-
-
-def _backwards(data: Measurements) -> Measurements:
-    """Each run from its last row to its first, with the same times."""
-    order = np.concatenate([np.flatnonzero(data.run == name)[::-1] for name in data.runs])
-    turned = data.rows(order)
-    return replace(turned, run=named_again(turned), t_s=data.t_s)
 
 
 # Additional plans that a user can carry out: payloads off centre, poses reached from beyond.
@@ -345,7 +335,7 @@ def _aside(plan: Planned, data: Measurements) -> Iterator[Extension]:
         Adding.PAYLOAD_ASIDE,
         f"repeat the poses with a known extra {short(mass, 2)} kg off the centre, at ({where}) m "
         "in the platform's frame (payload_kg, payload_x_m, payload_y_m, payload_z_m)",
-        like(plan, replace(data, loads=there, run=named_again(data))),
+        like(plan, replace(data, loads=there, run=_again(data))),
     )
 
 
@@ -355,18 +345,15 @@ def _way_points(plan: Planned, data: Measurements) -> Iterator[Extension]:
     if beyond is None or data.command_pose is None:
         return
     n = data.n_rows
-    both = data.rows(np.repeat(np.arange(n), 2))
+    both = data.rows(np.repeat(np.arange(n), 2)).without_readings()
     stops = np.tile([False, True], n)
     gone_through = replace(
         both,
-        run=named_again(both),
+        run=_again(both),
         t_s=None if data.t_s is None else _halfway(data.t_s),
         command_pose=np.stack([beyond, data.command_pose], axis=1).reshape(2 * n, 7),
         # any number marks a stop as read; the readings themselves come from the model
         position=np.where(stops[:, None], np.zeros(3), np.nan),
-        quat_wxyz=None,
-        angles_rad=np.full((2 * n, 3), np.nan),
-        tensions=np.full((2 * n, data.n_cables), np.nan),
     )
     words = "repeat each pose, now approached from a way point beyond it"
     yield Extension(Adding.WAY_POINTS, words, like(plan, gone_through))

@@ -147,14 +147,11 @@ def expected_sigma(
 def planned(
     robot: Robot, commands: Measurements, sigma: Sigma, reads: Reads, terms: Terms | None = None
 ) -> Planned:
-    """The problem of commands as they would be measured.
+    """The problem of commands as they would be measured, whatever readings they have.
 
     Args:
-        robot: the robot.
-        commands: planned commands; readings in it are ignored.
-        sigma: noise of every kind that is read.
-        reads: what will be read.
-        terms: effects of the model; by default none.
+        robot, commands: what is planned. sigma: noise of every kind that is read.
+        reads: what will be read. terms: effects of the model; by default none.
 
     Raises:
         CrosscheckError: the robot's joints lock all that will be read.

@@ -122,8 +122,7 @@ def propose(
     """What to add, each tried by itself, the most useful first.
 
     Args:
-        options: :func:`crosscheck.planning.places.extensions`.
-        own: signals of effects in what is read so far.
+        options: what could be added. own: signals of effects in what is read so far.
         wanted: what these do not show or tell apart.
         signals: computes the signals of the same effects in added readings.
         progress: called with what is being done and the fraction that is done.
@@ -136,10 +135,10 @@ def propose(
         there = signals(option.plan)
         if option.kind is Adding.POSES:
             out.append(_few_poses(option, own, there, wanted))
-        else:
-            told = option.plan.problem.data if option.kind not in _SENSORS else None
-            gains = _gains(own, there, wanted)
-            out.append(Suggestion(option.kind, option.words, gains, commands=told))
+            continue
+        told = option.plan.problem.data if option.kind not in _SENSORS else None
+        gains = _gains(own, there, wanted)
+        out.append(Suggestion(option.kind, option.words, gains, commands=told))
     useful = [s for s in out if s.gains]
     return tuple(sorted(useful, key=lambda s: (-len(s.reached), -len(s.gains))))
 
@@ -177,14 +176,7 @@ def _few_poses(
 def telling_apart(
     plan: Planned, options: Sequence[Extension], name: str, rival: Layout
 ) -> tuple[Suggestion, ...]:
-    """What would tell an effect of the plan's model from another one that could replace it.
-
-    Args:
-        plan: the data, with the model that has the effect.
-        options: :func:`crosscheck.planning.places.extensions`.
-        name: name of the effect.
-        rival: the other effect.
-    """
+    """What of some options would tell an effect of the plan's model from a rival of it."""
     own = _pair(plan, name, rival)
     now = signal_left(own[name], own[rival.name])
     if now <= EXACT * own[name].power:

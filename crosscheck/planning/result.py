@@ -253,11 +253,10 @@ class Sight:
         out = [f"In these data {effects} would be visible at a plausible size."]
         large = [n for n, why in self.missing.items() if why.why is Why.TOO_MANY_PARAMETERS]
         lacking = by_reason({n: why for n, why in self.missing.items() if n not in large})
-        if lacking or self.hidden:
-            small = [(f"{', '.join(self.hidden)} (too small compared with the noise)")] * bool(
-                self.hidden
-            )
-            out.append(f"Not visible: {'; '.join([*lacking, *small])}.")
+        if self.hidden:
+            lacking.append(f"{', '.join(self.hidden)} (too small compared with the noise)")
+        if lacking:
+            out.append(f"Not visible: {'; '.join(lacking)}.")
         if large:
             out.append(
                 "Some have more parameters than these data have rows, and rest on plausible sizes: "
@@ -280,11 +279,7 @@ class Sight:
 
 
 def sight_of(problem: Problem, base: State, factor: Array) -> Sight:
-    """What data can show beside a model.
-
-    Args:
-        problem: the data. base: the model on them. factor: noise factors.
-    """
+    """What data can show beside a model on them, with noise factors."""
     found, missing = signals(Planned(problem, base, factor, Reads.of(problem.data)))
     ranked = sorted(all_visible(found).values(), key=lambda one: one.factor)
     return Sight(tuple(ranked), missing)
@@ -304,13 +299,9 @@ def _visible(name: str, own: Mapping[str, Signal]) -> Visible:
     rest = {o: value for o, value in left.items() if o not in twins}
     imitator = min(rest, key=lambda o: rest[o]) if rest else ""
     least = rest[imitator] if imitator else power
-    confused: list[tuple[str, float]] = []
-    if power >= need:
-        near = sorted((value, o) for o, value in rest.items() if value < need)
-        confused = [(o, value) for value, o in near]
-    return Visible(
-        g, need, _size(need, power), _size(need, least), imitator, tuple(confused), twins
-    )
+    near = sorted((value, o) for o, value in rest.items() if value < need <= power)
+    confused = tuple((o, value) for value, o in near)
+    return Visible(g, need, _size(need, power), _size(need, least), imitator, confused, twins)
 
 
 def _size(need: float, power: float) -> float:

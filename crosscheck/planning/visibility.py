@@ -88,10 +88,11 @@ def signals(plan: Planned) -> tuple[dict[str, Signal], dict[str, Reason]]:
         if why_not is not None:
             missing[layout.name] = why_not
             continue
-        shape = _middle_shape(plan, layout)
-        if shape is None:
+        shapes = layout.effect.shapes(plan.base.prediction.setup)
+        if not shapes:
             missing[layout.name] = Reason(Why.NOT_MOVED)
             continue
+        shape = shapes[len(shapes) // 2]
         found[layout.name] = Signal(layout, shape, beside(_columns(plan, layout, shape), span))
     return found, missing
 
@@ -108,11 +109,6 @@ def signals_like(plan: Planned, like: Mapping[str, Signal]) -> dict[str, Signal]
 def _of_model(plan: Planned) -> Array:
     """Basis (N, k) of what the model's own effects can imitate, since they are fitted together."""
     return basis(free_derivatives(plan.problem, plan.base))
-
-
-def _middle_shape(plan: Planned, layout: Layout) -> dict[str, float] | None:
-    shapes = layout.effect.shapes(plan.base.prediction.setup)
-    return shapes[len(shapes) // 2] if shapes else None
 
 
 def _columns(plan: Planned, layout: Layout, shape: dict[str, float]) -> Array:
@@ -191,12 +187,13 @@ def chosen_poses(
     if not pairs:
         return []
     names = list(own)
-    part = _parts(own)
+    ends = np.cumsum([signal.columns.shape[1] for signal in own.values()]).tolist()
+    part = dict(zip(names, map(slice, [0, *ends], ends), strict=False))
     whole = np.concatenate([own[n].columns for n in names], axis=1)
     added = np.concatenate([there[n].columns for n in names], axis=1)
     candidates = np.unique(row_of)
-    grams = np.stack([_gram(added[row_of == k]) for k in candidates])
-    total = _gram(whole)
+    grams = np.stack([(rows := added[row_of == k]).T @ rows for k in candidates])
+    total = np.asarray(whole.T @ whole)
     chosen: list[int] = []
     score = _scores(total[None], part, pairs)[0]
     random = np.random.default_rng(0)
@@ -212,18 +209,6 @@ def chosen_poses(
         chosen.append(int(candidates[left[best]]))
         total, score = total + grams[left[best]], float(scores[best])
     return chosen
-
-
-def _parts(own: Mapping[str, Signal]) -> dict[str, slice]:
-    out, first = {}, 0
-    for name, signal in own.items():
-        out[name] = slice(first, first + signal.columns.shape[1])
-        first += signal.columns.shape[1]
-    return out
-
-
-def _gram(columns: Array) -> Array:
-    return np.asarray(columns.T @ columns)
 
 
 def _scores(grams: Array, part: Mapping[str, slice], pairs: Sequence[Wanted]) -> Array:

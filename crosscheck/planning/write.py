@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +17,6 @@ from crosscheck.planning.result import Plan
 from seecr.errors import InputError, InputFileError
 from seecr.files import check_writable
 from seecr.pose import Array
-
-__all__ = ["NAME", "box_of", "check_own", "sometimes_written", "write_plan"]
 
 NAME = "plan.json"
 _OWN = "poses.csv"
@@ -46,26 +43,23 @@ def write_plan(plan: Plan, folder: str | Path, own: bool = True) -> tuple[str, .
     files = {_OWN: (plan.planned.problem.data, "")} if own else {}
     for item in plan.suggestions:
         if item.reached and item.commands is not None:
-            files[_addition(item.kind)] = (item.commands, _slack_remark(item))
+            files[_addition(item.kind)] = (item.commands, slack_remark(item))
     for name, (commands, slack) in files.items():
         check_writable(folder / name)
         folder.mkdir(parents=True, exist_ok=True)
         remarks = "; ".join(filter(None, [remark_of(commands), slack]))
-        write_measurements(folder / name, _unread(commands), remarks)
+        write_measurements(folder / name, commands.without_readings(), remarks)
     return tuple(files)
 
 
 def sometimes_written(out: Path, read: Path | None) -> list[str]:
     """Names of the files that only some plans have, for :func:`seecr.files.staged`.
 
-    Users call their own commands ``poses.csv``, too. It is an older plan's only if that plan says
-    that it wrote it, and stays if it is what is planned now.
-
-    Args:
-        out: the folder of the plan, perhaps with an older one.
-        read: the commands that are planned, if they are a file.
+    Users call their own commands ``poses.csv``, too. It is an older plan's only if that plan
+    in ``out`` says that it wrote it, and stays if it is what is planned now, ``read``.
     """
-    own = [_OWN] if _OWN in _wrote(out) and not _same(out / _OWN, read) else []
+    planned = read is not None and (out / _OWN).resolve() == read.resolve()
+    own = [_OWN] if _OWN in _wrote(out) and not planned else []
     names = [Path(name) for name in (*own, *map(_addition, Adding))]
     return [str(one) for name in names for one in (name, name.with_suffix(".toml"))]
 
@@ -96,10 +90,6 @@ def _wrote(out: Path) -> list[object]:
     return files if isinstance(files, list) else []
 
 
-def _same(path: Path, other: Path | None) -> bool:
-    return other is not None and path.resolve() == other.resolve()
-
-
 def _addition(kind: Adding) -> str:
     return f"add-{kind.value}.csv"
 
@@ -110,25 +100,10 @@ def remark_of(commands: Measurements) -> str:
     return lines and f"way points, passed without a reading: lines {lines}"
 
 
-def _slack_remark(item: Suggestion) -> str:
+def slack_remark(item: Suggestion) -> str:
     """Which lines, below the remark and the header, leave cables slack; "" if none do."""
     loose = [f"line {k + 3} ({' '.join(names)})" for k, names in enumerate(item.slack) if names]
     return f"cables are slack at {', '.join(loose)}" if loose else ""
-
-
-def _unread(data: Measurements) -> Measurements:
-    """Commands and their loads, without any readings."""
-    n, nothing = data.n_rows, np.zeros(3, dtype=bool)
-    return replace(
-        data,
-        position=np.full((n, 3), np.nan),
-        quat_wxyz=None,
-        angles_rad=np.full((n, 3), np.nan),
-        tensions=np.full((n, data.n_cables), np.nan),
-        position_mask=nothing,
-        angle_mask=nothing,
-        tension_mask=np.zeros(data.n_cables, dtype=bool),
-    )
 
 
 def box_of(text: str) -> Array:

@@ -45,11 +45,7 @@ Left = Callable[[NDArray[np.intp]], Array]
 
 
 def exchange_doubts(problem: Problem, pulls: Pulls) -> list[str]:
-    """Sentences that name columns of lengths or tensions that seem exchanged.
-
-    Args:
-        problem: the data with their noise. pulls: tensions as measured and as predicted.
-    """
+    """Sentences that name columns of lengths or tensions that seem exchanged."""
     # where lengths are exchanged the platform is not where it is predicted
     return list(_lengths(problem)) or list(_tensions(problem, pulls))
 
@@ -73,9 +69,9 @@ def _lengths(problem: Problem) -> Iterator[str]:
         order = exchanged_lengths(apart, int(rows.sum()))
         # if all are, an axis or the tracker's frame may be reversed instead
         if order and len(order) < len(apart):
-            own, others = ([apart[i, j] for i, j in pairs] for pairs in (
-                [(i, i) for i in order], order.items()))  # fmt: skip
-            here, there = (1e3 * float(np.sqrt(np.mean(np.square(x)))) for x in (own, others))
+            own = list(order)
+            pairs = (apart[own, own], apart[own, list(order.values())])
+            here, there = (1e3 * float(np.sqrt(np.mean(x**2))) for x in pairs)
             yield (
                 f"{name}{_seem('length', order)}: apart from constants they differ by "
                 f"{short(here)} mm from the straight lengths at the measured poses, and by "
@@ -115,9 +111,7 @@ def _seem(what: str, order: Mapping[int, int]) -> str:
 def exchanged(left: Left, m: int, rows: int) -> dict[int, int]:
     """For columns that seem exchanged, the cable that each is of; empty if none is certain.
 
-    Args:
-        left: what orders of cables leave unexplained. m: number of cables.
-        rows: number of rows that this is of.
+    ``left`` says what orders of m cables leave unexplained in a number of rows.
     """
     own = np.arange(m)
     found: dict[int, int] = {}
@@ -161,18 +155,15 @@ def _measured_pose(problem: Problem) -> Array | None:
     if data.position_mask.sum() < 2:
         return None
     place = np.where(data.position_mask, data.position, home[:3])
-    quat = data.quat_wxyz
-    if quat is None:
-        quat = quat_from_rxyz(data.angles_rad)
+    quat = quat_from_rxyz(data.angles_rad) if data.quat_wxyz is None else data.quat_wxyz
     known = np.asarray(np.isfinite(quat).all(axis=1))
     return np.concatenate([place, np.where(known[:, None], quat, home[3:])], axis=1)
 
 
 def misfits(read: Array, expected: Array, noise: float) -> Array:
-    """How column i, as read, varies about what is expected of cable j, (m, m).
+    """How column i, as read (n, m), varies about what is expected of cable j, (m, m).
 
-    Args:
-        read, expected: (n, m). noise: the least that they can vary, apart from luck.
+    It is no less than the noise.
     """
     off = read[:, :, None] - expected[:, None, :]
     if not len(off):
@@ -185,9 +176,7 @@ def exchanged_lengths(apart: Array, rows: int) -> dict[int, int]:
     """For columns of lengths that seem exchanged, the cable that each is of.
 
     An order is as good as its worst column, and exchanged columns fit about as well as the others.
-
-    Args:
-        apart: (m, m) misfits of column i and cable j. rows: number of rows that this is of.
+    ``apart`` (m, m) holds the :func:`misfits` of some rows.
     """
     columns = np.arange(len(apart))
     order = exchanged(lambda orders: apart[columns, orders].max(axis=1), len(apart), rows)
@@ -250,12 +239,9 @@ class Pulls:
 
 
 def unbalanced(pulls: Pulls, rows: NDArray[np.bool_], noise: float) -> Left:
-    """What measured tensions leave of the load in any order of cables, by sums over rows.
+    """What measured tensions leave of the load [N] in any order of cables, over some rows (n,).
 
     Each order may have a scale: load cells and masses that are off by one factor do not count.
-
-    Args:
-        pulls: tensions. rows: (n,) those to sum over. noise: of the tensions [N].
     """
     matrix, read, load = pulls.matrix[rows], pulls.measured[rows], pulls.load[rows]
     count, m = read.shape

@@ -95,17 +95,15 @@ def _contradicting(
         return None
     place = problem.data.position
     at_rest = _resting(problem, commands, used)
-    neighbours = np.stack([used[:-1][at_rest], used[1:][at_rest]], axis=1)
+    neighbours = np.stack([used[:-1], used[1:]], axis=1)[at_rest]
     limit = np.inf if stated.position_m is None else _NOISE * np.sqrt(6.0) * stated.position_m
     spread = float(np.linalg.norm(np.std(predicted[used], axis=0)))
     # an effect with separate values for each file or run may make the same command differ
     kinds = commands
     if problem.groups is not None:
         kinds = np.concatenate([commands, problem.groups[:, None]], axis=1)
-    for pairs, most in (
-        (neighbours, limit),
-        (_of_same_command(kinds, used), _TRAVEL * spread),
-    ):
+    same = _of_same_command(kinds, used)
+    for pairs, most in ((neighbours, limit), (same, _TRAVEL * spread)):
         off = np.linalg.norm(place[pairs[:, 0]] - place[pairs[:, 1]], axis=1)
         wrong = off > most
         if most > 0.0 and wrong.sum() > max(_PAIRS * len(pairs), _ROWS * len(used)):

@@ -1,9 +1,8 @@
 """Fits the effects whose values belong to the data, before anything else is fitted.
 
-A tracker frame that was aligned to the commands has absorbed a part of every error. Its values
-therefore belong to these data: they are fitted together with everything else, and mean nothing for
-other data. The same holds for an effect with separate values for each file or run, if the model has
-not seen that file or run.
+A tracker frame that was aligned to the commands has absorbed a part of every error, so its values
+mean nothing for other data. The same holds for an effect with separate values for each file or run,
+if the model has not seen that file or run.
 """
 
 from __future__ import annotations
@@ -21,12 +20,87 @@ from crosscheck.fit.state import State, evaluate
 from crosscheck.fit.words import measured
 from crosscheck.inference.fit import FLAT, Data, Fit, fit, without_rows
 from crosscheck.inference.noise import outliers
-from crosscheck.preparation.parts import LaidOut
-from seecr.effects import ApartLayout, Term, Terms, apart, layout_of
+from crosscheck.measurements.data import Measurements
+from seecr.counted import some
+from seecr.effects import ApartLayout, Knowledge, Own, Term, Terms, Values, apart, layout_of
 from seecr.pose import Array
 from seecr.units import parameter_name
 
-__all__ = ["Freed", "freed"]
+# Effects with separate values for each file or run, laid out for those of some data. A model keeps
+# the values of files or runs that it has seen; others start from the effect's common values.
+
+
+@dataclass(frozen=True, eq=False)
+class LaidOut:
+    """A model for some data.
+
+    Attributes:
+        terms: its effects, those with separate values laid out for the files or runs of the data.
+        fresh: pairs of an effect and a file or run for which the model has no values.
+        notes: which values were taken from the model, and which are new.
+    """
+
+    terms: Terms
+    fresh: tuple[tuple[str, str], ...]
+    notes: tuple[str, ...]
+
+
+def laid_out(data: Measurements, terms: Terms) -> LaidOut:
+    """The model, with separate values for the files or runs of the data where effects have them."""
+    out, fresh, notes = [], [], []
+    for term in terms:
+        if term.own is None or isinstance(term.layout, ApartLayout):
+            out.append(term)
+            continue
+        names = tuple(dict.fromkeys(data.parts[term.own.kind].tolist()))
+        known = {name: _known(term.own, name) for name in names}
+        new = [name for name in names if known[name] is None]
+        values = [known[name] or _unknown(term) for name in names]
+        layout = apart(term.layout, term.own.kind, names, term.vector)
+        vector = np.concatenate([one.vector for one in values])
+        knowledge = Knowledge.joined([one.knowledge for one in values])
+        out.append(Term(layout, vector, knowledge, term.own))
+        fresh += [(term.name, name) for name in new]
+        notes.append(_said_of_parts(term, term.own.kind, [n for n in names if n not in new], new))
+    return LaidOut(Terms(out), tuple(fresh), tuple(notes))
+
+
+def groups_of(data: Measurements, terms: Terms) -> NDArray[np.int64] | None:
+    """(n,) number of each row's file or run, if effects have separate values for these."""
+    kinds = [term.layout.kind for term in terms if isinstance(term.layout, ApartLayout)]
+    if not kinds:
+        return None
+    _names, number = np.unique(data.parts["run" if "run" in kinds else "file"], return_inverse=True)
+    return np.asarray(number, np.int64)
+
+
+def _known(own: Own, name: str) -> Values | None:
+    """The model's values for a file or run; its name may be written without the folder."""
+    same = (
+        v for written, v in own.values.items() if name == written or name.endswith(f"/{written}")
+    )
+    return next(same, None)
+
+
+def _unknown(term: Term) -> Values:
+    """Starting values for a file or run that the model has not seen.
+
+    Independent measurements of other files or runs say nothing about it and are not taken over.
+    """
+    count = len(term.layout)
+    knowledge = replace(Knowledge.nothing(count), fixed=term.knowledge.fixed)
+    return Values(term.vector, np.full(count, np.inf), knowledge)
+
+
+def _said_of_parts(term: Term, kind: str, known: Sequence[str], new: Sequence[str]) -> str:
+    words = [f"{some(known)} as in the model"] if known else []
+    held = bool(term.knowledge.fixed.all())
+    then = "at the fixed common values" if held else "fitted to these data first"
+    words += [f"{some(new)} not in the model, so {then}"] if new else []
+    return f"{term.name} has separate values for each {kind}: {'; '.join(words)}"
+
+
+# The fit of what the data leave free.
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +118,7 @@ class Freed:
 
 
 def freed(problem: Problem, laid: LaidOut) -> Freed:
-    """Fit the parameters that the data leave free; all other values stay.
-
-    Args:
-        problem: the data; :attr:`Measurements.free` names the effects.
-        laid: the model as it stands, and the files or runs for which it has no values.
-    """
+    """Fit the parameters that the data leave free, of a model that is laid out; the others stay."""
     names, terms = problem.data.free, laid.terms
     if not (names or laid.fresh) or not problem.n_readings:
         return Freed(terms, np.zeros(len(terms), dtype=bool))

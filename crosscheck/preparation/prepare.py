@@ -15,8 +15,7 @@ from crosscheck.fit.state import State
 from crosscheck.inference.held_out import blocks_note
 from crosscheck.measurements.data import Measurements
 from crosscheck.preparation.fitness import refusal_of
-from crosscheck.preparation.freed import freed
-from crosscheck.preparation.parts import groups_of, laid_out
+from crosscheck.preparation.freed import freed, groups_of, laid_out
 from crosscheck.preparation.suspect import filled_in_note, suspicions, without_constants
 from seecr.description.robot import Robot
 from seecr.effects import Terms, catalogue
@@ -77,9 +76,8 @@ def prepare(
     every = np.ones(data.n_rows, dtype=bool)
     problem = Problem(robot, data, data.sigma, every, considered=considered)
     if not problem.measured.any():
-        return Prepared(
-            problem, terms, (*robot.notes, *data.notes), "", Refusal(Unfit.NO_READINGS, data.n_rows)
-        )
+        none = Refusal(Unfit.NO_READINGS, data.n_rows)
+        return Prepared(problem, terms, (*robot.notes, *data.notes), "", none)
     laid = laid_out(data, terms)
     plain = problem.experiment.predict(laid.terms.effects)
     problem, constants = without_constants(_solved_rows(problem, plain), plain)
@@ -96,17 +94,9 @@ def prepare(
         problem = problem.with_sigma(others.sigma)
     asked, odd = suspicions(problem, plain)
     notes = (
-        *robot.notes,
-        *strained(robot),
-        *data.notes,
-        *filled_in_note(problem),
-        *constants,
-        *asked,
-        *oversized(problem, plain),
-        *problem.left_out,
-        *estimates,
-        *said,
-    )
+        *robot.notes, *strained(robot), *data.notes, *filled_in_note(problem), *constants, *asked,
+        *oversized(problem, plain), *problem.left_out, *estimates, *said,
+    )  # fmt: skip
     problem = problem.with_groups(groups_of(data, terms))
     refusal = refusal_of(problem, plain.pose[:, :3], data.sigma) or odd
     return Prepared(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,8 @@ from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.dwells import mean_rotation
 from crosscheck.preparation.exchanged import Pulls, exchange_doubts, rows_of_files
-from crosscheck.preparation.stuck import stuck_doubts
 from seecr.columns.plausible import turned_from
-from seecr.counted import some
+from seecr.counted import counted, some
 from seecr.effects.base import Readings
 from seecr.pose import (
     Array,
@@ -59,11 +59,7 @@ _MOST_NAMED = 8
 
 
 def suspicions(problem: Problem, at: Prediction) -> tuple[list[str], Refusal | None]:
-    """Sentences that ask about what looks wrong, and why no verdict is passed, if so.
-
-    Args:
-        problem: the data with their noise. at: what the model as it stands predicts.
-    """
+    """Sentences that ask about what looks wrong, and why no verdict is passed, if so."""
     readings, pulls = at.readings, Pulls.of(problem, at)
     asked, refusal = misread_orientations(problem, readings)
     notes = [
@@ -100,11 +96,7 @@ _Meant = Callable[[Array], Array]
 
 
 def _turns(order: str, columns: str, sign: float = 1.0) -> _Meant:
-    """Quaternions of the same angles, taken as turns about moving axes in an order.
-
-    Args:
-        order: axes, such as "zyx". columns: the columns that hold these turns, such as "xyz".
-    """
+    """Quaternions of the same angles as turns about moving axes, "zyx", held by columns, "xyz"."""
 
     def read(quat: Array) -> Array:
         angles = sign * rxyz_from_quat(quat)
@@ -146,9 +138,6 @@ def misread_orientations(problem: Problem, readings: Readings) -> tuple[list[str
     """Asks whether orientations of a file are of another convention; a refusal if they must be.
 
     Of several files the first one for which that is certain; if none is, the first one.
-
-    Args:
-        problem: the data with their noise. readings: what the model as it stands predicts.
     """
     if problem.data.quat_wxyz is None:
         return [], None
@@ -281,6 +270,87 @@ def _worse_than_commands(problem: Problem, readings: Readings) -> Iterator[str]:
             )
 
 
+# A run that crashes midway leaves readings of one place beside commands of many. No effect is like
+# that, so a diagnosis would call it an unknown one.
+
+# The position stands still if it moves by less than this part of the way it is predicted to move,
+_STILL = 0.05
+# which is more than this part of what all predicted positions spread by, over so many rows.
+_FAR_WAY, _STUCK_ROWS = 0.1, 3
+# Most stretches that are named, and most rows of a run that are looked at, evenly spaced.
+_MOST_STRETCHES, _MOST_ROWS = 3, 400
+
+
+def stuck_doubts(problem: Problem, predicted: Array) -> list[str]:
+    """A sentence for each stretch of a run in which the position hardly changes but should.
+
+    ``predicted`` (n, 3) [m] are positions by the model as it stands.
+    """
+    data = problem.data
+    axes = np.flatnonzero(problem.counted[:, :3].any(axis=0))
+    if not len(axes):
+        return []
+    read, there = data.position[:, axes], predicted[:, axes]
+    whole = problem.use & np.isfinite(read).all(axis=1) & np.isfinite(there).all(axis=1)
+    if not whole.any():
+        return []
+    least = _FAR_WAY * float(np.linalg.norm(np.ptp(there[whole], axis=0)))
+    found = [
+        (rows[first], rows[first + 1 : last + 1])
+        for run in np.unique(data.run_index)
+        for every in [np.flatnonzero(whole & (data.run_index == run))]
+        for rows in [every[:: 1 + len(every) // _MOST_ROWS]]
+        for first, last in _stretches(read[rows], there[rows], least)
+    ]
+    said = [_stuck_words(problem, read, there, at, rows) for at, rows in found[:_MOST_STRETCHES]]
+    if (more := len(found) - _MOST_STRETCHES) > 0:
+        said.append(f"The position also stays in {counted(more, 'other part')} of the data.")
+    return said
+
+
+def _stretches(read: Array, there: Array, least: float) -> list[tuple[int, int]]:
+    """First and last rows between which positions read (n, k) stay, and those predicted do not.
+
+    Rows at either end at which the platform should be where it is read are left out.
+    """
+    apart, expected = _distances(read), _distances(there)
+    moved, should = (np.maximum.accumulate(table, axis=1) for table in (apart, expected))
+    still = (expected > least) & (moved < _STILL * should)
+    away = apart < _STILL * expected
+    out, first = [], 0
+    while first + _STUCK_ROWS < len(read):
+        if still[first].any():
+            start = int(np.argmax(away[first])) - 1
+            last = int(np.flatnonzero(still[first])[-1])
+            if last - start >= _STUCK_ROWS:
+                out.append((start, last))
+                first = last
+        first += 1
+    return out
+
+
+def _distances(places: Array) -> Array:
+    """(n, n) distances of places (n, k) from each other; zero from those before."""
+    squares = ((axis[:, None] - axis) ** 2 for axis in places.T)
+    return np.asarray(np.triu(np.sqrt(sum(squares))))
+
+
+def _stuck_words(
+    problem: Problem, read: Array, there: Array, at: np.intp, rows: NDArray[np.intp]
+) -> str:
+    data = problem.data
+    moved, should = (
+        1e3 * float(np.linalg.norm(table[rows] - table[at], axis=1).max())
+        for table in (read, there)
+    )
+    return (
+        f"Lines {data.place(int(rows[0]))} to {data.line[rows[-1]]}, run {data.run[at]}: the "
+        f"position stays within {moved:.3g} mm of that at line {data.line[at]}, where the commands "
+        f"should move it by {should:.4g} mm. Did the robot or its tracker stop? Then leave these "
+        "rows out."
+    )
+
+
 # tensions
 
 
@@ -302,8 +372,7 @@ def _other_units(problem: Problem, pulls: Pulls) -> Iterator[str]:
 def unit_of(part: Array) -> str | None:
     """The unit in which tensions carry the load; None if that is newtons, or none that is known.
 
-    Args:
-        part: (k,) of the load that they carry as newtons, in each of k rows.
+    ``part`` (k,) of the load is what they carry as newtons, row by row.
     """
     if len(part) < _SEVERAL:
         return None
@@ -334,12 +403,11 @@ def _other_tensions(problem: Problem, readings: Readings) -> list[str]:
 
 def filled_in_note(problem: Problem) -> list[str]:
     """A note about parts of the pose that the joints lock, and that nothing read."""
-    if not problem.filled_in.any():
-        return []
-    return [
+    said = (
         f"{_names(problem.filled_in)}: not counted as readings, because the joints allow no such "
         "motion and the file has the same number in every row"
-    ]
+    )
+    return [said] if problem.filled_in.any() else []
 
 
 def without_constants(problem: Problem, at: Prediction) -> tuple[Problem, list[str]]:
@@ -348,14 +416,11 @@ def without_constants(problem: Problem, at: Prediction) -> tuple[Problem, list[s
     Instruments repeat a number only if what they read changes by less than their last digit. Where
     the model expects more, whoever wrote the file filled it in. If nothing else was read the data
     are left as they are.
-
-    Args:
-        problem: the data. at: what the model as it stands predicts.
     """
     data, quat, notes = problem.data, problem.data.quat_wxyz, []
-    angles = data.angles_rad if quat is None else rxyz_from_quat(quat)
+    angles, there = data.angles_rad if quat is None else rxyz_from_quat(quat), at.readings
     read = np.concatenate([data.position, angles, data.tensions], axis=1)
-    turned, there = rxyz_from_quat(at.readings.quat_wxyz), at.readings
+    turned = rxyz_from_quat(there.quat_wxyz)
     expected = np.concatenate([there.position, turned, there.tensions], axis=1)
     seen = problem.counted & np.isfinite(expected)
     usual = _rms(there.tensions[seen[:, TENSION]]) if seen[:, TENSION].any() else 0.0
@@ -380,23 +445,17 @@ def without_constants(problem: Problem, at: Prediction) -> tuple[Problem, list[s
 
 def _without(data: Measurements, left: Array) -> Measurements:
     """Data of which only some readings (n, 6 + m) are left: positions, angles and tensions."""
-    position, angles, tensions = left[:, POSITION], left[:, ORIENTATION], left[:, TENSION]
-    quat, lost = data.quat_wxyz, np.isnan(angles)
+    angles, quat = left[:, ORIENTATION], data.quat_wxyz
+    lost = np.isnan(angles)
     if quat is None or lost.all() or (lost != lost[:, :1]).any():
         quat = None  # single angles can only be left out of angles
     else:
         quat, angles = np.where(lost[:, :1], np.nan, quat), data.angles_rad
-    masks = [np.asarray(np.isfinite(table).any(axis=0)) for table in (position, angles, tensions)]
+    masks: dict[str, Any] = dict.fromkeys(("position_mask", "angle_mask", "tension_mask"))
     return replace(
-        data,
-        position=position,
-        quat_wxyz=quat,
-        angles_rad=angles,
-        tensions=tensions,
-        position_mask=masks[0],
-        angle_mask=masks[1],
-        tension_mask=masks[2],
-    )
+        data, position=left[:, POSITION], quat_wxyz=quat, angles_rad=angles,
+        tensions=left[:, TENSION], **masks,
+    )  # fmt: skip
 
 
 def _constant(
@@ -414,7 +473,6 @@ def _constant(
 
 
 def _names(columns: NDArray[np.bool_]) -> str:
-    """Names of columns (6 + m,) of readings."""
     pose = [*"xyz", *(f"rotation about {axis}" for axis in "xyz")]
     names = [pose[k] if k < 6 else f"tension_{k - 5}" for k in np.flatnonzero(columns).tolist()]
     return some(names, _MOST_NAMED)

@@ -53,11 +53,7 @@ class Thinned:
     others: NDArray[np.bool_]
 
     def note_on_others(self, terms: Terms, sigma: Sigma) -> tuple[str, ...]:
-        """How well a model predicts the rows that were held out; empty if there are none.
-
-        Args:
-            terms: the model. sigma: the noise that was assumed.
-        """
+        """How well a model predicts the rows that were held out; empty if there are none."""
         if not self.others.any():
             return ()
         problem = Problem(self.robot, self.whole, sigma, self.others)
@@ -77,19 +73,18 @@ class Thinned:
 
 
 def thinned(robot: Robot, data: Measurements, most: int = MOST) -> Thinned:
-    """Choose the rows for a search.
+    """Choose the rows for a search: all if no more than ``most`` were read.
 
-    Args:
-        robot: the robot that was measured.
-        data: its measurements; all rows are taken if no more than ``most`` were read.
-        most: otherwise between half as many and so many are taken, and the rows at reversals.
+    Otherwise between half as many and so many are taken, and the rows at reversals.
     """
     read = data.read
     every = -(-int(read.sum()) // most)
     if every <= 1:
         return Thinned(robot, data, data, np.zeros(data.n_rows, dtype=bool))
     turns = _turns(robot, data)
-    place = _place_in_run(data)
+    index = np.arange(data.n_rows)
+    begins = np.append(True, data.run[1:] != data.run[:-1])
+    place = index - np.maximum.accumulate(np.where(begins, index, 0))  # within the run
     if turns.sum() <= most:
         last = np.append(place[1:] == 0, True)
         kept = (place % every == 0) | last | turns
@@ -110,13 +105,6 @@ def thinned(robot: Robot, data: Measurements, most: int = MOST) -> Thinned:
         f"{what}; `add` fits all of them"
     )
     return Thinned(robot, data, data.rows(kept).with_notes([note]), read & ~kept)
-
-
-def _place_in_run(data: Measurements) -> NDArray[np.int64]:
-    """(n,) number of each row within its run."""
-    index = np.arange(data.n_rows)
-    begins = np.append(True, data.run[1:] != data.run[:-1])
-    return index - np.maximum.accumulate(np.where(begins, index, 0))
 
 
 def _turns(robot: Robot, data: Measurements) -> NDArray[np.bool_]:

@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
 from made_data import measured, soft_cogiro
 
-from crosscheck.comparison.limits import RULES, Limits, Rule, exceeded, option
+from crosscheck.comparison.limits import (
+    RULES,
+    Limits,
+    Rule,
+    exceeded,
+    load_limits,
+    option,
+    parse_limit,
+)
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.problem import KINDS
+from seecr.errors import InputFileError
 
 
 @pytest.fixture(scope="module")
@@ -27,21 +37,78 @@ def test_each_field_of_the_limits_has_its_rule() -> None:
     assert option("max_position_worst") == "--max-position-worst"
 
 
-@pytest.mark.parametrize("name", ["max_position", "max_orientation_worst"])
-def test_a_limit_just_below_is_exceeded_and_one_just_above_holds(
-    found: Comparison, name: str
-) -> None:
-    rule = RULES[name]
-    sizes = found.errors_of(rule.kind.name)
-    value = float(np.nanmax(sizes)) if rule.worst else found.rms[rule.kind.key]
-    assert value is not None and exceeded(Limits(**{name: 1.001 * value}), found) == []
-    (item,) = exceeded(Limits(**{name: 0.999 * value}), found)
-    assert (item.name, item.value) == (name, value)
-    assert item.words.startswith(rule.words)
-    worst = int(np.nanargmax(sizes))
-    assert f"worst at line {found.problem.data.line[worst]}, " in item.words
+def test_a_limit_just_below_is_exceeded_and_one_just_above_holds(found: Comparison) -> None:
+    rms, sizes = found.rms["position_rms_m"], found.errors_of("position")
+    assert rms is not None
+    (item,) = exceeded(Limits(max_position=0.9 * rms), found)
+    assert (item.name, item.value, item.limit) == ("max_position", rms, 0.9 * rms)
+    assert f"exceeds {900 * rms:.4g} mm by {1e3 * (rms - 0.9 * rms):.4g} mm" in item.words
+    line = found.problem.data.line[int(np.argmax(sizes))]
+    assert f"worst at line {line}, run " in item.words and "commanded (" in item.words
+    assert exceeded(Limits(max_position=1.01 * rms), found) == []
+    assert exceeded(Limits(max_position_worst=1.01 * sizes.max()), found) == []
+    (item,) = exceeded(Limits(max_position_worst=0.99 * sizes.max()), found)
+    assert item.words.startswith("worst position error")
 
 
 def test_a_limit_on_what_was_not_read_is_refused(found: Comparison) -> None:
     with pytest.raises(CrosscheckError, match=r"--max-tension-worst: .* has no tension readings"):
         exceeded(Limits(max_tension_worst=1.0), found)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "value"),
+    [
+        ("max_position", "0.5mm", 5e-4),
+        ("max_position_worst", "300um", 3e-4),
+        ("max_orientation", "0.2deg", np.radians(0.2)),
+        ("max_tension_worst", ".5kN", 500.0),
+    ],
+)
+def test_limits_are_read_with_their_unit(name: str, text: str, value: float) -> None:
+    assert parse_limit(name, text) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("max_position", "0.5", r"--max-position: .*\(m, cm, mm, um, µm\).*, got no unit"),
+        ("max_position", "0.5deg", "got unit 'deg' in '0.5deg'"),
+        ("max_orientation", "1mm", "such as 0.2deg, got unit 'mm'"),
+        ("max_tension_worst", "1kg", "--max-tension-worst: .*got unit 'kg'"),
+        ("max_position", "mm", "got 'mm'"),
+        ("max_position", "1.2.3mm", "got unit '.3mm'"),
+        ("max_position", "nan mm", "got 'nan mm'"),
+        ("max_position", "0mm", "expected more than zero, got '0mm'"),
+        ("max_position", "-1mm", "expected more than zero"),
+    ],
+)
+def test_limits_without_a_right_unit_are_refused(name: str, text: str, words: str) -> None:
+    with pytest.raises(CrosscheckError, match=words):
+        parse_limit(name, text)
+
+
+def test_limits_from_a_file_and_the_command_line(tmp_path: Path) -> None:
+    file = tmp_path / "limits.toml"
+    file.write_text('max_position = "0.5mm"\nmax-orientation = "0.2deg"\n')
+    limits = load_limits(file).but({"max_position": "1mm", "max_tension": None})
+    assert limits == Limits(max_position=1e-3, max_orientation=np.radians(0.2))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            'max_postion = "1mm"',
+            "max_postion is not a limit; expected one of, nearest first: max_position,",
+        ),
+        ("max_position = 0.5", 'max_position: expected a text such as "0.5mm", got 0.5'),
+        ('max_position = "1deg"', "limits.toml: line 1: --max-position: .*got unit 'deg'"),
+        ("max_position = ", "is not TOML"),
+    ],
+)
+def test_bad_limit_files(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "limits.toml"
+    file.write_text(text)
+    with pytest.raises(InputFileError, match=words):
+        load_limits(file)

@@ -9,14 +9,11 @@ import pytest
 from made_data import SIGMA, measured, soft_cogiro, term
 from scipy import stats
 
-from crosscheck.comparison.associations import SIGNIFICANT, _labelled, _p
-from crosscheck.comparison.limits import Limits, exceeded, load_limits, parse_limit
+from crosscheck.comparison.associations import SIGNIFICANT, f_test, labelled
 from crosscheck.comparison.quantities import EVERYWHERE, STILL, cable_errors, independent_part
 from crosscheck.comparison.residuals import compare
-from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.data import Sigma
 from seecr.description.mjcf import load_robot, model_path
-from seecr.errors import InputFileError
 from seecr.files import json_text
 from seecr.pose import pose_add, pose_difference
 
@@ -214,86 +211,6 @@ def test_everything_is_json(off):
     assert "NaN" not in text and '"structured": true' in text
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "value"),
-    [
-        ("max_position", "0.5mm", 5e-4),
-        ("max_position", " 2e-3 m", 2e-3),
-        ("max_position_worst", "300um", 3e-4),
-        ("max_orientation", "0.2deg", np.radians(0.2)),
-        ("max_orientation", "3mrad", 3e-3),
-        ("max_tension", "1N", 1.0),
-        ("max_tension_worst", ".5kN", 500.0),
-    ],
-)
-def test_limits_are_read_with_their_unit(name, text, value):
-    assert parse_limit(name, text) == pytest.approx(value, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "words"),
-    [
-        ("max_position", "0.5", r"--max-position: .*\(m, cm, mm, um, µm\).*, got no unit"),
-        ("max_position", "0.5deg", "got unit 'deg' in '0.5deg'"),
-        ("max_orientation", "1mm", "such as 0.2deg, got unit 'mm'"),
-        ("max_tension_worst", "1kg", "--max-tension-worst: .*got unit 'kg'"),
-        ("max_position", "mm", "got 'mm'"),
-        ("max_position", "1.2.3mm", "got unit '.3mm'"),
-        ("max_position", "nan mm", "got 'nan mm'"),
-        ("max_position", "0mm", "expected more than zero, got '0mm'"),
-        ("max_position", "-1mm", "expected more than zero"),
-    ],
-)
-def test_limits_without_a_right_unit_are_refused(name, text, words):
-    with pytest.raises(CrosscheckError, match=words):
-        parse_limit(name, text)
-
-
-def test_limits_from_a_file_and_the_command_line(tmp_path):
-    file = tmp_path / "limits.toml"
-    file.write_text('max_position = "0.5mm"\nmax-orientation = "0.2deg"\n')
-    limits = load_limits(file).but({"max_position": "1mm", "max_tension": None})
-    assert limits == Limits(max_position=1e-3, max_orientation=np.radians(0.2))
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (
-            'max_postion = "1mm"',
-            "max_postion is not a limit; expected one of, nearest first: max_position,",
-        ),
-        ("max_position = 0.5", 'max_position: expected a text such as "0.5mm", got 0.5'),
-        ('max_position = "1deg"', "limits.toml: line 1: --max-position: .*got unit 'deg'"),
-        ("max_position = ", "is not TOML"),
-    ],
-)
-def test_bad_limit_files(tmp_path, text, words):
-    file = tmp_path / "limits.toml"
-    file.write_text(text)
-    with pytest.raises(InputFileError, match=words):
-        load_limits(file)
-
-
-def test_a_limit_says_by_how_much_and_where(off):
-    rms = off.rms["position_rms_m"]
-    (item,) = exceeded(Limits(max_position=1e-4), off)
-    assert item.value == rms and item.limit == 1e-4
-    assert f"exceeds 0.1 mm by {1e3 * (rms - 1e-4):.4g} mm" in item.words
-    sizes = off.errors_of("position")
-    line = off.problem.data.line[int(np.argmax(sizes))]
-    assert f"worst at line {line}, run " in item.words and "commanded (" in item.words
-    assert exceeded(Limits(max_position=1.01 * rms), off) == []
-    assert exceeded(Limits(max_position_worst=1.01 * sizes.max()), off) == []
-    (item,) = exceeded(Limits(max_position_worst=0.99 * sizes.max()), off)
-    assert item.words.startswith("worst position error")
-
-
-def test_a_limit_on_what_was_not_measured_is_refused(off):
-    with pytest.raises(CrosscheckError, match="has no tension readings"):
-        exceeded(Limits(max_tension=1.0), off)
-
-
 def test_a_pose_error_is_that_of_its_cables(robot, off):
     """dl = -u . (dt + dw x R b): against nominal lengths of the shifted pose, to first order."""
     problem, prediction = off.problem, off.state.prediction
@@ -341,13 +258,13 @@ def test_a_comparison_shows_itself(off):
 def test_p_values_of_associations_are_those_of_the_f_distribution() -> None:
     between, within = np.array([3.0, 40.0, 1.0, 1.0]), np.array([50.0, 60.0, 1.0, 0.0])
     won, lost = np.array([2, 5, 0, 3]), np.array([90, 30, 7, 0])
-    p = _p(between, won, within, lost)
+    p = f_test(between, won, within, lost)
     expected = stats.f.sf((between[:2] / won[:2]) / (within[:2] / lost[:2]), won[:2], lost[:2])
     assert p == pytest.approx([*expected, 1.0, 1.0])
     # rows that are identical vary within no bin
-    assert _p(between[:1], won[:1], 0.0 * within[:1], lost[:1]) == 0.0
+    assert f_test(between[:1], won[:1], 0.0 * within[:1], lost[:1]) == 0.0
 
 
 def test_groups_of_numbers_have_no_sign_at_zero() -> None:
-    assert _labelled(-0.0, 0.25, "m") == "0 to 0.25 m"
-    assert _labelled(0.4, 0.4, "m") == "0.4 m" and _labelled(2.0, 2.0, "") == "2"
+    assert labelled(-0.0, 0.25, "m") == "0 to 0.25 m"
+    assert labelled(0.4, 0.4, "m") == "0.4 m" and labelled(2.0, 2.0, "") == "2"

@@ -9,7 +9,7 @@ import pytest
 from made_data import SIGMA, measured, soft_cogiro
 
 from crosscheck.comparison.associations import Association
-from crosscheck.comparison.noise import _too_small
+from crosscheck.comparison.noise import underestimation
 from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import error_size_words, misfit_sentence, noise_sentence
@@ -89,7 +89,7 @@ def test_the_comparison_tells_how_many_times_the_noise_each_kind_is() -> None:
     assert found.as_json()["residual"]["times_noise"] == found.times_noise
 
 
-def test_what_varies_smoothly_with_the_tilt_is_no_noise_that_was_estimated_too_small() -> None:
+def test_what_varies_smoothly_with_the_tilt_is_no_noise_that_was_estimatedunderestimation() -> None:
     """Angles in another order were "3.46 times the assumed noise", and agreed."""
     rng = np.random.default_rng(0)
     data = measured(ROBOT).rows(np.arange(60))
@@ -111,11 +111,11 @@ def test_what_varies_smoothly_with_the_tilt_is_no_noise_that_was_estimated_too_s
     assert "(those of position are noise)" in found.sentence
 
 
-def test_estimates_from_differences_are_too_small_if_neighbours_are_alike() -> None:
+def test_estimates_from_differences_areunderestimation_if_neighbours_are_alike() -> None:
     rho, rows = 0.8, 200_000
     noise = np.random.default_rng(1).standard_normal(rows)
     for k in range(1, rows):
         noise[k] = rho * noise[k - 1] + np.sqrt(1.0 - rho**2) * noise[k]
     part = np.std(np.diff(noise, n=3)) / np.sqrt(20.0)
-    assert 1.0 / part == pytest.approx(_too_small(False, rho), rel=0.02)
-    assert _too_small(False, 0.0) == _too_small(True, 0.8) == 1.0
+    assert 1.0 / part == pytest.approx(underestimation(False, rho), rel=0.02)
+    assert underestimation(False, 0.0) == underestimation(True, 0.8) == 1.0

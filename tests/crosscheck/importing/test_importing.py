@@ -277,6 +277,9 @@ def test_two_recordings_are_one_case(made, commands, tmp_path):
     assert data.n_rows == 2 * made.truth.n_rows
     assert data.run[0].startswith("monday.csv: ") and data.run[-1].startswith("tuesday.csv: ")
     assert np.all(np.diff(data.t_s) > 0.0)
+    n = made.truth.n_rows
+    assert data.t_s[n] == pytest.approx(data.t_s[n - 1] + 60.0)
+    assert data.sigma.position_m == pytest.approx(made_of.NOISE_M / np.sqrt(60), rel=0.3)
 
 
 def test_noise_that_goes_together_counts_for_less():

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
 
 import made_recordings as made_of
 import numpy as np
 import pytest
 from made_data import soft_cogiro
 
-from crosscheck.importing import case, import_case
+from crosscheck.importing import import_case
 from crosscheck.importing.case import Imported, without_strays
 from crosscheck.importing.join import joined
 
@@ -70,28 +69,23 @@ def test_without_times_of_commands_a_dwell_left_out_is_between_its_neighbours(
     assert rows.t_s[3] == pytest.approx(0.5 * (whole[2] + whole[4]))
 
 
-@pytest.mark.parametrize(
-    ("off", "gone"),
-    [
-        ([0.1, 0.1, 0.1, 0.1, 3.0], 1),  # one of five, a fifth of what the commands spread
-        ([0.5, 0.5, 0.5, 0.5, 3.0], 0),  # not so much farther than most
-        ([0.1, 0.1, 0.1, 3.0, 3.0], 0),  # two of five
-        ([0.01, 0.01, 0.01, 0.01, 0.2], 0),  # small beside what the commands spread
-    ],
-)
-def test_only_few_dwells_much_farther_than_most_are_left_out(
-    monkeypatch: pytest.MonkeyPatch, off: list[float], gone: int
+def test_only_a_dwell_much_farther_than_most_and_than_commands_spread_is_left_out(
+    tmp_path: Path,
 ) -> None:
-    told = np.zeros((5, 3))
-    told[:, 0] = np.arange(5) * 2.0
-    far = np.array(off)
-    monkeypatch.setattr(case, "_told", lambda *_given: told)
-    monkeypatch.setattr(case, "_off", lambda *_given: far)
-    monkeypatch.setattr(case, "_stood_still", lambda *_given: far == far.max())
-    monkeypatch.setattr(case, "_note", lambda *_given: "left out")
-    monkeypatch.setattr(case, "_without", lambda _take, some: int(some.sum()))
-    takes, notes = without_strays(ROBOT, cast(Any, ["a take"]), cast(Any, None))
-    assert takes == ([gone] if gone else ["a take"]) and len(notes) == (gone > 0)
+    found = imported(tmp_path, MADE)
+    (take,) = found.takes
+    step = np.linalg.norm(np.diff(MADE.truth.command_pose[:, :3], axis=0), axis=1)
+    far, near = int(np.argmax(step)), int(np.argmin(np.where(step > 1e-6, step, np.inf)))
+
+    def notes(before: int, away: float = 0.0) -> list[str]:
+        """With the next dwell where the one before was, and all frames off by ``away`` [m]."""
+        place = take.dwells.position.copy()
+        place[take.used[before + 1]] = place[take.used[before]]
+        stopped = replace(take, dwells=replace(take.dwells, position=place))
+        frames = replace(found.frames, shift=found.frames.shift + np.array([away, 0.0, 0.0]))
+        return without_strays(ROBOT, [stopped], frames)[1]
+
+    assert len(notes(far)) == 1 and notes(near) == [] == notes(far, 1.0)
 
 
 def test_a_dwell_elsewhere_to_which_the_platform_moved_stays(tmp_path: Path) -> None:

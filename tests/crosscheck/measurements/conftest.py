@@ -36,11 +36,14 @@ def robot(robots: dict[str, Robot]) -> Robot:
 
 @pytest.fixture
 def csv_file(tmp_path: Path):
-    """Write lines to ``measured.csv`` and give its path."""
+    """Write lines to ``measured.csv``, with a TOML beside it if there is one; give its path."""
 
-    def write(*lines: str, end: str = "\n") -> Path:
+    def write(*lines: str, end: str = "\n", toml: str = "") -> Path:
         path = tmp_path / "measured.csv"
         path.write_bytes((end.join(lines) + end).encode())
+        path.with_suffix(".toml").unlink(missing_ok=True)
+        if toml:
+            path.with_suffix(".toml").write_text(toml)
         return path
 
     return write

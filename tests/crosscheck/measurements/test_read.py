@@ -1,8 +1,10 @@
-"""Reading measurements: units, parts of a pose, and what is assumed."""
+"""Files of measurements are read: units, orders, clocks, loads, missing readings and marks."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,9 +12,11 @@ from measured_csv import CMD, POSE
 
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import commands_of, load_commands, load_measurements
+from seecr.columns.csv import Table
+from seecr.columns.known import know_columns
 from seecr.commands import Loads
 from seecr.errors import InputError, InputFileError
-from seecr.pose import quat_from_rxyz, quat_rotate, quat_to_matrix
+from seecr.pose import quat_from_rotvec, quat_from_rxyz, quat_multiply, quat_rotate, quat_to_matrix
 
 NO_TURN = "No commanded orientation: that of the reference pose is used."
 
@@ -195,31 +199,11 @@ def test_unnamed_column_is_unused(csv_file, robot):
     assert data.unused_columns == ("(column 1, without a name)", "(column 6, without a name)")
 
 
-@pytest.mark.parametrize(
-    ("name", "meant"),
-    [
-        ("meas_X_m", "meas_x_m"),
-        ("mes_z_m", "meas_z_m"),
-        ("Time_s", "t_s"),
-        ("TENSION_2_N", "tension_2_N"),
-    ],
-)
-def test_misspelt_columns_are_unused_with_a_suggestion(csv_file, robot, name, meant):
-    data = load_measurements(csv_file(f"run,{CMD},meas_y_m,{name}", "a,0,0,0,1,2"), robot)
-    assert data.unused_columns == (name,)
-    assert f"Column '{name}' is not used; did you mean {meant}?" in data.notes
-
-
 def test_other_peoples_columns_pass_without_a_suggestion(csv_file, robot):
     names = "operator,meas_y_std_m,run_number,t_motor"
     data = load_measurements(csv_file(f"run,{CMD},meas_y_m,{names}", "a,0,0,0,1,x,x,x,x"), robot)
     assert data.unused_columns == tuple(names.split(","))
     assert not any("did you mean" in note for note in data.notes)
-
-
-def test_time_may_start_again_in_the_next_run_and_rows_may_repeat(csv_file, robot):
-    path = csv_file(f"run,t_s,{CMD},meas_x_m", *["a,5,0,0,0,1"] * 2, "b,0,0,0,0,1")
-    assert load_measurements(path, robot).t_s.tolist() == [5, 5, 0]
 
 
 def test_rows_are_a_subset_with_the_same_masks(csv_file, robot):
@@ -239,6 +223,7 @@ def test_commands_need_no_readings(csv_file, robot):
     path = csv_file("run," + CMD, "a,0,0,0")
     data = load_commands(path, robot)
     assert not (data.has_position or data.has_orientation or data.has_tension)
+    assert not data.read.any() and data.notes == (NO_TURN,)
     with pytest.raises(InputFileError, match="line 1: no measurement; expected readings"):
         load_measurements(path, robot)
 
@@ -300,3 +285,182 @@ def test_cables_are_read_by_their_names_too(csv_file, robot):
     expected = "unknown unit 'kg'; expected tension_cable2_N or tension_cable2_kN"
     with pytest.raises(InputFileError, match=expected):
         load_measurements(bare, robot)
+
+
+RUN = f"run,{POSE}"
+M = 4
+
+
+def test_semicolons_with_decimal_commas_and_tabs_read_as_commas_do(csv_file, robot):
+    rows = [RUN, "a,0.5,-.25,1e-1,1.125", "a,1,2,3,"]
+    plain = load_measurements(csv_file(*rows), robot)
+    european = [row.replace(",", ";").replace(".", ",") for row in rows]
+    tabs = [row.replace(",", "\t") for row in rows]
+    for lines in (european, [row.replace(",", ";") for row in rows], tabs):
+        other = load_measurements(csv_file(*lines), robot)
+        assert np.array_equal(other.command_pose, plain.command_pose)
+        assert np.array_equal(other.position, plain.position, equal_nan=True)
+    commas = [row.replace(",", "\t").replace(".", ",") for row in rows]
+    assert np.array_equal(
+        load_measurements(csv_file(*commas), robot).command_pose, plain.command_pose
+    )
+
+
+def test_what_is_no_number_of_ours_says_nothing_of_decimal_commas(csv_file, robot):
+    """A run called 1.5, or a version in a column that nobody reads."""
+    rows = [f"{RUN};version".replace(",", ";"), "1.5;0,5;-,25;0,1;1,125;2.7"]
+    found = load_measurements(csv_file(*rows), robot)
+    np.testing.assert_allclose(found.command_pose[0, :3], [0.5, -0.25, 0.1])
+    assert found.run.tolist() == ["1.5"] and found.position[0, 0] == 1.125
+    with pytest.raises(InputFileError, match="decimal comma"):
+        load_measurements(csv_file(rows[0], "1.5;0,5;-.25;0,1;1,125;2.7"), robot)
+
+
+def test_units_of_every_kind(csv_file, robot):
+    header = "run,t_ms,cmd_x_cm,cmd_y_um,cmd_z_m,meas_x_cm,tension_1_kN,payload_g,payload_x_mm"
+    header += ",payload_y_m,payload_z_m,force_x_kN,moment_z_Nm"
+    data = load_measurements(csv_file(header, "a,1500,2,3000,0,2.5,0.02,250,4,0,0,0.001,7"), robot)
+    assert data.t_s == [1.5] and data.tensions[0, 0] == 20.0 and data.position[0, 0] == 0.025
+    assert data.command_pose is not None and data.loads is not None
+    assert data.command_pose[0, :3] == pytest.approx([0.02, 0.003, 0.0])
+    assert data.loads.mass == [0.25] and data.loads.centre.tolist() == [[0.004, 0.0, 0.0]]
+    assert data.loads.wrench.tolist() == [[1.0, 0, 0, 0, 0, 7.0]]
+
+
+def test_nan_is_a_reading_that_was_not_made(csv_file, robot):
+    header = f"run,{CMD},meas_x_m,meas_qw,meas_qx,meas_qy,meas_qz"
+    data = load_measurements(
+        csv_file(header, "a,0,0,0,nan,1,0,0,0", "a,0,0,1,2,NaN,nan,,NaN"), robot
+    )
+    assert np.isnan(data.position[0, 0]) and data.position[1, 0] == 2.0
+    assert data.quat_wxyz is not None and np.isnan(data.quat_wxyz[1]).all()
+    with pytest.raises(InputFileError, match=r"column cmd_x_m: .*in every row, got 'nan'"):
+        load_measurements(csv_file(RUN, "a,nan,0,0,0"), robot)
+
+
+def test_the_toml_says_what_lengths_mean_where_runs_start_and_noise_with_its_unit(csv_file, robot):
+    header = ",".join(f"length_{i}_m" for i in range(1, M + 1)) + ",meas_x_m"
+    toml = """lengths = "told"
+start = "first_row"
+comment = "mine"
+[sigma]
+position_m = "0.1mm"
+orientation_rad = "0.02 deg"
+length_m = 1e-4
+[operator]
+name = "x"
+"""
+    data = load_measurements(csv_file(header, "1,1,1,1,0", toml=toml), robot)
+    assert data.told and not data.absolute and data.stands.tolist() == [True]
+    stated = Sigma(0.1 / 1000, data.sigma.orientation_rad, None, 1e-4)
+    assert data.sigma == stated and stated.orientation_rad == pytest.approx(np.deg2rad(0.02))
+    plain = load_measurements(csv_file(header, "1,1,1,1,0"), robot)
+    assert plain.absolute and not plain.stands.any()
+    poses = load_measurements(csv_file(RUN, "a,0,0,0,0", toml='lengths = "told"'), robot)
+    assert not poses.told and 'lengths = "told" has no effect here' in " ".join(poses.notes)
+
+
+def test_payloads_without_a_centre_hang_at_the_platforms_own(csv_file, robot):
+    rows = ["a,0,0,0,0,0.5,,,", "a,0,0,1,0,0.5,0.1,0.2,0.3"]
+    data = load_measurements(
+        csv_file(f"{RUN},payload_kg,payload_x_m,payload_y_m,payload_z_m", *rows), robot
+    )
+    assert data.loads is not None
+    assert np.isnan(data.loads.centre[0]).all() and data.loads.centre[1].tolist() == [0.1, 0.2, 0.3]
+    bare = load_measurements(csv_file(f"{RUN},payload_kg", "a,0,0,0,0,0.5"), robot)
+    assert bare.loads is not None and np.isnan(bare.loads.centre).all()
+
+
+def test_a_name_is_guessed_by_its_spelling_alone(csv_file, robot):
+    names = "meas_roll_deg,meas_pitch_deg,tension_A_N,mes_y_m,operator"
+    data = load_measurements(csv_file(f"{RUN},{names}", "a,0,0,0,0,1,2,3,4,x"), robot)
+    notes = " ".join(data.notes)
+    assert "Column 'mes_y_m' is not used; did you mean meas_y_m?" in notes
+    assert notes.count("did you mean") == 1
+    assert (
+        "Columns meas_roll_deg meas_pitch_deg are not used, because roll, pitch and yaw have "
+        "several conventions: here a rotation is meas_rx_deg meas_ry_deg meas_rz_deg with "
+        "R = Rx(rx) Ry(ry) Rz(rz), or the quaternion meas_qw meas_qx meas_qy meas_qz." in notes
+    )
+    assert "Column tension_A_N is not used: the robot's cables are 1 (cable1), " in notes
+    assert "Not used: operator." in notes
+    with pytest.raises(InputFileError, match=r"no measurement; .*R = Rx\(rx\) Ry\(ry\) Rz\(rz\)"):
+        load_measurements(csv_file(f"{CMD},meas_yaw_deg", "0,0,0,1"), robot)
+
+
+def test_rows_given_twice_are_said(csv_file, robot):
+    rows = ["a,0,0,0,1.5", "a,0,0,1,1.5", "b,0,0,0,1.5", "b,0,0,1,"]
+    notes = load_measurements(csv_file(RUN, *rows, "c,0,0,1,"), robot).notes
+    assert [note for note in notes if "twice" in note] == [
+        "Identical rows: line 4 as 2; they count twice, so remove one of each pair if it was "
+        "measured only once."
+    ]
+
+
+def test_millimetres_in_a_metre_column(csv_file, robot):
+    with pytest.raises(
+        InputFileError,
+        match=r"line 3, column cmd_y_m: far outside the robot: expected numbers of the size of its "
+        r"frame, .* m across, got 500 m; are these really m\? Name .* cmd_y_mm",
+    ):
+        load_measurements(csv_file(RUN, "a,0,0,0,0", "a,0,500,0,0"), robot)
+    size = float(np.ptp(robot.exit_points, axis=0).max())
+    notes = load_measurements(csv_file(RUN, f"a,{5 * size},0,0,0"), robot).notes
+    assert any("Line 2: a command" in note and "check its unit" in note for note in notes)
+
+
+def quaternions(prefix: str, quat: np.ndarray) -> list[str]:
+    header = ",".join(f"{prefix}_q{c}" for c in "wxyz")
+    return [header, *(",".join(f"{v:.12g}" for v in row) for row in quat)]
+
+
+def test_a_quaternion_in_another_order(csv_file, robot):
+    turn = quat_from_rotvec(np.random.default_rng(0).uniform(-0.2, 0.2, (5, 3)))
+    right = quat_multiply(turn, np.tile(robot.reference_pose[3:], (5, 1)))
+    for order, wrong in ((right, False), (np.roll(right, -1, axis=1), True)):
+        lines = [
+            f"{head},{quat}"
+            for head, quat in zip(
+                [RUN, *(f"a,0,0,{0.1 * k},0" for k in range(5))], quaternions("cmd", order),
+                strict=True,
+            )
+        ]  # fmt: skip
+        if wrong:
+            with pytest.raises(InputFileError, match="column cmd_qw: every command turns the plat"):
+                load_measurements(csv_file(*lines), robot)
+        else:
+            load_measurements(csv_file(*lines), robot)
+        read = [line.replace("cmd_q", "meas_q") for line in lines]
+        notes = " ".join(load_measurements(csv_file(*read), robot).notes)
+        assert ("are meas_qw meas_qx meas_qy meas_qz in the right order?" in notes) == wrong
+
+
+REFERENCE = (Path(__file__).resolve().parents[3] / "docs" / "formats.md").read_text(
+    encoding="utf-8"
+)
+
+
+def block(language: str) -> str:
+    return REFERENCE.partition(f"```{language}\n")[2].partition("```")[0]
+
+
+def test_the_reference_s_examples_are_read(csv_file, robot):
+    data = load_measurements(csv_file(block("text"), toml=block("toml")), robot)
+    assert data.read.tolist() == [True, False, True] and data.stands.all()
+    assert data.sigma.position_m == pytest.approx(3e-5) and data.sigma.length_m == 1e-4
+    assert data.loads is not None and data.loads.mass.tolist() == [0.0, 0.0, 0.2]
+    assert data.unused_columns == () and data.angle_mask.all()
+
+
+def test_the_reference_s_columns_and_units_are_known():
+    rows = [row.split("|") for row in REFERENCE.splitlines() if row.startswith("| `")]
+    assert len(rows) == 14
+    for _, columns, _, units, _ in rows:
+        names = [name for name in re.findall(r"`([^`]+)`", columns) for name in name.split()]
+        table = Table(Path("a.csv"), tuple(names), np.array([2]), 1, [["1"]] * len(names))
+        if not {"cmd_qw", "cmd_rx_deg", "meas_qw", "want_qw", "length_1_m"} & set(names):
+            assert know_columns(table, M).unused == ()
+        for unit in re.findall(r"_(\w+)", units):
+            quantity = names[0].rpartition("_")[0]
+            column = Table(Path("a.csv"), (f"{quantity}_{unit}",), np.array([2]), 1, [["1"]])
+            assert know_columns(column, M).known[quantity].unit.suffix == unit

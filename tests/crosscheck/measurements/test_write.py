@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,41 @@ import pytest
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import load_measurements
 from crosscheck.measurements.write import write_measurements
+from seecr.commands import Loads
 from seecr.errors import InputFileError, MissingPackageError
+
+PLAIN = Measurements(
+    path=Path("a.csv"),
+    n_cables=3,
+    run=np.array(["a", "b"]),
+    command_lengths=np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]),
+    position=np.array([[0.1, np.nan, np.nan], [np.nan] * 3]),
+    tensions=np.array([[np.nan, 7.0, np.nan], [np.nan, 8.0, np.nan]]),
+)
+
+
+def columns(**changes: object) -> dict[str, list]:
+    return dict(replace(PLAIN, **changes).columns())  # type: ignore[arg-type]
+
+
+def test_only_what_somebody_read_has_a_column_and_gaps_are_none() -> None:
+    assert columns() == {
+        "run": ["a", "b"],
+        **{f"length_{i}_m": [float(i), 3.0 + i] for i in (1, 2, 3)},
+        "meas_x_m": [0.1, None],
+        "tension_2_N": [7.0, 8.0],
+    }
+
+
+def test_a_centre_of_no_payload_and_forces_of_zero_are_nothing() -> None:
+    centre, wrench = np.array([0.1, 0.2, 0.3]), np.zeros((2, 6))
+    wrench[1, 4] = 2.0
+    there = columns(loads=Loads.of(2, centre=centre, wrench=wrench))
+    assert {key: there[key] for key in there if key not in columns()} == {"moment_y_Nm": [0.0, 2.0]}
+    hung = columns(loads=Loads.of(2, mass=np.array([0.0, 1.0]), centre=centre))
+    assert hung["payload_kg"] == [0.0, 1.0] and hung["payload_z_m"] == [0.3, 0.3]
+    own = columns(loads=Loads.of(2, mass=np.array(1.0)))
+    assert "payload_kg" in own and "payload_x_m" not in own
 
 
 def everything(path: Path) -> Measurements:
@@ -22,6 +57,11 @@ def everything(path: Path) -> Measurements:
     tensions[:, 1] = rng.uniform(0, 9, 6)
     position = rng.normal(size=(6, 3))
     position[2] = np.nan
+    loads = Loads(
+        np.repeat([0.5, 0.25, 0.0], 2), np.where(position > 0.0, [[0.1, 0.2, 0.3]], 0.4),
+        np.outer(np.arange(6.0), [1, 0, 2, 0, 0, 3]),
+    )  # fmt: skip
+    loads.centre[1] = np.nan
     wanted = np.concatenate([position + 0.01, np.tile([0.0, 0.6, 0.8, 0.0], (6, 1))], axis=1)
     return Measurements(
         path=path,
@@ -34,6 +74,9 @@ def everything(path: Path) -> Measurements:
         quat_wxyz=quat / np.linalg.norm(quat, axis=1, keepdims=True),
         tensions=tensions,
         temperature_C=np.linspace(-5, 25, 6),
+        told=True,
+        loads=loads,
+        stands=np.ones(6, dtype=bool),
         sigma=Sigma(position_m=3e-5, length_m=0.1 + 0.2),
         sigma_source="dwell_scatter",
     )
@@ -46,7 +89,9 @@ def test_round_trip_through_a_file(tmp_path, robot):
     compared = ("t_s", "command_lengths", "wanted", "position", "quat_wxyz", "tensions")
     for name in (*compared, "temperature_C"):
         np.testing.assert_allclose(getattr(back, name), getattr(made, name), rtol=1e-8, atol=1e-9)
-    assert back.run.tolist() == made.run.tolist()
+    for name in ("mass", "centre", "wrench"):
+        np.testing.assert_allclose(getattr(back.loads, name), getattr(made.loads, name))
+    assert back.run.tolist() == made.run.tolist() and back.told and back.stands.all()
     assert back.sigma == made.sigma and back.sigma_source == "dwell_scatter"
     assert back.tension_mask.tolist() == [False, True, False, False]
     assert back.command_pose is None and back.line.tolist() == [2, 3, 4, 5, 6, 7]

@@ -1,17 +1,27 @@
-"""The words of a plan: what an effect is confused with, and what a measurement would gain."""
+"""What callers give to planning, the words of a plan, and which files of an older one go."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+import crosscheck
 from crosscheck.fit.reasons import Reason, Why
-from crosscheck.planning.proposer import Gain
+from crosscheck.measurements.data import Sigma
+from crosscheck.planning.design import box_given, limits_given
+from crosscheck.planning.planned import Adding, kinds_of
+from crosscheck.planning.proposer import Gain, Suggestion
 from crosscheck.planning.result import Sight, Visible, alike, gain_words, signal_words
 from crosscheck.planning.visibility import Signal
+from crosscheck.planning.write import slack_remark, sometimes_written
 from seecr.effects import layout_of
+from seecr.errors import InputError
 
 DRUMS = layout_of("drum_eccentricity", "demobot_cogiro")
 SIGNAL = Signal(DRUMS, {}, np.ones((4, len(DRUMS))) * ~DRUMS.shape)
@@ -96,3 +106,76 @@ def test_what_has_more_parameters_than_rows_is_not_called_invisible() -> None:
     assert said.startswith("In these data 1 of 3 effects")
     assert unseen == "Not visible: tension_scale (needs measured tensions)."
     assert rest.endswith("rest on plausible sizes: anchor_point_error.")
+
+
+ROBOT = "planar_vertical"
+NONE = np.zeros((0, 7))
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: box_given([[1, 2], [3, 4]]), r"box must be \(2, 3\) \[m\], .* got \(2, 2\)"),
+        (lambda: box_given([[0, 2, 0], [1, 1, 1]]), "lowest position first, got y from 2 to 1 m"),
+        (lambda: limits_given(5), "limits must be two numbers, .* got 5"),
+        (lambda: limits_given((5, 1)), "0 <= lowest <= highest .* got 5 and 1"),
+        (lambda: limits_given((np.nan, 1)), "0 <= lowest <= highest .* got nan and 1"),
+        (lambda: limits_given((np.inf, np.inf)), "lowest finite, got inf and inf"),
+        (lambda: crosscheck.choose_poses(ROBOT, 6, box=[[1, 2], [3, 4]]), "box must be"),
+        (lambda: crosscheck.choose_poses(ROBOT, 6, limits=5), "limits must be"),
+        (lambda: crosscheck.make_plan(ROBOT, NONE), "there are no commands; expected one or more"),
+        (lambda: crosscheck.make_plan(ROBOT, NONE, limits=5), "limits must be"),
+        (lambda: crosscheck.make_plan(ROBOT, NONE, box=[1, 2]), "box must be"),
+        (lambda: crosscheck.make_twin(ROBOT, 1, poses=NONE), "there are no commands"),
+        (lambda: crosscheck.run_suite("planar-*", jobs=0), "jobs: .* from 1 on, got 0"),
+    ],
+)
+def test_what_cannot_be_planned_with_is_told_in_one_line(
+    call: Callable[[], Any], words: str
+) -> None:
+    with pytest.raises(InputError, match=words) as told:
+        call()
+    assert "\n" not in str(told.value)
+
+
+def test_boxes_and_limits_are_taken_as_they_are() -> None:
+    box = [[0.0, 0.0, 0.0], [1.0, 0.0, 2.0]]
+    found = box_given(box)
+    assert found is not None and found.tolist() == box and box_given(None) is None
+    assert limits_given((0.0, np.inf)) == (0.0, np.inf)
+
+
+def test_one_kind_of_reading_stands_for_itself() -> None:
+    assert kinds_of("position", Sigma()) == kinds_of(["position"], Sigma()) == ("position",)
+    with pytest.raises(crosscheck.CrosscheckError, match=r"^reads: expected some of .* 'colour'"):
+        crosscheck.make_plan(ROBOT, np.array([0.5, 0, 0.5, 1, 0, 0, 0]), reads="colour")
+
+
+OWN = {"poses.csv", "poses.toml"}
+
+
+def test_files_of_every_addition_may_be_stale(tmp_path: Path) -> None:
+    added = {f"add-{kind.value}.{end}" for kind in Adding for end in ("csv", "toml")}
+    assert set(sometimes_written(tmp_path, None)) == added
+
+
+def test_poses_are_removed_only_if_the_older_plan_wrote_them(tmp_path: Path) -> None:
+    poses, plan = tmp_path / "poses.csv", tmp_path / "plan.json"
+    plan.write_text(json.dumps({"files": ["poses.csv"]}))
+    assert set(sometimes_written(tmp_path, tmp_path / "mine.csv")) > OWN
+    assert not OWN & set(sometimes_written(tmp_path, tmp_path / ".." / tmp_path.name / poses.name))
+    plan.write_text(json.dumps({"files": ["add-payload.csv"]}))
+    assert not OWN & set(sometimes_written(tmp_path, None))
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"files": 3}'])
+def test_a_file_that_is_no_plan_says_nothing(tmp_path: Path, text: str) -> None:
+    (tmp_path / "plan.json").write_text(text)
+    assert not OWN & set(sometimes_written(tmp_path, None))
+
+
+def test_lines_that_leave_cables_slack_are_remarked_in_the_file_itself() -> None:
+    """Below the remark and the header, lines count from 3."""
+    item = Suggestion(Adding.POSES, "", (), slack=((), ("a", "b"), (), ("c",)))
+    assert slack_remark(item) == "cables are slack at line 4 (a b), line 6 (c)"
+    assert slack_remark(Suggestion(Adding.POSES, "", (), slack=((), ()))) == ""

@@ -1,4 +1,4 @@
-"""Columns of tensions or lengths that were exchanged are named, and only where that is certain."""
+"""Columns that were exchanged and tensions in other units are named, only where that is certain."""
 
 from __future__ import annotations
 
@@ -14,13 +14,7 @@ from made_data import measured, soft_cogiro, term
 import crosscheck
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import load_measurements, together
-from crosscheck.preparation.exchanged import (
-    Pulls,
-    exchanged,
-    exchanged_lengths,
-    misfits,
-    unbalanced,
-)
+from crosscheck.preparation.exchanged import Pulls, exchanged_lengths
 from crosscheck.preparation.prepare import prepare
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
@@ -146,6 +140,14 @@ def test_a_cable_that_was_not_read_hides_what_is_held() -> None:
     assert told(replace(data, tensions=some, tension_mask=np.isfinite(some).any(axis=0))) == []
 
 
+def test_what_is_less_than_the_noise_names_nothing() -> None:
+    """The better order is so by luck: noise may leave as much unbalanced."""
+    data = pulled(read_of(), order(2, 5))
+    assert told(replace(data, sigma=replace(SIGMA, tension_N=3.0))) == []
+    lengths = paid_out(by_lengths(), order(2, 5))
+    assert told(replace(lengths, sigma=replace(SIGMA, position_m=1.0))) == []
+
+
 def test_a_few_rows_are_no_evidence() -> None:
     data = pulled(read_of(), order(2, 5))
     assert len(told(data.rows(np.arange(8)))) == 1
@@ -167,6 +169,9 @@ def test_of_two_files_the_one_is_named() -> None:
     other = replace(pulled(read_of(), order(2, 5)), path=Path("tuesday.csv"))
     (said,) = told(together([one, other]))
     assert said.startswith("tuesday.csv: The columns tension_2 and tension_5 seem exchanged")
+    other = replace(in_unit(read_of(), 9.80665), path=Path("tuesday.csv"))
+    (said,) = said_of(together([one, other]))
+    assert said.startswith("tuesday.csv: The measured tensions carry 0.10")
 
 
 @pytest.mark.parametrize("kind", [False, True], ids=["absolute", "told"])
@@ -177,6 +182,13 @@ def test_exchanged_lengths_are_named(pair: Sequence[int], kind: bool) -> None:
     (said,) = told(paid_out(data, order(*pair)))
     assert said.startswith(f"The columns length_{pair[0]} and length_{pair[1]} seem exchanged: ")
     assert "mm from the straight lengths at the measured poses" in said
+
+
+def test_constant_offsets_of_lengths_hide_no_exchange() -> None:
+    data = paid_out(by_lengths(), order(2, 5))
+    shifted = data.command_lengths + np.linspace(-0.5, 0.5, 8)
+    (said,) = told(replace(data, command_lengths=shifted))
+    assert "length_2 and length_5 seem exchanged" in said
 
 
 def test_lengths_are_told_from_positions_alone() -> None:
@@ -201,6 +213,9 @@ def test_a_comparison_tells_and_changes_nothing() -> None:
     found = crosscheck.compare(COGIRO, data)
     assert sum("seem exchanged" in note for note in found.notes) == 1
     np.testing.assert_array_equal(found.problem.data.tensions, data.tensions)
+    found = crosscheck.compare(COGIRO, in_unit(read_of(), 9.80665))
+    assert sum(SAID in note for note in found.notes) == 1
+    assert found.rms["tension_rms_N"] > 0.5
 
 
 def test_neither_trial_data_nor_real_robots_are_doubted(shared_data: Path) -> None:
@@ -221,11 +236,13 @@ def test_lengths_of_a_real_robot(shared_data: Path, pair: Sequence[int]) -> None
     assert f"length_{pair[0]} and length_{pair[1]} seem exchanged" in said
 
 
-def test_misfits_leave_out_constants_and_are_no_less_than_noise() -> None:
-    rows = np.arange(10.0)[:, None]
-    read = np.concatenate([rows + 5.0, -rows], axis=1)
-    apart = misfits(read, np.concatenate([rows, -rows], axis=1), 0.1)
-    assert apart[0, 0] == apart[1, 1] == 0.1 and apart[0, 1] > 5.0
+def test_where_every_length_fits_another_cable_an_axis_may_be_reversed_instead() -> None:
+    robot = load_robot("planar_two_cable")
+    data = measured(robot, [], points=4, sigma=SIGMA)
+    assert data.command_pose is not None
+    lengths = robot.commanded_lengths(data.command_pose)
+    mine = replace(data, command_pose=None, command_lengths=lengths[:, ::-1], told=True)
+    assert told(mine, robot) == []
 
 
 def exchanges(apart: Array) -> dict[int, int]:
@@ -252,73 +269,6 @@ def test_only_one_order_that_fits_far_better_is_named() -> None:
     assert exchanges(three) == {0: 1, 1: 2, 2: 0}
 
 
-def test_three_are_named_though_two_pairs_explain_a_part_alike() -> None:
-    """Cables that nearly stand in for each other: either pair leaves 15, and the three leave 1."""
-    apart = np.full((5, 5), 90.0) - 89.0 * np.eye(5)
-    apart[:3, :3] = [[90.0, 1.0, 15.0], [15.0, 90.0, 1.0], [1.0, 15.0, 15.0]]
-    assert exchanges(apart) == {0: 1, 1: 2, 2: 0}
-
-
-def test_where_every_length_fits_another_cable_an_axis_may_be_reversed_instead() -> None:
-    robot = load_robot("planar_two_cable")
-    data = measured(robot, [], points=4, sigma=SIGMA)
-    assert data.command_pose is not None
-    lengths = robot.commanded_lengths(data.command_pose)
-    mine = replace(data, command_pose=None, command_lengths=lengths[:, ::-1], told=True)
-    apart = misfits(lengths[:, ::-1], robot.nominal_lengths(data.command_pose), 1e-4)
-    assert exchanges(apart) == {0: 1, 1: 0}
-    assert not any("seem exchanged" in note for note in told(mine, robot))
-
-
-ROWS = np.ones(20, bool)
-
-
-def pulls_of(measured: Array, expected: Array, along: Sequence[int] = (0, 1, 2)) -> Pulls:
-    """Cables that pull in a plane, in other directions in each row; tensions (n, m).
-
-    Args:
-        along: number of each cable's direction: those with the same are parallel.
-    """
-    n = len(measured)
-    turned = np.random.default_rng(0).normal(size=(n, 3))
-    angle = (turned + np.array([0.0, 2.0, 4.0]))[:, along]
-    matrix = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return Pulls(matrix, measured, expected, ROWS, free=False)
-
-
-def reordered(pulls: Pulls, noise: float = 0.01) -> dict[int, int]:
-    return exchanged(unbalanced(pulls, ROWS, noise), pulls.measured.shape[1], len(ROWS))
-
-
-def tensions(*each: float) -> Array:
-    """Of 20 rows, each cable's within a hundredth of a newton of one number."""
-    return np.array(each) + 0.01 * np.random.default_rng(1).normal(size=(20, len(each)))
-
-
-def test_the_order_that_balances_alone_is_found() -> None:
-    true = tensions(2.0, 5.0, 9.0)
-    pulls = pulls_of(true[:, [2, 1, 0]], true)
-    assert reordered(pulls) == {0: 2, 2: 0}
-    here, there = unbalanced(pulls, ROWS, 0.01)(np.array([[0, 1, 2], [2, 1, 0]]))
-    assert there == pytest.approx(0.01 * np.sqrt(3.0), rel=0.3) and here > 4.0
-
-
-def test_of_two_orders_that_balance_alike_neither_is() -> None:
-    """Two pairs of parallel cables, two of them with the same tension: either was exchanged."""
-    true, pairs = tensions(5.0, 2.0, 9.0, 5.0), (0, 0, 1, 1)
-    assert reordered(pulls_of(true[:, [2, 1, 0, 3]], true, along=pairs)) == {}
-    other = tensions(5.0, 2.0, 9.0, 7.0)
-    assert reordered(pulls_of(other[:, [2, 1, 0, 3]], other, along=pairs)) == {0: 2, 2: 0}
-
-
-def test_what_is_less_than_the_noise_names_nothing() -> None:
-    """The better order is so by luck: in the file's, as little is unbalanced as noise may leave."""
-    true = tensions(2.0, 5.0, 9.0)
-    wrong = pulls_of(true[:, [2, 1, 0]], true)
-    assert reordered(wrong, 1.0) == {0: 2, 2: 0}
-    assert reordered(wrong, 3.0) == {}
-
-
 def test_where_cables_pull_against_each_other_their_resultant_says_nothing() -> None:
     """Two rows: a load of a tenth of the tensions, and one of a hundredth."""
     pulls = Pulls(
@@ -330,3 +280,88 @@ def test_where_cables_pull_against_each_other_their_resultant_says_nothing() -> 
     )
     carried = pulls.carried()
     assert carried[0] == pytest.approx(2.0) and np.isnan(carried[1])
+
+
+FACTORS = {"kgf": 9.80665, "lbf": 4.44822, "grams (gf)": 9.80665e-3}
+SAID = "times the load that the model puts on the cables"
+
+
+def said_of(data: Measurements, robot: Robot = COGIRO) -> list[str]:
+    return [note for note in prepare(robot, data, Terms()).notes if "ension" in note]
+
+
+def in_unit(data: Measurements, newtons: float) -> Measurements:
+    return replace(data, tensions=data.tensions / newtons)
+
+
+@pytest.mark.parametrize("lacking", LACKING)
+@pytest.mark.parametrize("unit", FACTORS)
+def test_the_unit_is_named_whatever_the_model_lacks(unit: str, lacking: str) -> None:
+    (said,) = said_of(in_unit(read_of(lacking), FACTORS[unit]))
+    assert SAID in said and f"are they in {unit}, or" in said
+    assert f"of {FACTORS[unit]:.6g} N each" in said
+
+
+def test_a_row_that_is_far_off_hides_no_unit() -> None:
+    data = in_unit(read_of(), 9.80665)
+    data.tensions[2] *= 5.0
+    (said,) = said_of(data)
+    assert "are they in kgf, or" in said
+
+
+@pytest.mark.parametrize("lacking", LACKING)
+def test_newtons_are_let_alone(lacking: str) -> None:
+    assert said_of(read_of(lacking)) == []
+
+
+@pytest.mark.parametrize("factor", [0.6, 0.35, 0.16, 0.06, 2.0, 5.0])
+def test_what_is_no_unit_is_not_called_one(factor: float) -> None:
+    assert said_of(in_unit(read_of(), 1.0 / factor)) == []
+
+
+@pytest.mark.parametrize(("factor", "said"), [(30.0, True), (0.03, True), (8.0, False)])
+def test_another_order_is_said_without_a_unit(factor: float, said: bool) -> None:
+    notes = said_of(in_unit(read_of(), 1.0 / factor))
+    assert len(notes) == said and all("is it another unit, the file of" in one for one in notes)
+
+
+def test_slack_cables_count_for_nothing() -> None:
+    """On fishing line most of the cables of this robot are slack somewhere."""
+    robot = load_robot("demobot_parallel")
+    data = measured(robot, points=3, sigma=SIGMA, tensions=True)
+    assert (data.tensions < 0.1).mean() > 0.1
+    assert said_of(data, robot) == []
+    (said,) = said_of(in_unit(data, 9.80665), robot)
+    assert "are they in kgf" in said
+
+
+def test_pretension_that_is_gone_is_no_unit() -> None:
+    """Cables that only carry the load, where the model strains them four times as much."""
+    robot = load_robot("ipanema")
+    data = measured(robot, points=2, sigma=SIGMA, tensions=True)
+    looser = replace(robot, rest_lengths=robot.rest_lengths * 1.004)
+    left = measured(looser, points=2, sigma=SIGMA, tensions=True)
+    part = float(np.median(left.tensions.sum(axis=1) / data.tensions.sum(axis=1)))
+    assert part < 0.3  # as if in lbf
+    assert not any(SAID in one for one in said_of(left, robot))
+    (said,) = said_of(in_unit(left, 9.80665), robot)
+    assert "are they in kgf" in said
+
+
+def test_where_a_cable_was_not_read_nothing_is_known_of_the_load() -> None:
+    data = read_of()
+    some = data.tensions.copy()
+    some[:, 3] = np.nan
+    partly = replace(data, tensions=some, tension_mask=np.isfinite(some).any(axis=0))
+    assert not any(SAID in one for one in said_of(in_unit(partly, 9.80665)))
+
+
+def test_without_pretension_any_cable_tells() -> None:
+    robot = load_robot("planar_two_cable")
+    data = measured(robot, points=3, sigma=SIGMA, tensions=True)
+    some = data.tensions.copy()
+    some[:, 1] = np.nan
+    partly = replace(data, tensions=some, tension_mask=np.isfinite(some).any(axis=0))
+    assert not any(SAID in one for one in said_of(partly, robot))
+    (said,) = said_of(in_unit(partly, 4.44822), robot)
+    assert "are they in lbf" in said

@@ -1,22 +1,27 @@
-"""A tracker that was aligned to the commands stays free in every fit of its data."""
+"""What data leave free is fitted first: trackers aligned to the commands, values for new files."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
-from made_data import measured, soft_cogiro, term
+from made_data import COGIRO, SIGMA, measured, soft_cogiro, term
 from made_diagnoses import SLOW
 
 import crosscheck
-from crosscheck.measurements.data import Sigma
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import known_left, known_readings
+from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import together
 from crosscheck.measurements.write import write_measurements
+from crosscheck.preparation.freed import Freed, LaidOut, freed, groups_of, laid_out
 from crosscheck.preparation.prepare import prepare
-from seecr.effects import Terms
-from seecr.errors import InputFileError
+from seecr.description.mjcf import load_robot
+from seecr.effects import ApartLayout, Own, Term, Terms, Values, apart, effect_named, layout_of
+from seecr.pose import Array
 from seecr.prediction.experiment import Experiment
 
 ROBOT = soft_cogiro()
@@ -102,15 +107,6 @@ def test_files_say_it_and_of_several_only_those_that_do(tmp_path):
     assert both.free_in == {"tracker_frame": (0,)}
 
 
-@pytest.mark.parametrize("said", ['["stiffness"]', '"tracker_frame"', "[1]"])
-def test_only_sensors_can_be_free(tmp_path, said):
-    write_measurements(tmp_path / "a.csv", measured(ROBOT, points=2))
-    (tmp_path / "a.toml").write_text(f"free = {said}\n")
-    expected = "a.toml: line 1: free must be a list of some of tracker_frame"
-    with pytest.raises(InputFileError, match=expected):
-        crosscheck.load_measurements(tmp_path / "a.csv", ROBOT)
-
-
 def test_noise_of_lengths_is_read_through_the_tracker():
     """Where the tracker stands turned, so does what noisy lengths do to the pose."""
     sigma = Sigma(position_m=2e-5, orientation_rad=3e-4, length_m=2e-4)
@@ -127,3 +123,190 @@ def test_noise_of_lengths_is_read_through_the_tracker():
     )
     state = crosscheck.compare(ROBOT, data, [frame]).state
     assert state.chi2 / len(state.white) == pytest.approx(0.9, abs=0.25)  # 2.2 unturned
+
+
+STIFF = load_robot(COGIRO)
+SCALE = layout_of(effect_named("tracker_scale"), STIFF)
+FAR_FRAME = {"shift_x_m": 1.5, "shift_z_m": -0.4, "rotation_x_rad": 0.3, "rotation_z_rad": 2.0}
+
+
+@lru_cache
+def data_of(factor: float = 1.004) -> Measurements:
+    return measured(STIFF, [term(STIFF, "tracker_scale", factor=factor)], points=2)
+
+
+def problem_of(data: Measurements) -> Problem:
+    return Problem(STIFF, data, SIGMA, np.ones(data.n_rows, dtype=bool))
+
+
+def found_in(data: Measurements, *terms: Term, fresh: tuple[tuple[str, str], ...] = ()) -> Freed:
+    return freed(problem_of(data), LaidOut(Terms(terms), fresh, ()))
+
+
+def positions(data: Measurements) -> Array:
+    """(n, 3) as the plain robot has them."""
+    return problem_of(data).experiment.predict(()).readings.position
+
+
+def slope(told: Array, read: Array) -> float:
+    """Of the line through the origin with the least squares."""
+    return float(np.sum(told * read) / np.sum(told**2))
+
+
+def near(told: Array) -> float:
+    """A tenth of the slope's standard error: a fit ends where it gains no more than that."""
+    return 0.1 * SIGMA.position_m / float(np.linalg.norm(told))
+
+
+def test_nothing_is_fitted_if_nothing_is_free() -> None:
+    held = term(STIFF, "tracker_scale", factor=1.002)
+    found = found_in(data_of(), held)
+    assert found.terms["tracker_scale"].vector.tolist() == [1.002]
+    assert found.free.tolist() == [False] and found.notes == ()
+
+
+def test_without_readings_nothing_is_fitted() -> None:
+    data = replace(data_of(), free=("tracker_scale",))
+    nothing = Problem(STIFF, data, SIGMA, np.zeros(data.n_rows, dtype=bool))
+    found = freed(nothing, LaidOut(Terms(), (), ()))
+    assert found.terms.names == () and found.free.tolist() == []
+
+
+def test_a_free_effect_that_the_model_lacks_is_fitted_by_least_squares() -> None:
+    data = replace(data_of(), free=("tracker_scale",))
+    found = found_in(data, term(STIFF, "pulley_radius"))
+    assert found.terms.names == ("pulley_radius", "tracker_scale")
+    assert found.free.tolist() == [False, True]
+    assert found.terms["pulley_radius"].vector.tolist() == [0.0]
+    told = positions(data)
+    expected = slope(told, data.position)
+    assert expected == pytest.approx(1.004, abs=50.0 * near(told))
+    assert found.terms["tracker_scale"].vector == pytest.approx(expected, abs=near(told))
+
+
+def test_a_free_effect_of_the_model_is_fitted_from_where_it_stands_and_a_fixed_one_stays() -> None:
+    data = replace(data_of(), free=("tracker_scale",))
+    told = positions(data)
+    expected = slope(told, data.position)
+    start = term(STIFF, "tracker_scale", factor=0.99)
+    found = found_in(data, start)
+    assert found.terms["tracker_scale"].vector == pytest.approx(expected, abs=near(told))
+    fixed = found_in(data, start.fixed())
+    assert fixed.terms["tracker_scale"].vector.tolist() == [0.99]
+    assert fixed.free.tolist() == [False]
+    assert fixed.notes == (
+        "tracker_scale is free, as stated in the TOML beside measured.csv, and was fitted to these "
+        "data first: factor 0.99 (fixed)",
+    )
+
+
+def test_errors_that_are_told_are_those_of_what_the_model_leaves() -> None:
+    """They go with the rms of the positions' residuals: of noise, and of what is no noise."""
+    data = replace(data_of(), free=("tracker_scale",))
+    told = positions(data)
+    off = np.zeros_like(told)
+    off[:, 0] = np.where(np.arange(len(told)) % 2, 1e-2, -1e-2)
+    off -= slope(told, off) * told  # so that it changes no slope
+
+    def error(data: Measurements) -> float:
+        (note,) = found_in(data).notes
+        return float(note.rpartition("± ")[2])
+
+    def expected(data: Measurements) -> float:
+        left = data.position - slope(told, data.position) * told
+        return float(np.linalg.norm(left) / np.sqrt(left.size - 1) / np.linalg.norm(told))
+
+    assert error(data) == pytest.approx(expected(data), rel=0.05)  # two digits are told
+    assert expected(data) == pytest.approx(SIGMA.position_m / np.linalg.norm(told), rel=0.2)
+    far = replace(data, position=data.position + off)
+    assert expected(far) > 100.0 * expected(data)
+    assert error(far) == pytest.approx(expected(far), rel=0.05)
+
+
+def test_only_runs_that_the_model_has_not_seen_are_fitted() -> None:
+    data = data_of()
+    half = data.n_rows // 2
+    data = replace(data, run=np.repeat(["seen", "new"], [half, data.n_rows - half]))
+    seen, new = (str(data.parts["run"][k]) for k in (0, -1))
+    layout = apart(SCALE, "run", (seen, new), SCALE.null)
+    model = Terms([Term(layout, np.array([1.0, 1.0]))])
+    found = freed(problem_of(data), LaidOut(model, (("tracker_scale", new),), ()))
+    assert found.free.tolist() == [False, True]
+    told = positions(data)[half:]
+    seen_before, fresh = found.terms["tracker_scale"].vector
+    assert seen_before == 1.0
+    assert fresh == pytest.approx(slope(told, data.position[half:]), abs=near(told))
+    (note,) = found.notes
+    assert note.startswith("tracker_scale was fitted to these data first: ")
+    assert "seen" not in note
+
+
+def test_of_several_files_each_that_says_so_has_its_own() -> None:
+    data = replace(
+        data_of(), free=("tracker_scale",), free_in={"tracker_scale": (1, 2)},
+        files=("a.csv", "b.csv", "c.csv"), origins=("x/a.csv", "x/b.csv", "x/c.csv"),
+        file=np.arange(data_of().n_rows) % 3,
+    )  # fmt: skip
+    problem = problem_of(data).with_groups(np.asarray(data.file))
+    found = freed(problem, LaidOut(Terms(), (), ()))
+    layout = found.terms["tracker_scale"].layout
+    assert isinstance(layout, ApartLayout) and layout.parts == ("x/b.csv", "x/c.csv")
+    told = positions(data)
+    for k, value in zip((1, 2), found.terms["tracker_scale"].vector, strict=True):
+        own = data.file == k
+        expected = slope(told[own], data.position[own])
+        assert value == pytest.approx(expected, abs=near(told[own]))
+
+
+def test_a_frame_that_is_far_away_is_registered_first() -> None:
+    """Gauss-Newton alone would not come there: it is turned by more than a right angle."""
+    frame = term(STIFF, "tracker_frame", **FAR_FRAME)
+    data = replace(measured(STIFF, [frame], points=2), free=("tracker_frame",))
+    found = found_in(data)
+    assert found.free.tolist() == [True] * 6
+    assert found.terms["tracker_frame"].vector == pytest.approx(frame.vector, abs=2e-3)
+
+
+def test_what_was_measured_is_a_reading_in_standard_errors() -> None:
+    """A pulley of 12 +- 2 mm, 7 mm in the model: 2.5 standard errors are left."""
+    wheel = term(STIFF, "pulley_radius").measured(radius_m=(0.012, 0.002))
+    wheel = wheel.with_vector(np.array([0.007]))
+    stiff = term(STIFF, "stiffness", factor=1.1)
+    terms = Terms([wheel, stiff])
+    columns, readings = known_readings(terms)
+    scale = wheel.layout.scale[0]
+    assert columns == pytest.approx(np.array([[scale / 0.002, 0.0]]))
+    assert readings == pytest.approx([6.0]) and known_left(terms) == pytest.approx([2.5])
+    assert known_readings(Terms([stiff]))[0].shape == (0, 1)
+
+
+def days() -> Measurements:
+    n = data_of().n_rows
+    number = (np.arange(n) >= n // 2).astype(np.int64)
+    origins = ("case/monday.csv", "case/tuesday.csv")
+    return replace(data_of(), files=("monday.csv", "tuesday.csv"), origins=origins, file=number)
+
+
+def test_values_of_a_file_are_found_by_its_name_and_new_files_start_at_the_common_ones() -> None:
+    plain = term(STIFF, "tracker_frame", shift_x_m=0.5)
+    there = Values(plain.layout.null + 0.25, np.zeros(6), plain.knowledge)
+    own = Own("file", {"monday.csv": there})
+    found = laid_out(days(), Terms([replace(plain, own=own), term(STIFF, "stiffness", factor=1.1)]))
+    frame = found.terms["tracker_frame"]
+    assert isinstance(frame.layout, ApartLayout) and found.fresh == (
+        ("tracker_frame", "case/tuesday.csv"),
+    )
+    assert frame.vector == pytest.approx(np.concatenate([there.vector, plain.vector]))
+    assert found.notes == (
+        "tracker_frame has separate values for each file: case/monday.csv as in the model; "
+        "case/tuesday.csv not in the model, so fitted to these data first",
+    )
+    assert found.terms["stiffness"].vector.tolist() == [1.1]
+
+
+def test_rows_are_grouped_where_an_effect_has_values_apart() -> None:
+    plain = term(STIFF, "tracker_frame")
+    apart = laid_out(days(), Terms([replace(plain, own=Own("file", {}))])).terms
+    groups = groups_of(days(), apart)
+    assert groups is not None and groups.tolist() == days().file.tolist()
+    assert groups_of(days(), Terms([plain])) is None

@@ -16,7 +16,7 @@ from crosscheck.cli import main
 from crosscheck.inference.held_out import blocks_of
 from crosscheck.measurements.read import together
 from crosscheck.measurements.write import write_measurements
-from crosscheck.preparation.parts import laid_out
+from crosscheck.preparation.freed import laid_out
 from crosscheck.preparation.prepare import prepare
 from seecr.cli import main as seecr_main
 from seecr.description.mjcf import load_robot

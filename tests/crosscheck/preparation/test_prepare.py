@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from made_data import measured, term
 
-from crosscheck.fit.algebra import basis, beside, imitated, left_over
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Reason, Refusal, Unfit, Why
 from crosscheck.fit.residual_noise import outlying_rows
@@ -119,26 +118,6 @@ def test_a_row_that_sticks_out_alone_is_an_outlier_and_two_together_are_not(
     assert outlying([7]) == [7]
     assert outlying([7, 8]) == []
     assert outlying([]) == []
-
-
-def test_what_can_be_imitated_is_a_part_from_nothing_to_all() -> None:
-    rng = np.random.default_rng(0)
-    columns = rng.standard_normal((50, 4))
-    span = basis(columns)
-    assert span.shape == (50, 4)
-    assert span.T @ span == pytest.approx(np.eye(4), abs=1e-12)
-    inside = columns @ np.array([1.0, -2.0, 0.0, 3.0])
-    assert imitated(inside, span) == pytest.approx(1.0)
-    assert left_over(inside, span) == pytest.approx(0.0, abs=1e-20)
-    outside = beside(rng.standard_normal(50), span)
-    assert imitated(outside, span) == pytest.approx(0.0, abs=1e-12)
-    mixed = inside / np.linalg.norm(inside) + outside / np.linalg.norm(outside)
-    assert imitated(mixed, span) == pytest.approx(0.5)
-    assert left_over(3.0 * mixed, span) == pytest.approx(9.0)
-    # columns that depend on each other, and none
-    assert basis(np.column_stack([columns, columns[:, 0] * 1e-7, np.zeros(50)])).shape == (50, 4)
-    assert imitated(inside, basis(np.zeros((50, 0)))) == 0.0
-    assert imitated(np.zeros(50), span) == 0.0
 
 
 def test_what_no_joint_changes_and_the_file_says_of_every_row_is_no_reading() -> None:

@@ -1,4 +1,4 @@
-"""A file that belongs to another robot, or says another unit than it has, is noticed and said."""
+"""A file of another robot, in another unit, filled in, or of a run that stopped, is noticed."""
 
 from __future__ import annotations
 
@@ -7,18 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_data import measured, refused, run, soft_cogiro, soft_xml
+from made_data import measured, refused, soft_cogiro
 
 import crosscheck
-from crosscheck.fit.reasons import Unfit
-from crosscheck.measurements.data import Sigma
-from crosscheck.measurements.read import load_commands, load_measurements, together
+from crosscheck.fit.problem import Problem
+from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.measurements.read import load_measurements, together
 from crosscheck.measurements.write import write_measurements
 from crosscheck.preparation.prepare import prepare
+from crosscheck.preparation.suspect import stuck_doubts
 from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Terms
 from seecr.errors import InputFileError
 from seecr.pose import (
+    Array,
     quat_from_rotvec,
     quat_from_rxyz,
     quat_multiply,
@@ -50,18 +52,6 @@ def test_commands_off_the_joints_of_a_planar_robot(tmp_path):
     assert "are these the commands of another robot?" in said and not (tmp_path / "out").exists()
 
 
-def test_most_commands_outside_the_frame(tmp_path):
-    file = tmp_path / "commands.csv"
-    far = COGIRO.reference_pose[:3] + COGIRO.reach * np.array([0.9, 0.9, 0.0])
-    lines = [",".join(f"{v:.4f}" for v in (*far[:2], far[2] + 0.01 * k)) for k in range(5)]
-    file.write_text("\n".join(["cmd_x_m,cmd_y_m,cmd_z_m", *lines]) + "\n")
-    with pytest.raises(InputFileError, match=r"most commands are outside the .*another robot"):
-        load_commands(file, COGIRO)
-    near = [",".join(f"{v:.4f}" for v in COGIRO.reference_pose[:3])] * 3
-    file.write_text("\n".join(["cmd_x_m,cmd_y_m,cmd_z_m", *near, *lines[:3]]) + "\n")
-    assert load_commands(file, COGIRO).n_rows == 6
-
-
 def test_positions_that_do_not_follow_the_commands(cogiro, tmp_path):
     file = tmp_path / "measured.csv"
     swapped = replace(cogiro, position=cogiro.position[:, [1, 0, 2]], tensions=None)
@@ -69,27 +59,17 @@ def test_positions_that_do_not_follow_the_commands(cogiro, tmp_path):
         write_measurements(file, data)
         said = " ".join(load_measurements(file, COGIRO).notes)
         assert ("The measured positions do not follow the commands: they are" in said) is odd
+        told = " m if meas_x and meas_y are exchanged. Are axes exchanged, is this the file"
+        assert (told in said) is odd
     write_measurements(file, replace(swapped, free=("tracker_frame",)))
     assert "do not follow" not in " ".join(load_measurements(file, COGIRO).notes)
-
-
-def test_degrees_in_a_column_of_radians(tmp_path):
-    file = tmp_path / "measured.csv"
-    home = ",".join(f"{v:.4f}" for v in COGIRO.reference_pose[:3])
-    for unit, odd in (("rad", True), ("deg", False)):
-        rows = [f"{home},{angle}" for angle in (1.1, -0.9, 0.8, 1.3)]
-        file.write_text("\n".join([f"cmd_x_m,cmd_y_m,cmd_z_m,meas_ry_{unit}", *rows]) + "\n")
-        if odd:
-            with pytest.raises(InputFileError, match="name the column meas_ry_deg"):
-                load_measurements(file, COGIRO)
-        else:
-            assert load_measurements(file, COGIRO).n_rows == 4
 
 
 def test_a_model_worse_than_the_commands(cogiro):
     assert "the commands themselves are only" not in notes(COGIRO, cogiro)
     obeyed = replace(cogiro, position=cogiro.command_pose[:, :3] + 1e-5, tensions=None)
     assert "the commands themselves are only 0.0100 mm from them (rms)" in notes(COGIRO, obeyed)
+    assert "the commands themselves" not in notes(COGIRO, obeyed.rows(slice(3)))
 
 
 def test_of_several_files_the_one_of_another_robot_is_named(cogiro):
@@ -99,23 +79,6 @@ def test_of_several_files_the_one_of_another_robot_is_named(cogiro):
         note for note in crosscheck.compare(COGIRO, both).notes if "commands themselves" in note
     ]
     assert len(said) == 1 and said[0].startswith("odd.csv: The model is ")
-
-
-@pytest.mark.slow
-def test_newtons_in_a_column_of_kilonewtons(cogiro, tmp_path, unpaged):
-    assert "Tensions of" not in notes(COGIRO, cogiro)
-    assert "where the model expects" in notes(
-        COGIRO, replace(cogiro, tensions=1e3 * cogiro.tensions)
-    )
-    xml, file = tmp_path / "robot.xml", tmp_path / "measured.csv"
-    xml.write_text(soft_xml())
-    write_measurements(file, replace(cogiro, tensions=1e3 * cogiro.tensions))
-    done = run("diagnose", xml, file, "--only", "stiffness", "--no-recording",
-               "--out", tmp_path / "out")  # fmt: skip
-    assert done.stdout.count("note: Tensions of") == 1
-    # whatever is fitted to them says so, from Python as well
-    kilo = replace(cogiro, tensions=1e3 * cogiro.tensions)
-    assert any("Tensions of" in note for note in prepare(COGIRO, kilo, Terms()).all_notes)
 
 
 def test_rotations_in_radians_that_are_called_degrees(cogiro):
@@ -197,15 +160,77 @@ def test_numbers_that_may_well_stay_the_same_are_readings(cogiro):
         assert not any("same number" in note for note in prepare(robot, data, Terms()).notes)
 
 
-def test_where_all_readings_are_the_same_that_is_said_instead(cogiro):
-    same = {name: np.repeat(getattr(cogiro, name)[:1], cogiro.n_rows, axis=0)
-            for name in ("position", "quat_wxyz", "tensions")}  # fmt: skip
-    refusal = prepare(COGIRO, replace(cogiro, **same), Terms()).refusal
-    assert refusal is not None and refusal.unfit is Unfit.FROZEN_READINGS
+@pytest.fixture(scope="module")
+def data() -> Measurements:
+    return measured(COGIRO, points=8)
 
 
-def test_axes_that_were_exchanged_are_named(cogiro, tmp_path):
-    file = tmp_path / "measured.csv"
-    write_measurements(file, replace(cogiro, position=cogiro.position[:, [1, 0, 2]]))
-    (said,) = (n for n in load_measurements(file, COGIRO).notes if "do not follow" in n)
-    assert " m if meas_x and meas_y are exchanged. Are axes exchanged, is this the file" in said
+def stops(data: Measurements, first: int, last: int) -> Measurements:
+    position = data.position.copy()
+    noise = np.random.default_rng(1).normal(size=(last - first, 3))
+    position[first + 1 : last + 1] = position[first] + 3e-5 * noise
+    return replace(data, position=position)
+
+
+def stuck_notes(data: Measurements) -> list[str]:
+    return [note for note in prepare(COGIRO, data, Terms()).notes if "tracker stop" in note]
+
+
+@pytest.mark.parametrize("row", [0, -1], ids=["first run", "last run"])
+def test_rows_after_a_crash_are_named(data: Measurements, row: int) -> None:
+    run = np.flatnonzero(data.run == data.run[row])
+    (note,) = stuck_notes(stops(data, run[2], run[-1]))
+    at, first, last = data.line[[run[2], run[3], run[-1]]]
+    assert note.startswith(
+        f"Lines {first} to {last}, run {data.run[row]}: the position stays within"
+    )
+    assert f"of that at line {at}, where" in note
+
+
+def test_so_many_are_counted_where_more_than_three_stop(data: Measurements) -> None:
+    stopped = data
+    for run in np.unique(data.run_index):
+        rows = np.flatnonzero(data.run_index == run)
+        stopped = stops(stopped, rows[2], rows[-1])
+    assert len(stuck_notes(stopped)) == 3
+    (count,) = [n for n in prepare(COGIRO, stopped, Terms()).notes if "also stays" in n]
+    assert (
+        count
+        == f"The position also stays in {len(np.unique(data.run)) - 3} other parts of the data."
+    )
+
+
+def test_a_run_that_goes_on_has_no_such_note(data: Measurements) -> None:
+    assert stuck_notes(data) == []
+    lost = data.position.copy()
+    lost[2:6] = np.nan
+    assert stuck_notes(replace(data, position=lost)) == []
+
+
+def stretches(read: Array, there: Array, spread: float = 1.0) -> list[str]:
+    """Lines that are named where positions (n, 3) are read beside those that are predicted.
+
+    A last row, in a run of its own, makes the predicted positions spread.
+    """
+    far = spread * np.array([[0.0, 0.0, 1.0]])
+    read, there = (np.concatenate([table, table[:1] + far]) for table in (read, there))
+    run = np.repeat(["a", "b"], [len(read) - 1, 1])
+    pose = np.tile(COGIRO.reference_pose, (len(read), 1))
+    data = Measurements(Path("a.csv"), 8, run, command_pose=pose, position=read)
+    problem = Problem(COGIRO, data, Sigma(1e-4), np.ones(len(read), dtype=bool))
+    return [note.partition(",")[0] for note in stuck_doubts(problem, there)]
+
+
+def test_stretches_end_where_the_platform_moves_again() -> None:
+    there = np.linspace(0.0, 1.0, 11)[:, None] * [1.0, 0.0, 0.0]
+    read = there.copy()
+    assert stretches(read, there) == []
+    read[3:8] = read[3]
+    assert stretches(read, there) == ["Lines 6 to 9"]
+    # far less than the whole way is no standstill that could be told from backlash
+    assert stretches(read, there, 6.0) == []
+    # and begin where commands leave the place, and end where they are back: those rows are right
+    back = np.repeat([0.0, 1.0, 0.0], 4)[:, None] * [1.0, 0.0, 0.0]
+    assert stretches(np.zeros_like(back), back) == ["Lines 6 to 9"]
+    # readings of one place under one command
+    assert stretches(np.repeat(there, 5, axis=0), np.repeat(there, 5, axis=0)) == []

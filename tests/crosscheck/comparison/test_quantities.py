@@ -1,22 +1,22 @@
-"""Where the platform was told to go, cable errors of a known shift: by hand."""
+"""Where the platform was told to go, cable errors of a known shift, periods: by hand."""
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from made_data import measured, soft_cogiro
+from scipy import signal
 
 from crosscheck.comparison.quantities import (
     STILL,
     QuantityKind,
-    cable_errors,
-    cable_lengths,
     in_time,
-    independent_part,
     of_cables,
     of_rows,
+    periodogram,
     regions_of,
     travel,
 )
@@ -31,18 +31,6 @@ def case() -> tuple[Problem, Prediction]:
     data = measured(robot)
     problem = Problem(robot, data, data.sigma, np.ones(data.n_rows, dtype=bool))
     return problem, problem.experiment.predict(Terms().effects)
-
-
-def test_direction_and_speed_are_those_of_the_commands(case: tuple[Problem, Prediction]) -> None:
-    problem, prediction = case
-    way = travel(problem, prediction)
-    data, starts = problem.data, problem.experiment.commands.starts
-    assert data.command_pose is not None
-    step = np.diff(data.command_pose[:, :3], axis=0)
-    k = next(i for i in range(1, data.n_rows) if not starts[i] and np.any(step[i - 1]))
-    assert way.step[k, :3] == pytest.approx(step[k - 1], abs=1e-15)
-    assert np.isnan(way.speed[starts]).all()
-    assert way.direction[k] == STILL or way.direction[k][0] in "+-"
 
 
 def test_a_run_that_starts_at_its_first_row_has_no_motion_to_it(
@@ -92,23 +80,6 @@ def test_regions_are_halves_of_what_was_used(case: tuple[Problem, Prediction]) -
     assert set(regions_of(problem, pose)[[2, 3]]) == {"x from 0.5 m"}, "on the plane"
 
 
-def test_a_shift_of_the_platform_is_an_error_of_each_cable(
-    case: tuple[Problem, Prediction],
-) -> None:
-    problem, prediction = case
-    shift = np.array([1e-6, -2e-6, 3e-6])
-    raw = np.zeros((problem.data.n_rows, 6 + problem.robot.n_cables))
-    raw[:, :3] = shift
-    errors, noise = cable_errors(problem, raw, prediction)
-    moved = prediction.pose.copy()
-    moved[:, :3] += shift
-    apart = problem.robot.nominal_lengths(moved) - cable_lengths(problem, prediction)
-    # to the second order: the square of the shift over a cable of 0.1 m
-    assert errors[problem.use] == pytest.approx(apart[problem.use], rel=0, abs=1e-10)
-    assert np.all(noise >= problem.sigma.position_m)
-    assert 0.0 < independent_part(problem, prediction) <= 1.0
-
-
 def test_quantities_are_of_rows_or_of_cables(case: tuple[Problem, Prediction]) -> None:
     problem, prediction = case
     way, n, m = travel(problem, prediction), problem.data.n_rows, problem.robot.n_cables
@@ -136,3 +107,32 @@ def test_a_period_is_found_in_time(case: tuple[Problem, Prediction]) -> None:
     period = float(found.name.split()[-2])
     assert period == pytest.approx(span / 5.0, rel=0.05)
     assert in_time(problem, np.full_like(table, np.nan)) == (None, 0)
+
+
+SPAN = 100.0
+
+
+def uneven(n: int) -> tuple[np.ndarray, np.ndarray]:
+    random = np.random.default_rng(3)
+    t = np.sort(random.uniform(0.0, SPAN, n)) + 7.0
+    values = np.sin(2.0 * np.pi * 0.31 * t) + 0.3 * random.standard_normal(n)
+    return t, values - values.mean()
+
+
+def test_power_is_that_of_the_slow_sum() -> None:
+    t, values = uneven(400)
+    step, count = 0.25 / SPAN, 600
+    fast = periodogram(t, values, step, count)
+    slow = signal.lombscargle(t, values, 2.0 * np.pi * step * np.arange(1, count + 1))
+    assert np.argmax(fast) == np.argmax(slow)
+    # what spreading over two cells costs at the shortest period
+    assert fast == pytest.approx(slow, rel=0.04, abs=1e-3 * slow.max())
+
+
+def test_memory_grows_with_rows_and_frequencies_and_not_with_their_product() -> None:
+    t, values = uneven(15_000)
+    tracemalloc.start()
+    periodogram(t, values, 0.25 / SPAN, 20_000)
+    _now, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 50e6  # the product would be 2.4e9 bytes
