@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from seecr.cli.group import group_of
+from seecr.cli.group import LazyGroup
 
 # Command, module in crosscheck.cli that holds it as `command`, and its line in --help.
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -20,13 +20,9 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "twin": ("twin", "Make measurements with a hidden effect, with MuJoCo as the truth."),
 }
 
-
-@group_of("crosscheck.cli", COMMANDS)
-def main() -> None:
-    """Check the statics of a cable-driven parallel robot against MuJoCo and against measurements.
-
-    \b
-    ROBOT.xml is an MJCF file, or the name of a shipped robot (demobot_cogiro, planar_vertical ...).
-    Exit status: 0 all well, 1 a threshold exceeded, 2 bad input or usage,
-    3 a solve did not converge.
-    """
+main = LazyGroup(
+    "crosscheck.cli",
+    COMMANDS,
+    "Check the statics of a cable-driven parallel robot against MuJoCo and against measurements.",
+    "ROBOT.xml",
+)

@@ -2,64 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from crosscheck.cli.choices import grown_model_option, result_in, sigma_option
+from crosscheck.cli import choices
 from crosscheck.cli.following import Given, after_fit
-from crosscheck.cli.grown import keep_grown, model_or_new
-from seecr.cli.options import FILE, json_option, made_by, progress_share
+from seecr.cli import options
 
 if TYPE_CHECKING:
     from seecr import Model
 
 
-@click.command(
-    short_help="Fit an effect and add it to a model.",
-    epilog="""\b
-Examples:
-  crosscheck add pulley_radius robot.xml measured.csv --model model.toml
-  crosscheck compare robot.xml measured.csv --model model.toml
-  crosscheck add pulley_radius robot.xml second_day.csv --model model.toml --refit
-  crosscheck add tracker_frame robot.xml monday.csv tuesday.csv --model model.toml --per file
-  crosscheck add --all-from diagnosis.json robot.xml measured.csv --model model.toml
-""",
+@options.command(
+    "crosscheck add pulley_radius robot.xml measured.csv --model model.toml",
+    "crosscheck compare robot.xml measured.csv --model model.toml",
+    "crosscheck add pulley_radius robot.xml second_day.csv --model model.toml --refit",
+    "crosscheck add tracker_frame robot.xml monday.csv tuesday.csv --model model.toml --per file",
+    "crosscheck add --all-from diagnosis.json robot.xml measured.csv --model model.toml",
 )
 @click.argument("words", nargs=-1, metavar="EFFECT ROBOT.xml DATA.csv...")
-@click.option(
-    "--all-from",
-    type=FILE,
-    metavar="diagnosis.json",
-    help="Instead of EFFECT: fit all effects that this diagnosis lists, together.",
+@options.option(
+    "--all-from diagnosis.json",
+    "Instead of EFFECT: fit all effects that this diagnosis lists, together.",
 )
-@grown_model_option
-@click.option("--refit", is_flag=True, help="Refit an effect that the model already has.")
-@click.option(
-    "--per",
-    type=click.Choice(["file", "run"]),
-    help="Give EFFECT separate values for each file or run.",
-)
-@click.option(
-    "--force", is_flag=True, help="Add it even if it does not predict held-out runs better."
-)
-@sigma_option
-@click.option("--out", type=FILE, metavar="DIR", help="Folder for add.json.  [default: none]")
-@json_option
+@choices.grown_model
+@options.option("--refit", "Refit an effect that the model already has.")
+@options.option("--per [file|run]", "Give EFFECT separate values for each file or run.")
+@options.option("--force", "Add it even if it does not predict held-out runs better.")
+@choices.sigma
+@options.out_file("add.json")
+@options.as_json
 def command(
-    words: tuple[str, ...],
-    all_from: Path | None,
-    model: Path,
-    refit: bool,
-    per: str | None,
-    force: bool,
-    sigmas: tuple[str, ...],
-    out: Path | None,
-    as_json: bool,
-) -> int:
+    words: tuple[str, ...], all_from: Path | None, model: Path, refit: bool, per: str | None,
+    force: bool, sigmas: tuple[str, ...], out: Path | None, as_json: bool,
+) -> int:  # fmt: skip
     """Fit EFFECT to DATA.csv, together with the model's own effects, and add it to the model.
 
     All effects of the model are refitted, because one may have absorbed what another causes. The
@@ -75,9 +54,9 @@ def command(
     """
     from crosscheck import Sigma, add_effect, add_effects, load_diagnosed, load_measurements
     from crosscheck.model.write import check_place
+    from crosscheck.show.fits import print_addition
     from seecr import effect_named, load_robot
 
-    _check_not_both(words, all_from)
     effect, robot, data = _arguments(words, all_from)
     if effect is not None:
         effect_named(effect)
@@ -86,47 +65,44 @@ def command(
     machine = load_robot(robot)
     listed, said = load_diagnosed(all_from, machine) if all_from is not None else ((), ())
     names = [effect] if effect is not None else [term.name for term in listed]
-    old = model_or_new(model, machine)
+    old = choices.model_or_new(model, machine)
     for name in names:
         _check_names(old, name, refit, model)
     measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     check_place(model)
-    with result_in(out, "add.json") as keep:
-        with progress_share(f"adding {' + '.join(names)}") as progress:
+    with options.result_in(out, "add.json") as keep:
+        with options.progress_share(f"adding {' + '.join(names)}") as progress:
             if effect is not None:
                 found = add_effect(machine, measured, effect, old, progress, per=per)
             else:
                 found = add_effects(machine, measured, listed, old, progress)
         found = replace(found, notes=(*said, *found.notes))
         written = found.pays or force
-        made = made_by(machine.source, *data, all_from, model)  # of the model as it was read
-        text = keep_grown(found, model, written, made, keep, {"model_notes": list(old.notes)})
+        # of the model as it was read
+        made = options.made_by(machine.source, *data, all_from, model)
+        more = {"model_notes": list(old.notes)}
+        text = choices.keep_grown(found, model, written, made, keep, more)
     if as_json:
         click.echo(text)
     else:
-        from crosscheck.show.fits import print_addition
-
         print_addition(found, model, written)
-        given = Given.with_data(measured, robot, data, model, sigmas)
+        given = Given(robot, data, model, sigmas)
         click.echo(after_fit(found.is_noise, written, given))
     return 0 if written else 1
 
 
-def _check_not_both(words: Sequence[str], all_from: Path | None) -> None:
-    """Beside --all-from the first word is the robot's file; an effect there was meant as one."""
+def _arguments(
+    words: tuple[str, ...], all_from: Path | None
+) -> tuple[str | None, Path, tuple[Path, ...]]:
+    """The effect, unless a diagnosis names them, the robot's file and those of the data."""
     from seecr import catalogue
 
+    # beside --all-from the first word is the robot's file; an effect there was meant as one
     if all_from is not None and words and words[0] in catalogue() and not Path(words[0]).exists():
         raise click.UsageError(
             f"expected EFFECT or --all-from, not both; got {words[0]} and --all-from {all_from}; "
             "leave one of them out"
         )
-
-
-def _arguments(
-    words: Sequence[str], all_from: Path | None
-) -> tuple[str | None, Path, tuple[Path, ...]]:
-    """The effect, unless a diagnosis names them, the robot's file and those of the data."""
     expected = ["EFFECT", "ROBOT.xml", "DATA.csv"][0 if all_from is None else 1 :]
     if len(words) < len(expected):
         given = " ".join(words) or "nothing"

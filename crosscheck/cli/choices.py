@@ -1,17 +1,23 @@
-"""Options of the commands that compare a model with measurements."""
+"""Options of the commands that compare a model with measurements, and what they keep."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from seecr.cli.options import FILE
+from seecr.cli.options import FILE, F, option, together
+
+if TYPE_CHECKING:
+    from crosscheck import Addition, Calibrated
+    from seecr import Model, Robot
+    from seecr.files import Made
 
 
-def listed(ctx: click.Context, param: click.Parameter, texts: Sequence[str]) -> tuple[str, ...]:
+def _listed(ctx: click.Context, param: click.Parameter, texts: Sequence[str]) -> tuple[str, ...]:
     """Words of an option that may be repeated and holds several between commas; its callback."""
     words = [[word.strip() for word in text.split(",") if word.strip()] for text in texts]
     for text, found in zip(texts, words, strict=True):
@@ -20,33 +26,36 @@ def listed(ctx: click.Context, param: click.Parameter, texts: Sequence[str]) -> 
     return tuple(word for found in words for word in found)
 
 
-sigma_option = click.option(
-    "--sigma",
-    "sigmas",
-    multiple=True,
-    metavar="KIND=0.1mm",
-    help="Noise of a kind of reading (position, orientation, tension) or of the commanded lengths "
+def listed(words: str, said: str) -> Callable[[F], F]:
+    """An option that may be repeated and holds several words between commas, as a tuple."""
+    return option(words, said, multiple=True, callback=_listed)
+
+
+robot_and_data = together(
+    click.argument("robot", type=FILE, metavar="ROBOT.xml"),
+    click.argument("data", type=FILE, nargs=-1, required=True, metavar="DATA.csv..."),
+)
+sigma = option(
+    "--sigma KIND=0.1mm",
+    "Noise of a kind of reading (position, orientation, tension) or of the commanded lengths "
     "(length); may be repeated; overrides [sigma] in the TOML.",
-)
-"""``--sigma position=0.1mm``, given to the command as ``sigmas``, a tuple of texts."""
-
-only_option = click.option(
-    "--only",
+    name="sigmas",
     multiple=True,
-    callback=listed,
-    metavar="EFFECT,...",
-    help="Consider only these effects, in addition to those of the model; may be repeated.",
 )
-"""``--only EFFECT,...``, given to the command as ``only``, a tuple of names."""
-
-exclude_option = click.option(
-    "--exclude",
+tolerance = option(
+    "--tolerance 0.1mm",
+    "Unexplained errors beyond the noise matter from this rms size on, such as 0.1mm, 0.05deg or "
+    "1N; may be repeated.  [default: half the noise]",
+    name="tolerances",
     multiple=True,
-    callback=listed,
-    metavar="EFFECT,...",
-    help="Do not consider these effects.",
 )
-"""``--exclude EFFECT,...``, given to the command as ``exclude``, a tuple of names."""
+only = listed(
+    "--only EFFECT,...",
+    "Consider only these effects, in addition to those of the model; may be repeated.",
+)
+exclude = listed("--exclude EFFECT,...", "Do not consider these effects.")
+grown_model = option("--model M.toml", "The model; created if it does not exist.", required=True)
+figures = option("--figures DIR", "Folder for the page's figures, as SVG and PNG.")
 
 
 def check_effects(*names: Sequence[str]) -> None:
@@ -59,32 +68,6 @@ def check_effects(*names: Sequence[str]) -> None:
 
     for name in (name for some in names for name in some):
         effect_named(name)
-
-
-grown_model_option = click.option(
-    "--model",
-    type=FILE,
-    required=True,
-    metavar="M.toml",
-    help="The model; created if it does not exist.",
-)
-"""``--model M.toml`` of commands that add to a model, given to the command as ``model``."""
-
-tolerance_option = click.option(
-    "--tolerance",
-    "tolerances",
-    multiple=True,
-    metavar="0.1mm",
-    help="Unexplained errors beyond the noise matter from this rms size on, such as 0.1mm, "
-    "0.05deg or 1N; may be repeated.  [default: half the noise]",
-)
-"""``--tolerance 0.1mm``, given to the command as ``tolerances``, a tuple of texts."""
-
-
-figures_option = click.option(
-    "--figures", type=FILE, metavar="DIR", help="Folder for the page's figures, as SVG and PNG."
-)
-"""``--figures DIR``, given to the command as ``figures``; see :func:`figures_in`."""
 
 
 @contextmanager
@@ -100,13 +83,30 @@ def figures_in(folder: Path | None) -> Iterator[None]:
         yield
 
 
-@contextmanager
-def result_in(out: Path | None, name: str) -> Iterator[Callable[[str], None]]:
-    """A function that keeps a result's text in a folder, if any; it is tried before the work."""
-    from seecr.files import staged, write_text
+def model_or_new(path: Path, robot: Robot) -> Model:
+    """The model that a file holds; one without effects if there is no such file."""
+    from seecr import load_model, new_model
 
-    if out is None:
-        yield lambda _text: None
-        return
-    with staged(out) as folder:
-        yield lambda text: write_text(folder / name, text + "\n")
+    return load_model(path, robot) if path.exists() else new_model(robot)
+
+
+def keep_grown(
+    found: Addition | Calibrated, model: Path, written: bool, made: Made,
+    keep: Callable[[str], None], more: Mapping[str, Any],
+) -> str:  # fmt: skip
+    """Keep what was found, and the model if it is ``written``; returns the JSON that was kept.
+
+    Args:
+        found: with its model. model: the file for that.
+        made: of the files as they were read.
+        keep: keeps the JSON, see :func:`seecr.cli.options.result_in`. more: for the JSON too.
+    """
+    from crosscheck import save_model
+    from seecr.files import json_text
+
+    said = {"made": made, "written": written, "model": str(model), **found.as_json(), **more}
+    text = json_text(said)
+    keep(text)
+    if written:
+        save_model(model, found.model)
+    return text

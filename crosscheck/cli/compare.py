@@ -6,53 +6,39 @@ from pathlib import Path
 
 import click
 
-from crosscheck.cli.choices import figures_in, figures_option, sigma_option
+from crosscheck.cli import choices
 from crosscheck.cli.following import Given, after_comparison
-from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
+from seecr.cli import options
 
 
-@click.command(
-    short_help="Compare a model with measurements.",
-    epilog="""\b
-Examples:
-  crosscheck compare robot.xml measured.csv
-  crosscheck compare robot.xml measured.csv --model model.toml --max-position 0.5mm
-  crosscheck compare robot.xml measured.csv --limits limits.toml --json
-""",
+@options.command(
+    "crosscheck compare robot.xml measured.csv",
+    "crosscheck compare robot.xml measured.csv --model model.toml --max-position 0.5mm",
+    "crosscheck compare robot.xml measured.csv --limits limits.toml --json",
 )
-@click.argument("robot", type=FILE, metavar="ROBOT.xml")
-@click.argument("data", type=FILE, nargs=-1, required=True, metavar="DATA.csv...")
-@click.option("--model", type=FILE, metavar="M.toml", help="The model.  [default: plain SEECR]")
-@click.option("--max-position", metavar="0.5mm", help="Limit on the rms position error.")
-@click.option("--max-orientation", metavar="0.2deg", help="Limit on the rms orientation error.")
-@click.option("--max-tension", metavar="1N", help="Limit on the rms tension error.")
-@click.option("--max-position-worst", metavar="2mm", help="Limit on the worst row's error.")
-@click.option("--max-orientation-worst", metavar="1deg", help="Limit on the worst row's error.")
-@click.option("--max-tension-worst", metavar="5N", help="Limit on the worst row's error.")
-@click.option(
-    "--limits",
-    "limits_file",
-    type=FILE,
-    metavar="FILE.toml",
-    help='Limits from a file: max_position = "0.5mm" and so on; options override it.',
+@choices.robot_and_data
+@options.option("--model M.toml", "The model.  [default: plain SEECR]")
+@options.option("--max-position 0.5mm", "Limit on the rms position error.")
+@options.option("--max-orientation 0.2deg", "Limit on the rms orientation error.")
+@options.option("--max-tension 1N", "Limit on the rms tension error.")
+@options.option("--max-position-worst 2mm", "Limit on the worst row's error.")
+@options.option("--max-orientation-worst 1deg", "Limit on the worst row's error.")
+@options.option("--max-tension-worst 5N", "Limit on the worst row's error.")
+@options.option(
+    "--limits FILE.toml",
+    'Limits from a file: max_position = "0.5mm" and so on; options override it.',
+    name="limits_file",
 )
-@sigma_option
-@figures_option
-@click.option("--no-recording", is_flag=True, help="Do not write a recording (.rrd).")
-@out_option("crosscheck-comparison")
-@json_option
+@choices.sigma
+@choices.figures
+@options.no_recording
+@options.out("crosscheck-comparison")
+@options.as_json
 def command(
-    robot: Path,
-    data: tuple[Path, ...],
-    model: Path | None,
-    limits_file: Path | None,
-    sigmas: tuple[str, ...],
-    figures: Path | None,
-    no_recording: bool,
-    out: Path,
-    as_json: bool,
-    **options: str | None,
-) -> int:
+    robot: Path, data: tuple[Path, ...], model: Path | None, limits_file: Path | None,
+    sigmas: tuple[str, ...], figures: Path | None, no_recording: bool, out: Path, as_json: bool,
+    **errors: str | None,
+) -> int:  # fmt: skip
     """Show where a model is off, by how much, and whether the residuals are noise.
 
     ROBOT.xml is the robot's MJCF, DATA.csv its measurements; a TOML file beside it states the
@@ -71,30 +57,25 @@ def command(
     from seecr import load_model, load_robot, with_history
     from seecr.files import json_text, staged, write_text
 
-    limits = (load_limits(limits_file) if limits_file else Limits()).but(options)
+    limits = (load_limits(limits_file) if limits_file else Limits()).but(errors)
     machine = load_robot(robot)
     measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     own = load_model(model, machine) if model is not None else None
     with (
         staged(out, sometimes=["comparison.rrd"]) as folder,
-        progress_share("comparing") as progress,
+        options.progress_share("comparing") as progress,
     ):
         found = compare(machine, measured, own.terms if own else ())
         beyond = exceeded(limits, found)
         status = 1 if beyond else (0 if found.converged else 3)
-        made = made_by(machine.source, *data, model)
-        document = {
-            "made": made,
-            "exit_status": status,
-            "limits": {k: v for k, v in vars(limits).items() if v is not None},
-            "exceeded": beyond,
-            **found.as_json(),
-            "model_notes": list(own.notes) if own else [],
-        }
-        text = json_text(document)
+        made = options.made_by(machine.source, *data, model)
+        stated = {k: v for k, v in vars(limits).items() if v is not None}
+        head = {"made": made, "exit_status": status, "limits": stated, "exceeded": beyond}
+        notes = own.notes if own else ()
+        text = json_text({**head, **found.as_json(), "model_notes": list(notes)})
         write_text(folder / "comparison.json", text + "\n")
         progress("drawing the page" if no_recording else "drawing the page, recording", 0.5)
-        with figures_in(figures):
+        with choices.figures_in(figures):
             write_page(found, folder / "comparison.html", made)
             if not no_recording:
                 from crosscheck.show.error_recordings import write_comparison_recording
@@ -106,10 +87,11 @@ def command(
         return status
     from crosscheck.show.comparison import print_comparison
 
-    for note in own.notes if own else ():
+    for note in notes:
         click.echo(f"note: {note}")
     print_comparison(found, beyond, limits != Limits(), out)
     history = own is not None and bool(with_history(machine, own))
-    given = Given.with_data(measured, robot, data, model, sigmas, history)
+    lengths = measured.command_lengths is not None
+    given = Given(robot, data, model, sigmas, lengths, history)
     click.echo(after_comparison(found, given))
     return status

@@ -7,65 +7,36 @@ from typing import TYPE_CHECKING
 
 import click
 
-from crosscheck.cli.choices import (
-    check_effects,
-    exclude_option,
-    figures_in,
-    figures_option,
-    listed,
-    only_option,
-    sigma_option,
-    tolerance_option,
-)
+from crosscheck.cli import choices
 from crosscheck.cli.following import Given, after_diagnosis
-from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
+from seecr.cli import options
 
 if TYPE_CHECKING:
     from crosscheck import Diagnosis
 
 
-@click.command(
-    epilog="Example: crosscheck diagnose robot.xml measured.csv --out diagnosis",
+@click.command(epilog="Example: crosscheck diagnose robot.xml measured.csv --out diagnosis")
+@choices.robot_and_data
+@options.option("--model M.toml", "Effects that the model already has.")
+@choices.only
+@choices.exclude
+@choices.sigma
+@choices.tolerance
+@options.option("--model-out M.toml", "Write the model with the missing effects added.")
+@choices.listed(
+    "--fail-on VERDICT,...",
+    "Exit with status 1 if the verdict is one of these, such as unknown_effect,no_verdict.",
 )
-@click.argument("robot", type=FILE, metavar="ROBOT.xml")
-@click.argument("data", type=FILE, nargs=-1, required=True, metavar="DATA.csv...")
-@click.option("--model", type=FILE, metavar="M.toml", help="Effects that the model already has.")
-@only_option
-@exclude_option
-@sigma_option
-@tolerance_option
-@click.option(
-    "--model-out",
-    type=FILE,
-    metavar="M.toml",
-    help="Write the model with the missing effects added.",
-)
-@click.option(
-    "--fail-on",
-    multiple=True,
-    callback=listed,
-    metavar="VERDICT,...",
-    help="Exit with status 1 if the verdict is one of these, such as unknown_effect,no_verdict.",
-)
-@figures_option
-@click.option("--no-recording", is_flag=True, help="Do not write a recording (.rrd).")
-@out_option("crosscheck-diagnosis")
-@json_option
+@choices.figures
+@options.no_recording
+@options.out("crosscheck-diagnosis")
+@options.as_json
 def command(
-    robot: Path,
-    data: tuple[Path, ...],
-    model: Path | None,
-    only: tuple[str, ...],
-    exclude: tuple[str, ...],
-    sigmas: tuple[str, ...],
-    tolerances: tuple[str, ...],
-    model_out: Path | None,
-    fail_on: tuple[str, ...],
-    figures: Path | None,
-    no_recording: bool,
-    out: Path,
-    as_json: bool,
-) -> int:
+    robot: Path, data: tuple[Path, ...], model: Path | None, only: tuple[str, ...],
+    exclude: tuple[str, ...], sigmas: tuple[str, ...], tolerances: tuple[str, ...],
+    model_out: Path | None, fail_on: tuple[str, ...], figures: Path | None, no_recording: bool,
+    out: Path, as_json: bool,
+) -> int:  # fmt: skip
     """Find which effects a model misses, those that explain most first.
 
     ROBOT.xml is the robot's MJCF, DATA.csv its measurements; a TOML file beside it states the
@@ -77,6 +48,7 @@ def command(
     """
     from crosscheck import DiagnosisVerdict, Sigma, Tolerance, diagnose, load_measurements
     from crosscheck.model.write import check_place
+    from crosscheck.show.diagnosis import print_diagnosis
     from crosscheck.show.page import write_page
     from seecr import load_model, load_robot, new_model, with_history
     from seecr.description.fingerprint import fingerprint
@@ -84,52 +56,44 @@ def command(
 
     gates = [DiagnosisVerdict.named(word) for word in fail_on]
     tolerance = Tolerance.parsed(tolerances)
-    check_effects(only, exclude)  # a wrong name is told before any file is read
+    choices.check_effects(only, exclude)  # a wrong name is told before any file is read
     machine = load_robot(robot)
     measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     own = load_model(model, machine) if model is not None else new_model(machine)
     if model_out is not None:
         check_place(model_out)
     with staged(out, sometimes=["diagnosis.rrd"]) as folder:
-        with progress_share("diagnosing") as progress:
+        with options.progress_share("diagnosing") as progress:
             found = diagnose(
                 machine, measured, own, progress, only=only, exclude=exclude,
                 tolerance=tolerance,
             )  # fmt: skip
-        made = made_by(machine.source, *data, model)
+        made = options.made_by(machine.source, *data, model)
         text = json_text({"made": made, "robot": fingerprint(machine), **found.as_json()})
         write_text(folder / "diagnosis.json", text + "\n")
-        with figures_in(figures):
+        with choices.figures_in(figures):
             write_page(found, folder / "diagnosis.html", made)
             if not no_recording and found.path is not None:
                 from crosscheck.show.error_recordings import write_diagnosis_recording
 
                 write_diagnosis_recording(found, folder / "diagnosis.rrd")
-        note = "" if model_out is None else _keep(found, model_out)
+        note = "" if model_out is None else keep_found(found, model_out)
     if as_json:
         click.echo(text)
     else:
-        from crosscheck.show.diagnosis import print_diagnosis
-
         print_diagnosis(found, out)
     if note:
         click.echo(note, err=as_json)
     if not as_json:
-        history = bool(with_history(machine, own))
-        given = Given.with_data(measured, robot, data, model, sigmas, history)
+        lengths, history = measured.command_lengths is not None, bool(with_history(machine, own))
+        given = Given(robot, data, model, sigmas, lengths, history)
         click.echo(after_diagnosis(found, given, model_out, out))
     if found.verdict in gates:
         return 1
     return 0 if found.converged else 3
 
 
-_PART = (
-    ". Its values are fitted without the other missing effects, so that it predicts best; those "
-    "above allow for them and are nearer to the truth"
-)
-
-
-def _keep(found: Diagnosis, path: Path) -> str:
+def keep_found(found: Diagnosis, path: Path) -> str:
     """Write the model that was found, if there was a verdict; what was done."""
     from crosscheck import DiagnosisVerdict, save_model
 
@@ -138,7 +102,12 @@ def _keep(found: Diagnosis, path: Path) -> str:
     save_model(path, found.model)
     if found.missing:
         text = f"Written to {path}: {', '.join(one.effect for one in found.missing)}"
-        return text + _PART * (found.verdict is DiagnosisVerdict.MANY_EFFECTS)
+        if found.verdict is DiagnosisVerdict.MANY_EFFECTS:
+            text += (
+                ". Its values are fitted without the other missing effects, so that it predicts "
+                "best; those above allow for them and are nearer to the truth"
+            )
+        return text
     if found.refitted:
         names = ", ".join(found.refitted)
         return f"Written to {path}: {names}, refitted to these data; nothing added"

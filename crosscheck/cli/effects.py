@@ -6,25 +6,15 @@ from pathlib import Path
 
 import click
 
-from crosscheck.cli.choices import result_in
+from seecr.cli import options
 from seecr.cli.following import following
-from seecr.cli.options import FILE, json_option, made_by
 
 
-@click.command(
-    short_help="List the effects that a robot may have, and how to check each by hand.",
-    epilog="""\b
-Examples:
-  crosscheck effects
-  crosscheck effects pulley_radius --robot robot.xml
-""",
-)
+@options.command("crosscheck effects", "crosscheck effects pulley_radius --robot robot.xml")
 @click.argument("name", required=False)
-@click.option(
-    "--robot", type=FILE, metavar="ROBOT.xml", help="Show plausible sizes for this robot."
-)
-@click.option("--out", type=FILE, metavar="DIR", help="Folder for effects.json.  [default: none]")
-@json_option
+@options.option("--robot ROBOT.xml", "Show plausible sizes for this robot.")
+@options.out_file("effects.json")
+@options.as_json
 def command(name: str | None, robot: Path | None, out: Path | None, as_json: bool) -> int:
     """List the effects of the catalogue, or describe one: its formula, its parameters, and how to
     check it.
@@ -41,8 +31,8 @@ def command(name: str | None, robot: Path | None, out: Path | None, as_json: boo
     chosen = [effect_named(name)] if name is not None else list(catalogue().values())
     rows = [effect_record(effect, machine) for effect in chosen]
     told = rows[0] if name is not None else {"effects": rows}
-    text = json_text({"made": made_by(None if machine is None else machine.source), **told})
-    with result_in(out, "effects.json") as keep:
+    text = json_text({"made": options.made_by(None if machine is None else machine.source), **told})
+    with options.result_in(out, "effects.json") as keep:
         keep(text)
     if as_json:
         click.echo(text)

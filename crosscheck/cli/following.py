@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from seecr.cli.following import Words, following, given_with
+from seecr.cli.following import following, given_with
 
 if TYPE_CHECKING:
-    from crosscheck import Comparison, Diagnosis, Measurements
+    from crosscheck import Comparison, Diagnosis
 
 _MODEL = "model.toml"
-# Rows that a plan chooses where nobody said how many.
-_ROWS = 40
+_ROWS = 40  # that a plan chooses where nobody said how many
 
 
 @dataclass(frozen=True)
@@ -34,35 +33,21 @@ class Given:
     lengths: bool = False
     history: bool = False
 
-    @classmethod
-    def with_data(
-        cls, measured: Measurements, robot: Path, data: Sequence[Path], model: Path | None,
-        sigmas: Sequence[str], history: bool = False,
-    ) -> Given:  # fmt: skip
-        """The same of files that were read."""
-        return cls(robot, data, model, sigmas, measured.command_lengths is not None, history)
-
-    @property
-    def options(self) -> Words:
-        """``--sigma`` again."""
-        return noise(self.sigmas)
-
-
-def noise(sigmas: Sequence[str]) -> Words:
-    """``--sigma`` as it was given."""
-    return tuple(word for text in sigmas for word in ("--sigma", text))
+    def then(self, verb: str, *words: object) -> str:
+        """The line that names a command of crosscheck, with ``--sigma`` as it was given."""
+        noise = (word for text in self.sigmas for word in ("--sigma", text))
+        return following("crosscheck", verb, *words, *noise)
 
 
 def after_comparison(found: Comparison, given: Given) -> str:
     """What is missing; where nothing is, what these data could not have shown, or using it."""
     files = (given.robot, *given.data)
     if found.refusal is not None:
-        return following("crosscheck", "plan", given.robot, "--rows", _ROWS, *given.options)
+        return given.then("plan", given.robot, "--rows", _ROWS)
     if not found.is_noise:
-        model = given_with(None, given.model)
-        return following("crosscheck", "diagnose", *files, *model, *given.options)
+        return given.then("diagnose", *files, *given_with(None, given.model))
     if given.model is None:
-        return following("crosscheck", "plan", *files[:2], *given.options)
+        return given.then("plan", *files[:2])
     return _using(given, given.model)
 
 
@@ -76,20 +61,18 @@ def after_diagnosis(found: Diagnosis, given: Given, kept: Path | None, out: Path
     files, to = (given.robot, *given.data), ("--model", given.model or _MODEL)
     match found.verdict:
         case DiagnosisVerdict.MANY_EFFECTS:
-            return following("crosscheck", "calibrate", *files, *to, *given.options)
+            return given.then("calibrate", *files, *to)
         case DiagnosisVerdict.NO_EFFECT_MISSING if given.model is not None:
             if found.refitted and kept is None:
-                again = (found.refitted[0], *files, *to, "--refit", *given.options)
-                return following("crosscheck", "add", *again)
+                return given.then("add", found.refitted[0], *files, *to, "--refit")
             return _using(given, kept or given.model)
         case DiagnosisVerdict.NO_VERDICT:
-            return following("crosscheck", "plan", given.robot, "--rows", _ROWS, *given.options)
+            return given.then("plan", given.robot, "--rows", _ROWS)
     if not found.missing:
-        return following("crosscheck", "plan", *files[:2], *given.options)
+        return given.then("plan", *files[:2])
     if kept is not None:
-        return following("crosscheck", "compare", *files, "--model", kept, *given.options)
-    listed = ("--all-from", out / "diagnosis.json")
-    return following("crosscheck", "add", *listed, *files, *to, *given.options)
+        return given.then("compare", *files, "--model", kept)
+    return given.then("add", "--all-from", out / "diagnosis.json", *files, *to)
 
 
 def _using(given: Given, model: Path) -> str:
@@ -110,10 +93,9 @@ def after_fit(is_noise: bool, written: bool, given: Given) -> str:
     there = written or (given.model is not None and given.model.exists())
     model = given_with(None, given.model) if there else ()
     verb = "compare" if is_noise and written else "diagnose"
-    return following("crosscheck", verb, given.robot, *given.data, *model, *given.options)
+    return given.then(verb, given.robot, *given.data, *model)
 
 
-def after_plan(robot: Path, poses: Path, sigmas: Sequence[str] = ()) -> str:
+def after_plan(given: Given) -> str:
     """Once the poses have been measured."""
-    line = following("crosscheck", "diagnose", robot, poses, *noise(sigmas))
-    return f"{line}  # once these poses are measured"
+    return f"{given.then('diagnose', given.robot, *given.data)}  # once these poses are measured"

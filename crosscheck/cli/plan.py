@@ -4,83 +4,56 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import click
 
-from crosscheck.cli.choices import figures_in, figures_option, listed, sigma_option
-from crosscheck.cli.following import after_plan
-from seecr.cli.arguments import check_places
-from seecr.cli.options import (
-    FILE,
-    Number,
-    WholeNumber,
-    json_option,
-    made_by,
-    out_option,
-    progress_share,
-)
+from crosscheck.cli import choices
+from crosscheck.cli.following import Given, after_plan
+from seecr.cli import options
 
 
-@click.command(
-    short_help="Find which effects planned poses can reveal, or choose poses to measure.",
-    epilog="""\b
-Examples:
-  crosscheck plan robot.xml --rows 40
-  crosscheck plan robot.xml poses.csv --reads position,tension --sigma position=0.1mm
-""",
+@options.command(
+    "crosscheck plan robot.xml --rows 40",
+    "crosscheck plan robot.xml poses.csv --reads position,tension --sigma position=0.1mm",
 )
-@click.argument("robot", type=FILE, metavar="ROBOT.xml")
-@click.argument("poses", type=FILE, metavar="[POSES.csv]", required=False)
-@click.option(
-    "--rows",
-    type=WholeNumber(min=6),
-    metavar="N",
-    help="Choose this many poses instead of reading a file.",
+@click.argument("robot", type=options.FILE, metavar="ROBOT.xml")
+@click.argument("poses", type=options.FILE, metavar="[POSES.csv]", required=False)
+@options.option(
+    "--rows N", "Choose this many poses instead of reading a file.", options.WholeNumber(min=6)
 )
-@click.option(
-    "--reads",
-    multiple=True,
-    callback=listed,
-    metavar="KIND,...",
-    help="What will be measured: position, orientation, tension.  [default: position,orientation, "
-    "and tension if its noise is stated]",
+@choices.listed(
+    "--reads KIND,...",
+    "What will be measured: position, orientation, tension.  [default: position,orientation, and "
+    "tension if its noise is stated]",
 )
-@sigma_option
-@click.option(
-    "--lowest",
-    type=Number(),
-    metavar="N",
+@choices.sigma
+@options.option(
+    "--lowest N",
+    "Lowest cable tension at proposed poses.",
+    options.Number(),
     default=0.0,
-    help="Lowest cable tension at proposed poses.",
+    show_default=False,
 )
-@click.option(
-    "--highest",
-    type=Number(),
-    metavar="N",
+@options.option(
+    "--highest N",
+    "Highest cable tension at proposed poses.",
+    options.Number(),
     default=math.inf,
-    help="Highest cable tension at proposed poses.",
+    show_default=False,
 )
-@click.option(
-    "--box",
-    metavar="X0,Y0,Z0,X1,Y1,Z1",
-    help="Where poses are chosen and proposed [m].  [default: inside the exit points]",
+@options.option(
+    "--box X0,Y0,Z0,X1,Y1,Z1",
+    "Where poses are chosen and proposed [m].  [default: inside the exit points]",
 )
-@figures_option
-@out_option("crosscheck-plan")
-@json_option
+@choices.figures
+@options.out("crosscheck-plan")
+@options.as_json
 def command(
-    robot: Path,
-    poses: Path | None,
-    rows: int | None,
-    reads: tuple[str, ...],
-    sigmas: tuple[str, ...],
-    lowest: float,
-    highest: float,
-    box: str | None,
-    figures: Path | None,
-    out: Path,
-    as_json: bool,
-) -> int:
+    robot: Path, poses: Path | None, rows: int | None, reads: tuple[str, ...],
+    sigmas: tuple[str, ...], lowest: float, highest: float, box: str | None,
+    figures: Path | None, out: Path, as_json: bool,
+) -> int:  # fmt: skip
     """Tell, before measuring, which effects the poses would reveal and distinguish.
 
     POSES.csv holds commands in the same format as a file of measurements; readings in it are
@@ -112,13 +85,13 @@ def command(
     from crosscheck.show.page import write_page
     from crosscheck.show.plan import print_plan
     from seecr import load_robot
+    from seecr.cli.arguments import check_places
     from seecr.files import json_text, staged, with_toml, write_text
 
     machine = load_robot(robot)
     room = box_of(box) if box else None
     if room is not None:
         check_places(room, machine)
-    limits = (lowest, highest)
     sigma = Sigma.parsed(sigmas)
     given = None if poses is None else load_commands(poses, machine, sigma=sigma)
     sigma = sigma if given is None else given.sigma
@@ -126,26 +99,23 @@ def command(
         check_own(out)
     sometimes = sometimes_written(out, poses)
     with staged(out, sometimes=sometimes, read=with_toml(poses)) as folder:
-        with progress_share("planning") as progress:
+        with options.progress_share("planning") as progress:
+            asked: dict[str, Any] = {"reads": reads, "limits": (lowest, highest), "box": room}
             commands = given or choose_poses(
-                machine, rows or 0, sigma=sigma, reads=reads, limits=limits, progress=progress,
-                box=room,
-            )  # fmt: skip
-            plan = make_plan(
-                machine, commands, sigma, progress, reads=reads, limits=limits, box=room
+                machine, rows or 0, sigma=sigma, progress=progress, **asked
             )
-        made = made_by(machine.source, poses)
+            plan = make_plan(machine, commands, sigma, progress, **asked)
+        made = options.made_by(machine.source, poses)
         status = 0 if plan.converged else 3
         files = write_plan(plan, folder, own=given is None)
-        text = json_text(
-            {"made": made, "exit_status": status, **plan.as_json(), "files": list(files)}
-        )
+        head = {"made": made, "exit_status": status}
+        text = json_text({**head, **plan.as_json(), "files": list(files)})
         write_text(folder / NAME, text + "\n")
-        with figures_in(figures):
+        with choices.figures_in(figures):
             write_page(plan, folder / "plan.html", made)
     if as_json:
         click.echo(text)
     else:
         print_plan(plan, out, files)
-        click.echo(after_plan(robot, poses or out / "poses.csv", sigmas))
+        click.echo(after_plan(Given(robot, [poses or out / "poses.csv"], sigmas=sigmas)))
     return status

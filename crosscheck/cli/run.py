@@ -8,78 +8,56 @@ from typing import TYPE_CHECKING
 
 import click
 
+from seecr.cli import options
 from seecr.cli.following import following
-from seecr.cli.options import (
-    FILE,
-    jobs_option,
-    json_option,
-    out_option,
-    progress_bar,
-    seed_option,
-)
-from seecr.parallel import processors
 
 if TYPE_CHECKING:
     from crosscheck import Case, CaseResult, Run, Thresholds
     from crosscheck.suite.effects import EffectCase
 
 
-@click.command(
-    short_help="Run the cross-check suite.",
-    epilog="""\b
-Examples:
-  crosscheck run
-  crosscheck run --case 'parallel-*' --out results
-  crosscheck run --robot my_robot.xml
-  crosscheck run --robot nominal.xml --mujoco-robot as_built.xml
-  crosscheck run --json > results.json
-""",
+@options.command(
+    "crosscheck run",
+    "crosscheck run --case 'parallel-*' --out results",
+    "crosscheck run --robot my_robot.xml",
+    "crosscheck run --robot nominal.xml --mujoco-robot as_built.xml",
+    "crosscheck run --json > results.json",
 )
-@click.option(
-    "--case",
-    "patterns",
+@options.option(
+    "--case NAME",
+    "Run only this case, or a pattern such as 'cogiro-*'; may be repeated. See --list.",
+    name="patterns",
     multiple=True,
-    metavar="NAME",
-    help="Run only this case, or a pattern such as 'cogiro-*'; may be repeated. See --list.",
 )
-@click.option("--list", "list_only", is_flag=True, help="List the cases and exit.")
-@click.option(
-    "--robot",
-    type=FILE,
-    metavar="FILE.xml",
-    help="Instead of the shipped robots: your own MJCF, along a sweep and at random poses.",
+@options.option("--list", "List the cases and exit.", name="list_only")
+@options.option(
+    "--robot FILE.xml",
+    "Instead of the shipped robots: your own MJCF, along a sweep and at random poses.",
 )
-@click.option(
-    "--mujoco-robot",
-    type=FILE,
-    metavar="FILE.xml",
-    help="With --robot: another MJCF for MuJoCo, to see what a difference between the two does.",
+@options.option(
+    "--mujoco-robot FILE.xml",
+    "With --robot: another MJCF for MuJoCo, to see what a difference between the two does.",
 )
-@click.option(
-    "--thresholds",
-    "thresholds_file",
-    type=FILE,
-    metavar="FILE.toml",
-    help="TOML with the allowed differences. Each run saves the file it used with its results: "
-    "copy and edit that.",
+@options.option(
+    "--thresholds FILE.toml",
+    "TOML with the allowed differences. Each run saves the file it used with its results: copy "
+    "and edit that.",
+    name="thresholds_file",
 )
-@seed_option
-@jobs_option
-@click.option("--no-recordings", is_flag=True, help="Do not write recordings (.rrd).")
-@out_option("crosscheck-results")
-@json_option
+@options.option("--seed N", "Seed of the random numbers.", options.WholeNumber(min=0), default=0)
+@options.option(
+    "--jobs N",
+    "Number of parallel processes.  [default: one per processor]",
+    options.WholeNumber(min=1),
+)
+@options.option("--no-recordings", "Do not write recordings (.rrd).")
+@options.out("crosscheck-results")
+@options.as_json
 def command(
-    patterns: tuple[str, ...],
-    list_only: bool,
-    robot: Path | None,
-    mujoco_robot: Path | None,
-    thresholds_file: Path | None,
-    seed: int,
-    jobs: int | None,
-    no_recordings: bool,
-    out: Path,
+    patterns: tuple[str, ...], list_only: bool, robot: Path | None, mujoco_robot: Path | None,
+    thresholds_file: Path | None, seed: int, jobs: int | None, no_recordings: bool, out: Path,
     as_json: bool,
-) -> int:
+) -> int:  # fmt: skip
     """Solve each pose with SEECR, settle it in MuJoCo, and compare the difference with thresholds.
 
     The shipped cases: DemoBot in the Cogiro and the parallel configuration, with Vectran cables and
@@ -121,7 +99,9 @@ def command(
     if list_only:
         _list(chosen)
         return 0
-    return _run(chosen, thresholds, seed, jobs or processors(), not no_recordings, out, as_json)
+    run = _run(chosen, thresholds, seed, jobs, not no_recordings, out)
+    _tell(run, out, not no_recordings, as_json)
+    return run.outcome.exit_status
 
 
 def _list(chosen: list[Case | EffectCase]) -> None:
@@ -135,52 +115,25 @@ def _list(chosen: list[Case | EffectCase]) -> None:
 
 
 def _run(
-    chosen: list[Case | EffectCase],
-    thresholds: Thresholds,
-    seed: int,
-    jobs: int,
-    recordings: bool,
-    out: Path,
-    as_json: bool,
-) -> int:
-    from crosscheck import write_run
+    chosen: list[Case | EffectCase], thresholds: Thresholds, seed: int, jobs: int | None,
+    recordings: bool, out: Path,
+) -> Run:  # fmt: skip
+    from crosscheck import run_suite, write_run
     from crosscheck.suite.write import FILE_NAME
     from seecr.files import staged
+    from seecr.parallel import processors
 
     # effects alone have no worst pose
     sometimes = [FILE_NAME, *(f"{case.name}.rrd" for case in chosen)]
     with staged(out, sometimes=sometimes) as folder:
-        record = partial(_record, folder=folder) if recordings else None
-        with progress_bar("compiling", sum(map(len, chosen))) as advance:
-            from crosscheck import run_suite
-
+        with options.progress_bar("compiling", sum(map(len, chosen))) as advance:
             run = run_suite(
-                chosen,
-                thresholds,
-                seed=seed,
-                jobs=jobs,
-                record=record,
+                chosen, thresholds, seed=seed, jobs=jobs or processors(),
+                record=partial(_record, folder=folder) if recordings else None,
                 progress=lambda result: advance(len(result), result.case.name),
-            )
+            )  # fmt: skip
         write_run(run, folder)
-    _tell(run, out, recordings, as_json)
-    return run.outcome.exit_status
-
-
-def _tell(run: Run, out: Path, recordings: bool, as_json: bool) -> None:
-    from crosscheck.suite.write import RESULTS
-
-    for note in run.notes:
-        click.echo(f"note: {note}", err=True)
-    if as_json:
-        click.echo((out / RESULTS).read_text(encoding="utf-8"), nl=False)
-    else:
-        from crosscheck.show.suite import print_run
-
-        print_run(run, out)
-        recorded = [result.case.name for result in run.results] if recordings else []
-        if recorded:
-            click.echo(following("rerun", out / f"{recorded[0]}.rrd"))
+    return run
 
 
 def _record(result: CaseResult, folder: Path) -> str:
@@ -190,3 +143,17 @@ def _record(result: CaseResult, folder: Path) -> str:
     name = f"{result.case.name}.rrd"
     write_case_recording(result, folder / name)
     return name
+
+
+def _tell(run: Run, out: Path, recordings: bool, as_json: bool) -> None:
+    from crosscheck.show.suite import print_run
+    from crosscheck.suite.write import RESULTS
+
+    for note in run.notes:
+        click.echo(f"note: {note}", err=True)
+    if as_json:
+        click.echo((out / RESULTS).read_text(encoding="utf-8"), nl=False)
+        return
+    print_run(run, out)
+    if recordings and run.results:
+        click.echo(following("rerun", out / f"{run.results[0].case.name}.rrd"))

@@ -3,88 +3,63 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 from click.core import ParameterSource
 
-from crosscheck.cli.choices import sigma_option
+from crosscheck.cli import choices
+from seecr.cli import options
 from seecr.cli.following import following, typed
-from seecr.cli.options import FILE, WholeNumber, json_option, made_by, out_option, progress_bar
 
 if TYPE_CHECKING:
     from crosscheck import Twin
     from seecr.files import Made
 
 
-@click.command(
-    short_help="Make measurements with a hidden effect.",
-    epilog="""\b
-Examples:
-  crosscheck twin my_robot.xml --hide 7 --out case7
-  crosscheck diagnose case7/robot.xml case7/measured.csv
-  crosscheck twin --open case7
-  crosscheck twin my_robot.xml --hide 8 --poses my_poses.csv --out case8
-""",
+@options.command(
+    "crosscheck twin my_robot.xml --hide 7 --out case7",
+    "crosscheck diagnose case7/robot.xml case7/measured.csv",
+    "crosscheck twin --open case7",
+    "crosscheck twin my_robot.xml --hide 8 --poses my_poses.csv --out case8",
 )
-@click.argument("robot", type=FILE, metavar="ROBOT.xml", required=False)
-@click.option(
-    "--hide",
+@click.argument("robot", type=options.FILE, metavar="ROBOT.xml", required=False)
+@options.option(
+    "--hide SEED",
+    "Seed from which the hidden effects, their sizes and the noise are drawn; the same seed gives "
+    "the same case.",
+    options.WholeNumber(min=0),
     "seed",
-    type=WholeNumber(min=0),
-    metavar="SEED",
-    help=(
-        "Seed from which the hidden effects, their sizes and the noise are drawn; the same seed "
-        "gives the same case."
-    ),
 )
-@click.option(
-    "--effects",
+@options.option(
+    "--effects K",
+    "How many effects to hide.  [default: none, one or two, drawn from the seed]",
+    options.WholeNumber(min=0),
     "count",
-    type=WholeNumber(min=0),
-    metavar="K",
-    help="How many effects to hide.  [default: none, one or two, drawn from the seed]",
 )
-@click.option(
-    "--effect",
-    "names",
+@options.option(
+    "--effect NAME",
+    "Hide this effect; only its size is drawn. May be repeated.",
+    name="names",
     multiple=True,
-    metavar="NAME",
-    help="Hide this effect; only its size is drawn. May be repeated.",
 )
-@click.option("--tensions", is_flag=True, help="Also record tensions.")
-@click.option(
-    "--poses",
-    type=FILE,
-    metavar="POSES.csv",
-    help="Your own commands, with loads and way points, instead of the sweeps.",
+@options.option("--tensions", "Also record tensions.")
+@options.option(
+    "--poses POSES.csv", "Your own commands, with loads and way points, instead of the sweeps."
 )
-@sigma_option
-@click.option(
-    "--open",
-    "opened",
-    type=FILE,
-    metavar="FILE",
-    help="Show what a case hides: its answer.sealed, or its folder.",
+@choices.sigma
+@options.option(
+    "--open FILE", "Show what a case hides: its answer.sealed, or its folder.", name="opened"
 )
-@out_option("twin")
-@json_option
+@options.out("twin")
+@options.as_json
 @click.pass_context
 def command(
-    context: click.Context,
-    robot: Path | None,
-    seed: int | None,
-    count: int | None,
-    names: tuple[str, ...],
-    tensions: bool,
-    poses: Path | None,
-    sigmas: tuple[str, ...],
-    opened: Path | None,
-    out: Path,
-    as_json: bool,
-) -> int:
+    context: click.Context, robot: Path | None, seed: int | None, count: int | None,
+    names: tuple[str, ...], tensions: bool, poses: Path | None, sigmas: tuple[str, ...],
+    opened: Path | None, out: Path, as_json: bool,
+) -> int:  # fmt: skip
     """Simulate measurements of a robot with hidden effects, with MuJoCo as the truth.
 
     The platform is commanded along sweeps to and fro, at two heights and across, and around a
@@ -102,8 +77,14 @@ def command(
       answer.sealed    what was hidden; no other command opens it
     """
     if opened is not None:
-        named = context.get_parameter_source("out") is not ParameterSource.DEFAULT
-        _check_alone(robot, seed, count, names, tensions, poses, sigmas, named)
+        given = {
+            name for name in context.params
+            if context.get_parameter_source(name) is not ParameterSource.DEFAULT
+        }  # fmt: skip
+        if given - {"opened", "as_json"}:
+            raise click.UsageError(
+                "--open shows an existing case; leave out all other options but --json"
+            )
         return _open(opened, as_json)
     if robot is None or seed is None:
         raise click.UsageError("expected ROBOT.xml and --hide SEED, or --open FILE")
@@ -116,29 +97,15 @@ def command(
     noise = Sigma.parsed(sigmas)
     commands = load_commands(poses, robot, sigma=noise) if poses is not None else None
     # whatever is hidden, the bar shows the same: rows of one kind, done or not
-    with progress_bar("measuring", 1) as advance:
+    with options.progress_bar("measuring", 1) as advance:
         twin = make_twin(
-            robot,
-            seed,
-            effects=names or None,
-            n_effects=count,
-            out=out,
-            tensions=tensions,
-            poses=commands,
-            sigma=commands.sigma if commands else noise,
+            robot, seed, effects=names or None, n_effects=count, out=out, tensions=tensions,
+            poses=commands, sigma=commands.sigma if commands else noise,
             progress=lambda rows, now: advance(0, "measuring"),
-        )
+        )  # fmt: skip
         advance(1, "measured")
-    _tell(twin, out, made_by(twin.robot.source, poses) if as_json else None)
+    _tell(twin, out, options.made_by(twin.robot.source, poses) if as_json else None)
     return 0
-
-
-def _check_alone(*others: object) -> None:
-    """That nothing is asked to be made beside what is opened."""
-    if any(other is not None and other is not False and other != () for other in others):
-        raise click.UsageError(
-            "--open shows an existing case; leave out all other options but --json"
-        )
 
 
 def _tell(twin: Twin, out: Path, made: Made | None) -> None:
@@ -155,22 +122,14 @@ def _tell(twin: Twin, out: Path, made: Made | None) -> None:
         click.echo(json_text(document, indent=2))
         return
     sigma = twin.answer.sigma
-    click.echo(
-        f"{counted(twin.measured.n_rows, 'row')} of {twin.robot.name} in "
-        f"{counted(len(twin.measured.runs), 'run')}; "
-        f"noise {', '.join(_noises(sigma))}"
-    )
+    noise = f"{1e3 * sigma['position_m']:.3g} mm, {math.degrees(sigma['orientation_rad']):.2g} deg"
+    if "tension_N" in sigma:
+        noise += f", {sigma['tension_N']:.2g} N"
+    rows, runs = counted(twin.measured.n_rows, "row"), counted(len(twin.measured.runs), "run")
+    click.echo(f"{rows} of {twin.robot.name} in {runs}; noise {noise}")
     click.echo(f"written to {out}: {', '.join(files)}")
     click.echo(f"to see what is hidden: {typed('crosscheck', 'twin', '--open', out)}")
     click.echo(following("crosscheck", "diagnose", out / "robot.xml", out / "measured.csv"))
-
-
-def _noises(sigma: Mapping[str, float]) -> Iterator[str]:
-    """The noise of each kind of reading."""
-    yield f"{1e3 * sigma['position_m']:.3g} mm"
-    yield f"{math.degrees(sigma['orientation_rad']):.2g} deg"
-    if "tension_N" in sigma:
-        yield f"{sigma['tension_N']:.2g} N"
 
 
 def _open(path: Path, as_json: bool) -> int:
@@ -182,7 +141,7 @@ def _open(path: Path, as_json: bool) -> int:
     answer = unseal(path)
     if as_json:
         files = [path / name for name in FILES] if path.is_dir() else [path]
-        click.echo(json_text({"made": made_by(*files), **answer.as_json()}, indent=2))
+        click.echo(json_text({"made": options.made_by(*files), **answer.as_json()}, indent=2))
         return 0
     if not answer.hidden:
         click.echo("nothing was hidden")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from seecr.cli.group import group_of
+from seecr.cli.group import LazyGroup
 
 # Command, module in seecr.cli that holds it as `command`, and its line in --help.
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -13,13 +13,9 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "export": ("export", "Write a calibrated robot as MJCF."),
 }
 
-
-@group_of("seecr.cli", COMMANDS)
-def main() -> None:
-    """Statics of cable-driven parallel robots with elastic cables: where the platform rests.
-
-    \b
-    ROBOT is an MJCF file, or the name of a shipped robot (demobot_cogiro, planar_vertical ...).
-    Exit status: 0 all well, 1 a threshold exceeded, 2 bad input or usage,
-    3 a solve did not converge.
-    """
+main = LazyGroup(
+    "seecr.cli",
+    COMMANDS,
+    "Statics of cable-driven parallel robots with elastic cables: where the platform rests.",
+    "ROBOT",
+)

@@ -1,141 +1,33 @@
-"""What the commands of seecr are given: a robot, a model, numbers that may be negative."""
+"""What the commands of seecr are given: a robot, a model, poses, axes of a grid.
+
+It takes a while to import: commands do so when they are called, not when their help is shown.
+"""
 
 from __future__ import annotations
 
-import difflib
-import re
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any
 
-import click
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from seecr.cli.options import FILE, Number
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
-
-    from seecr import Commands, Model, Robot, Solution
-
-F = TypeVar("F", bound=Callable[..., Any])
-
-# A number below zero, or an axis of a grid that begins with one.
-_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?(:.*)?")
-
+from seecr import Commands, InputError, Model, Robot, Solution, load_model, load_robot
+from seecr.columns.commands import read_commands
+from seecr.columns.plausible import ABSURD, scalar_last
+from seecr.counted import counted
+from seecr.description.mjcf import CABLES
+from seecr.effects.base import unfed
+from seecr.equilibrium.solving import strained, strained_rows
+from seecr.pose import NORM_TOLERANCE
+from seecr.statics.starts import commanded_poses
+from seecr.workspace.maps import evenly
 
 _LEAST_EA, _MOST_EA = 1e-3, 1e12  # [N]: a steel rope as thick as an arm has 1e9
 _MOST_POSES = 10_000_000  # of a grid or line; more would take days, and all memory
-
-
-class NumbersCommand(click.Command):
-    """A command whose negative numbers are values, not options."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Let negative numbers pass as arguments; refuse other unknown options as ever."""
-        known = {name for p in self.get_params(ctx) for name in (*p.opts, *p.secondary_opts)}
-        for arg in args[: args.index("--") if "--" in args else None]:
-            name = arg.partition("=")[0]
-            is_option = len(arg) > 1 and arg.startswith("-") and not _NUMBER.fullmatch(arg)
-            if is_option and name not in known:
-                near = difflib.get_close_matches(name, known, n=3)
-                raise click.NoSuchOption(name, possibilities=near, ctx=ctx)
-        ctx.ignore_unknown_options = True
-        return super().parse_args(ctx, args)
-
-
-def robot_options(function: F) -> F:
-    """``ROBOT``, ``--cable`` and ``--model``, given as ``robot``, ``cable`` and ``model``."""
-    function = click.option(
-        "--model",
-        type=FILE,
-        metavar="M.toml",
-        help="Model file with the robot's effects.  [default: plain SEECR]",
-    )(function)
-    function = click.option(
-        "--cable",
-        metavar="NAME|N",
-        help=(
-            "k_c = E S of all cables, instead of that in the robot's file: vectran, fishing, or a "
-            "number [N]."
-        ),
-    )(function)
-    return click.argument("robot", type=FILE, metavar="ROBOT")(function)
-
-
-def limit_options(function: F) -> F:
-    """``--lowest`` and ``--highest``, given as ``lowest`` and ``highest`` [N], None without."""
-    function = click.option(
-        "--highest", type=Number(), metavar="N", help="Highest allowed tension of every cable [N]."
-    )(function)
-    return click.option(
-        "--lowest",
-        type=Number(),
-        default=0.0,
-        show_default=True,
-        metavar="N",
-        help="Lowest allowed tension of every cable [N].",
-    )(function)
-
-
-def turned_option(of: str) -> Callable[[F], F]:
-    """``--turned``, the orientation ``of`` what it is said to be of, given as ``turned``."""
-    return click.option(
-        "--turned",
-        nargs=4,
-        type=Number(),
-        metavar="QW QX QY QZ",
-        callback=_unit_turn,
-        help=f"Orientation of {of}.  [default: that of the reference pose]",
-    )
-
-
-def _unit_turn(
-    _ctx: click.Context, _option: click.Parameter, value: tuple[float, ...] | None
-) -> tuple[float, ...] | None:
-    """``--turned`` as given, if it is a rotation."""
-    if value is not None:
-        _check_unit("--turned", value)
-    return value
-
-
-def _check_unit(name: str, turn: Sequence[float]) -> None:
-    """That a quaternion is of unit norm, to the rounding of what is typed.
-
-    Raises:
-        InputError: it is not.
-    """
-    from seecr import InputError
-    from seecr.pose import NORM_TOLERANCE
-
-    norm = sum(part * part for part in turn) ** 0.5
-    if not abs(norm - 1.0) <= NORM_TOLERANCE:
-        raise InputError(
-            f"{name}: expected a unit quaternion, scalar first, got one of norm {norm:.4g}"
-        )
-
-
-_FIGURES = ("png", "svg")
-
-
-def files_of_pictures(name: str) -> list[str]:
-    """All files of that name that ``--figure`` and ``--no-recording`` write or leave out."""
-    return [f"{name}.{kind}" for kind in (*_FIGURES, "rrd")]
-
-
-def picture_options(function: F) -> F:
-    """``--figure`` and ``--no-recording``, given as ``figure`` and ``no_recording``."""
-    function = click.option(
-        "--no-recording", is_flag=True, help="Do not write a recording (.rrd)."
-    )(function)
-    return click.option(
-        "--figure",
-        type=click.Choice([*_FIGURES, "none"]),
-        default="png",
-        show_default=True,
-        help="File type of the figure.",
-    )(function)
+_COUNT = 24  # poses of --line
 
 
 def robot_at(given: Path, cable: str | None = None) -> Robot:
@@ -144,11 +36,6 @@ def robot_at(given: Path, cable: str | None = None) -> Robot:
     Raises:
         RobotError, InputError: no such file and no such name, no such cable.
     """
-    import numpy as np
-
-    from seecr import InputError, load_robot
-    from seecr.description.mjcf import CABLES
-
     robot = load_robot(given)
     if cable is None:
         return robot
@@ -165,13 +52,16 @@ def robot_at(given: Path, cable: str | None = None) -> Robot:
 
 
 def model_at(given: Path | None, robot: Robot) -> Model | None:
-    """The model of a file, or none."""
-    from seecr import load_model
-
+    """The model of a file, or none; it notes where values for each file or run are not used."""
     if given is None:
         return None
     model = load_model(given, robot)
-    return replace(model, notes=(*model.notes, *_usual(model)))
+    kinds = [(term.name, term.own.kind) for term in model.terms if term.own is not None]
+    usual = [
+        f"{name} has separate values for each {kind}: the values for no particular {kind} are used"
+        for name, kind in kinds
+    ]
+    return replace(model, notes=(*model.notes, *usual))
 
 
 def notes_of(
@@ -183,14 +73,9 @@ def notes_of(
         model: of the robot. solution: of the commands.
         commands: as given; None for poses without times and temperatures.
     """
-    from seecr import Commands
-    from seecr.columns.plausible import scalar_last
-    from seecr.effects.base import unfed
-    from seecr.equilibrium.solving import strained, strained_rows
-
     robot = solution.robot
     much = (*strained(robot), *strained_rows(solution))
-    slips = (*outside(robot, solution.command), *scalar_last(robot, solution.command[:, 3:]))
+    slips = (*_outside(robot, solution.command), *scalar_last(robot, solution.command[:, 3:]))
     said = (*robot.notes, *much, *slips)
     if model is None:
         return said
@@ -198,12 +83,8 @@ def notes_of(
     return (*said, *model.notes, *unfed(model.terms.effects, given), *model.beyond(solution))
 
 
-def outside(robot: Robot, commands: NDArray[np.float64]) -> tuple[str, ...]:
+def _outside(robot: Robot, commands: NDArray[np.float64]) -> tuple[str, ...]:
     """That commands (n, 7) lie outside the frame, where some do: most likely a slip."""
-    import numpy as np
-
-    from seecr.counted import counted
-
     away = np.linalg.norm(commands[:, :3] - robot.reference_pose[:3], axis=1)
     out = int(np.sum(away > robot.reach))
     if out == 0:
@@ -214,31 +95,19 @@ def outside(robot: Robot, commands: NDArray[np.float64]) -> tuple[str, ...]:
     )
 
 
-def _usual(model: Model) -> list[str]:
-    """That values of no file or run in particular are used, where there are others."""
-    own = [(term.name, term.own.kind) for term in model.terms if term.own is not None]
-    return [
-        f"{name} has separate values for each {kind}: the values for no particular {kind} are used"
-        for name, kind in own
-    ]
-
-
 def pose_of(coordinates: Sequence[float], robot: Robot) -> list[float]:
     """A pose (7,) from X Y Z or X Y Z QW QX QY QZ; turned as the reference pose without the last.
 
     Raises:
         InputError: another number of numbers, or a position far outside the robot.
     """
-    from seecr import InputError
-    from seecr.counted import counted
-
     if len(coordinates) not in (3, 7):
         raise InputError(
             f"expected X Y Z or X Y Z QW QX QY QZ, got {counted(len(coordinates), 'number')}"
         )
     check_places(coordinates[:3], robot)
     if len(coordinates) == 7:
-        _check_unit("QW QX QY QZ", coordinates[3:])
+        check_unit("QW QX QY QZ", coordinates[3:])
     return [*coordinates[:3], *(coordinates[3:] or robot.reference_pose[3:].tolist())]
 
 
@@ -248,11 +117,6 @@ def check_places(places: ArrayLike, robot: Robot) -> None:
     Raises:
         InputError: they are in another unit, which a solve would answer after minutes, if at all.
     """
-    import numpy as np
-
-    from seecr import InputError
-    from seecr.columns.plausible import ABSURD
-
     array = np.asarray(places, float).reshape(-1, 3)
     far = ~(np.abs(array - robot.reference_pose[:3]) <= ABSURD * robot.reach)
     if np.any(far):
@@ -263,14 +127,12 @@ def check_places(places: ArrayLike, robot: Robot) -> None:
         )
 
 
-def check_count(option: str, poses: int) -> None:
+def _check_count(option: str, poses: int) -> None:
     """That there are not more poses than can be solved.
 
     Raises:
         InputError: there are.
     """
-    from seecr import InputError
-
     if poses > _MOST_POSES:
         raise InputError(f"{option}: expected at most {_MOST_POSES:.0e} poses, got {poses:.1e}")
 
@@ -283,13 +145,8 @@ def axes_of(
     Raises:
         InputError: one that is none, or far outside the robot; more poses than can be solved.
     """
-    import math
-
-    import numpy as np
-
     axes = [_axis_of(text) for text in texts]
-    total = math.prod(len(axis) for axis in axes)
-    check_count("--grid", total)
+    _check_count("--grid", math.prod(map(len, axes)))
     places = np.array([[axis[k] for axis in axes] for k in (0, -1)])
     check_places(places if directions is None else places @ directions, robot)
     return axes
@@ -301,10 +158,6 @@ def _axis_of(text: str) -> NDArray[np.float64]:
     Raises:
         InputError: it is neither.
     """
-    import numpy as np
-
-    from seecr import InputError
-
     parts = text.split(":")
     try:
         if len(parts) == 1:
@@ -317,6 +170,66 @@ def _axis_of(text: str) -> NDArray[np.float64]:
             f"--grid: expected FIRST:LAST:COUNT with a count above zero, or one number [m], "
             f"got {text!r}"
         ) from None
-    from seecr.workspace.maps import evenly  # takes a while to import
-
     return evenly(first, last, min(count, _MOST_POSES + 1))
+
+
+def check_unit(name: str, turn: Sequence[float]) -> None:
+    """That a quaternion is of unit norm, to the rounding of what is typed.
+
+    Raises:
+        InputError: it is not.
+    """
+    norm = sum(part * part for part in turn) ** 0.5
+    if not abs(norm - 1.0) <= NORM_TOLERANCE:
+        raise InputError(
+            f"{name}: expected a unit quaternion, scalar first, got one of norm {norm:.4g}"
+        )
+
+
+def commands_of(
+    robot: Robot, poses: Path | None, line: tuple[float, ...] | None, count: int | None,
+    grid: tuple[str, ...] | None, turned: tuple[float, ...] | None,
+) -> tuple[
+    Commands, Mapping[str, Sequence[Any]], tuple[str, ...], NDArray[np.float64] | None,
+    Sequence[Any] | None,
+]:  # fmt: skip
+    """The commands of a file, or along ``--line``, or on a ``--grid``.
+
+    Returns:
+        commands, further columns of their file, notes on it, the poses that lengths are for, and
+        which commands follow on each other: those of a run, or of a column of the grid.
+
+    Raises:
+        InputError: several of these ways, or none; options of another way.
+    """
+    ways = {"POSES.csv": poses, "--line": line, "--grid": grid}
+    given = [name for name, value in ways.items() if value]
+    if len(given) != 1:
+        got = " and ".join(given) or "none"
+        raise InputError(f"expected one of {', '.join(ways)}; got {got}")
+    if poses is not None and turned:
+        raise InputError(
+            "--turned applies to --line and --grid; commands of a file are turned by columns such "
+            f"as cmd_rx_deg; leave it out, or add them to {poses}"
+        )
+    if count and not line:
+        raise InputError(
+            f"--count applies to --line, got it together with {poses or '--grid'}, which sets the "
+            "number of poses; leave it out"
+        )
+    if poses is not None:
+        read = read_commands(poses, robot)
+        return read.commands, read.conditions, read.notes, read.wanted, read.conditions.get("run")
+    runs = None
+    if line:
+        check_places(line, robot)
+        _check_count("--count", count or _COUNT)
+        places = np.linspace(line[:3], line[3:], count or _COUNT)
+    else:
+        axes = axes_of(grid or (), robot)
+        places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        column = next((len(axis) for axis in reversed(axes) if len(axis) > 1), 1)
+        runs = [k // column for k in range(len(places))]
+    turn = np.tile(turned or robot.reference_pose[3:], (len(places), 1))
+    there = Commands(commanded_poses(np.column_stack([places, turn])))
+    return there, {}, ("Poses are counted from 0, as the rows of sweep.json are.",), None, runs

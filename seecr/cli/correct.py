@@ -8,16 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from seecr.cli.arguments import (
-    NumbersCommand,
-    limit_options,
-    model_at,
-    notes_of,
-    robot_at,
-    robot_options,
-)
+from seecr.cli import options
 from seecr.cli.following import following, given_with, mapping
-from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
 
 if TYPE_CHECKING:
     from seecr import Model, Robot
@@ -27,57 +19,35 @@ if TYPE_CHECKING:
 _SEEN = 1e-6
 
 
-@click.command(
-    cls=NumbersCommand,
-    short_help="Find the commands that bring the platform to the wanted poses.",
-    epilog="""\b
-Examples:
-  seecr correct robot.xml poses.csv --model model.toml --out corrected
-  seecr correct robot.xml poses.csv --lowest 1 --highest 50 --aim middle
-  seecr sweep robot.xml corrected/corrected.csv --model model.toml
-""",
+@options.command(
+    "seecr correct robot.xml poses.csv --model model.toml --out corrected",
+    "seecr correct robot.xml poses.csv --lowest 1 --highest 50 --aim middle",
+    "seecr sweep robot.xml corrected/corrected.csv --model model.toml",
+    cls=options.NumbersCommand,
 )
-@robot_options
-@click.argument("poses", type=FILE, metavar="POSES.csv")
-@limit_options
-@click.option(
-    "--aim",
+@options.robot
+@click.argument("poses", type=options.FILE, metavar="POSES.csv")
+@options.limits
+@options.option(
+    "--aim minimum|middle|N,N,...",
+    "Where tensions should be within their limits, or the wanted tensions: one, or one per cable. "
+    "The nearest ones that balance are taken: with the middle Pott's closed form, wherever that "
+    "is within the limits.",
     default="minimum",
-    show_default=True,
-    metavar="minimum|middle|N,N,...",
-    help=(
-        "Where tensions should be within their limits, or the wanted tensions: one, or one per "
-        "cable. The nearest ones that balance are taken: with the middle Pott's closed form, "
-        "wherever that is within the limits."
-    ),
 )
-@click.option(
-    "--prefer",
-    type=click.Choice(["pose", "position"]),
-    default="pose",
-    show_default=True,
-    help="What to keep of a pose that cannot be held.",
+@options.option(
+    "--prefer [pose|position]", "What to keep of a pose that cannot be held.", default="pose"
 )
-@click.option(
+@options.option(
     "--as-read",
-    is_flag=True,
-    help="Take the poses as what the model's tracker should read, not as poses in the base frame.",
+    "Take the poses as what the model's tracker should read, not as poses in the base frame.",
 )
-@out_option("seecr-correction")
-@json_option
+@options.out("seecr-correction")
+@options.as_json
 def command(
-    robot: Path,
-    poses: Path,
-    cable: str | None,
-    model: Path | None,
-    lowest: float,
-    highest: float | None,
-    aim: str,
-    prefer: str,
-    as_read: bool,
-    out: Path,
-    as_json: bool,
-) -> int:
+    robot: Path, poses: Path, cable: str | None, model: Path | None, lowest: float,
+    highest: float | None, aim: str, prefer: str, as_read: bool, out: Path, as_json: bool,
+) -> int:  # fmt: skip
     """Find the commands that bring the platform to rest at the poses of a file.
 
     ROBOT is an MJCF file or the name of a shipped robot, POSES.csv a list of commands: the wanted
@@ -107,6 +77,7 @@ def command(
     3 a pose without an answer, one at which the platform does not come to rest, or none reached.
     """  # fmt: skip
     from seecr import InputFileError, correct, kept_chance
+    from seecr.cli.arguments import model_at, notes_of, robot_at
     from seecr.columns.commands import read_commands
     from seecr.files import check_replaces, json_text, staged, with_toml, write_texts
     from seecr.show.batch_words import chance_lines, turned_words
@@ -129,45 +100,37 @@ def command(
     commands_of_it = ("corrected.csv", "corrected.toml")
     check_replaces(out, commands_of_it, "correction.json", read=with_toml(poses))
     with staged(out, sometimes=commands_of_it, read=with_toml(poses)) as folder:
-        with progress_share("correcting") as tell:
+        with options.progress_share("correcting") as tell:
             found = correct(
                 machine, wanted.commands, effects=own or (), lowest=lowest, highest=limits,
                 aim=near, prefer=prefer, any_orientation=turns,
             )  # fmt: skip
             within = {"lowest": lowest, "highest": limits}
+            kept = None
             if own is not None:
                 tell("chances", 0.8)
-            kept = None if own is None else kept_chance(machine, found.commands, own, **within)
+                kept = kept_chance(machine, found.commands, own, **within)
             tell("corrected", 1.0)
         status = 0 if found.stays.all() and found.reached.any() else 3
         told = replace(found.solution, line=found.commands.line)
         notes = [*notes_of(own, told, wanted.commands), *wanted.notes, *tracker]
         if turns and found.reached.any():
             notes.append(turned_words(found))
-        made = made_by(machine.source, poses, model)
-        document = {
-            "made": made, "exit_status": status, "notes": notes, **found.as_json(kept)
-        }  # fmt: skip
-        files = {"correction.json": json_text(document) + "\n"}
+        made = options.made_by(machine.source, poses, model)
+        told_of_it = {"made": made, "exit_status": status, "notes": notes}
+        text = json_text({**told_of_it, **found.as_json(kept)})
+        files = {"correction.json": text + "\n"}
         if found.found.any():  # a list without commands is none that anything reads
             texts = corrected_csv(found, wanted), corrected_toml(wanted)
             files |= dict(zip(commands_of_it, texts, strict=True))
         write_texts({folder / name: text for name, text in files.items()})
-    if as_json:
-        click.echo(json_text(document))
-        return status
     then = mapping(machine, robot, cable, own)  # where there is something to hold
     if found.found.any():
         given = given_with(cable, model)
         then = following("seecr", "sweep", robot, out / "corrected.csv", *given)
-    for line in [
-        *notes,
-        *found.lines(),
-        *chance_lines(found, kept, aim == "minimum", highest is not None),
-        f"Results in {out}/",
-        then,
-    ]:
-        click.echo(line)
+    chances = chance_lines(found, kept, aim == "minimum", highest is not None)
+    lines = [*notes, *found.lines(), *chances, f"Results in {out}/", then]
+    click.echo(text if as_json else "\n".join(lines))
     return status
 
 

@@ -6,40 +6,24 @@ from pathlib import Path
 
 import click
 
-from seecr.cli.arguments import (
-    NumbersCommand,
-    model_at,
-    pose_of,
-    robot_at,
-    robot_options,
-)
+from seecr.cli import options
 from seecr.cli.following import following
-from seecr.cli.options import FILE, Number, json_option, made_by
 
 
-@click.command(
-    cls=NumbersCommand,
-    short_help="Write a calibrated robot as MJCF.",
-    epilog="""\b
-Examples:
-  seecr export robot.xml calibrated.xml --model model.toml
-  seecr export robot.xml calibrated.xml 0.3 0.2 0.15 --model model.toml
-""",
+@options.command(
+    "seecr export robot.xml calibrated.xml --model model.toml",
+    "seecr export robot.xml calibrated.xml 0.3 0.2 0.15 --model model.toml",
+    cls=options.NumbersCommand,
 )
-@robot_options
-@click.argument("out", type=FILE, metavar="OUT.xml")
-@click.argument("coordinates", nargs=-1, type=Number(), metavar="[X Y Z [QW QX QY QZ]]")
-@click.option("--out", "folder", type=FILE, metavar="DIR", help="Write OUT.xml into this folder.")
-@json_option
+@options.robot
+@click.argument("out", type=options.FILE, metavar="OUT.xml")
+@click.argument("coordinates", nargs=-1, type=options.Number(), metavar="[X Y Z [QW QX QY QZ]]")
+@options.option("--out DIR", "Write OUT.xml into this folder.", name="folder")
+@options.as_json
 def command(
-    robot: Path,
-    out: Path,
-    coordinates: tuple[float, ...],
-    cable: str | None,
-    model: Path | None,
-    folder: Path | None,
-    as_json: bool,
-) -> int:
+    robot: Path, out: Path, coordinates: tuple[float, ...], cable: str | None, model: Path | None,
+    folder: Path | None, as_json: bool,
+) -> int:  # fmt: skip
     """Write a robot with the effects of its model as MJCF, as far as MJCF can express them.
 
     OUT.xml is a robot's description, which every command reads: given the same rest lengths, MuJoCo
@@ -52,6 +36,8 @@ def command(
     Exit status: 0 all well, 2 bad input, 3 no equilibrium at the pose to export at.
     """
     from seecr import InputError, export
+    from seecr.cli.arguments import model_at, pose_of, robot_at
+    from seecr.columns.plausible import scalar_last
     from seecr.files import check_writable, json_text, write_texts
 
     machine = robot_at(robot, cable)
@@ -73,23 +59,18 @@ def command(
     out.parent.mkdir(parents=True, exist_ok=True)
     files = {out: found.text} | ({beside: found.mujoco_text} if found.mujoco_text else {})
     write_texts(files, "cannot write the MJCF")
-    from seecr.columns.plausible import scalar_last
-
     slip = scalar_last(machine, coordinates[3:])
     notes = [*machine.notes, *(own.notes if own else ()), *slip]
     if beside not in files and beside.is_file():
         notes.append(_without(beside))
-    if as_json:
-        document = {
-            "made": made_by(machine.source, model), "exit_status": 0, "notes": notes,
-            "files": [str(path) for path in files], **found.as_json(),
-        }  # fmt: skip
-        click.echo(json_text(document))
-        return 0
+    document = {
+        "made": options.made_by(machine.source, model), "exit_status": 0, "notes": notes,
+        "files": [str(path) for path in files], **found.as_json(),
+    }  # fmt: skip
     place = [f"{value + 0.0:g}" for value in coordinates or machine.reference_pose[:3]]
     then = following("seecr", "pose", out, *place)
-    for line in [*notes, *found.lines(out.name, beside.name), then]:
-        click.echo(line)
+    lines = [*notes, *found.lines(out.name, beside.name), then]
+    click.echo(json_text(document) if as_json else "\n".join(lines))
     return 0
 
 

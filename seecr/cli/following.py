@@ -12,13 +12,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from seecr import Commands, Model, Robot, Solution
 
-Words = tuple[object, ...]
-
 STDIN = "/dev/stdin"
-"""Standard input, as a path."""
-
-# Stands for a file that came through a pipe.
-_SAVED = "INPUT"
+_SAVED = "INPUT"  # stands for a file that came through a pipe
 
 
 def following(*words: object) -> str:
@@ -56,7 +51,7 @@ def _reached(program: str) -> str:
     return str(beside) if is_ours and not found and shutil.which(beside) else program
 
 
-def given_with(cable: str | None, model: Path | None) -> Words:
+def given_with(cable: str | None, model: Path | None) -> tuple[object, ...]:
     """Options that the next command needs too."""
     cables = () if cable is None else ("--cable", cable)
     return cables if model is None else (*cables, "--model", model)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import gc
-import inspect
 import signal
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from importlib import import_module
 from itertools import pairwise
 from typing import Any, TypeAlias
@@ -21,36 +20,42 @@ CommandTable: TypeAlias = Mapping[str, tuple[str, str]]
 BAD_INPUT = 2
 ARGUMENTS = "seecr.arguments"
 """In a context's ``meta``: what the command line was called with, a list of words."""
+_HELP = """\b
+{} is an MJCF file, or the name of a shipped robot (demobot_cogiro, planar_vertical ...).
+Exit status: 0 all well, 1 a threshold exceeded, 2 bad input or usage,
+3 a solve did not converge."""
 # As a shell counts what SIGINT, SIGPIPE and SIGTERM end.
 _INTERRUPTED, _CUT_OFF, _ENDED = 130, 141, 143
 
 
 class LazyGroup(click.Group):
-    """A group that imports a command when it is called, and ends bad input in one line.
+    """A command line that imports a command when it is called, and ends bad input in one line.
 
     Args:
-        package: where the commands' modules are; each holds its own as ``command``.
+        package: where the commands' modules are, in the package that the command is called as; each
+            holds its own as ``command``.
         table: of each command its module and its line in ``--help``, in the order of the help.
+        said: what the commands are for. robot: how their help calls the robot's file.
     """
 
-    def __init__(self, *args: Any, package: str, table: CommandTable, **extra: Any) -> None:
-        super().__init__(*args, **extra)
+    def __init__(self, package: str, table: CommandTable, said: str, robot: str) -> None:
+        name = package.partition(".")[0]
+        super().__init__(
+            name,
+            callback=click.pass_context(_show_help),
+            help=f"{said}\n\n{_HELP.format(robot)}",
+            invoke_without_command=True,
+            context_settings={"help_option_names": ["-h", "--help"]},
+            epilog=f"'{name} COMMAND --help' shows a command's options and examples.",
+        )
+        click.version_option(__version__, prog_name=name)(self)
         self.package, self.table = package, table
-
-    def make_context(
-        self, info_name: str | None, args: list[str], parent: click.Context | None = None,
-        **extra: Any,
-    ) -> click.Context:  # fmt: skip
-        """A context that remembers what the command line was called with."""
-        given = list(args)
-        ctx = super().make_context(info_name, args, parent, **extra)
-        ctx.meta[ARGUMENTS] = given
-        return ctx
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """The command and its words, none of them empty; no option for one file has two."""
+        ctx.meta[ARGUMENTS] = list(args)
         name, command, words = super().resolve_command(ctx, args)
         _refuse_empty(words, ctx)
         if command is not None:
@@ -65,8 +70,9 @@ class LazyGroup(click.Group):
         """The command, imported."""
         if cmd_name not in self.table:
             return None
-        module = import_module(f"{self.package}.{self.table[cmd_name][0]}")
-        command: click.Command = module.command
+        module, line = self.table[cmd_name]
+        command: click.Command = import_module(f"{self.package}.{module}").command
+        command.short_help = line  # which completion in a shell shows
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -98,14 +104,11 @@ class LazyGroup(click.Group):
         sys.exit(status if isinstance(status, int) else 0)
 
     def _tell_compiling(self) -> None:
-        name = self.package.partition(".")[0]
-        click.echo(
-            (f"{name}: compiling the solver, only this first time; it takes up to a minute"),
-            err=True,
-        )
+        text = "compiling the solver, only this first time; it takes up to a minute"
+        click.echo(f"{self.name}: {text}", err=True)
 
     def _refuse(self, text: str, status: int = BAD_INPUT) -> int:
-        click.echo(f"{self.package.partition('.')[0]}: {' '.join(text.split())}", err=True)
+        click.echo(f"{self.name}: {' '.join(text.split())}", err=True)
         return status
 
     def _run(self, *args: Any, **extra: Any) -> Any:
@@ -113,33 +116,9 @@ class LazyGroup(click.Group):
         return super().main(*args, standalone_mode=False, **extra)  # type: ignore[call-overload]
 
 
-def group_of(package: str, table: CommandTable) -> Callable[[Callable[..., Any]], LazyGroup]:
-    """A decorator that makes a command line of a function whose docstring is its help.
-
-    Args:
-        package: where the commands' modules are, in the package that the command is called as.
-        table: as :class:`LazyGroup` takes it.
-    """
-    name = package.partition(".")[0]
-
-    def decorate(function: Callable[..., Any]) -> LazyGroup:
-        def show_help(ctx: click.Context) -> None:
-            if ctx.invoked_subcommand is None:
-                click.echo(ctx.get_help())
-
-        group = LazyGroup(
-            name,
-            package=package,
-            table=table,
-            callback=click.pass_context(show_help),
-            help=inspect.getdoc(function),
-            invoke_without_command=True,
-            context_settings={"help_option_names": ["-h", "--help"]},
-            epilog=f"'{name} COMMAND --help' shows a command's options and examples.",
-        )
-        return click.version_option(__version__, prog_name=name)(group)
-
-    return decorate
+def _show_help(ctx: click.Context) -> None:
+    if ctx.invoked_subcommand is None:
+        click.echo(ctx.get_help())
 
 
 def _end(_signal: int, _frame: object) -> None:
@@ -168,16 +147,13 @@ def _refuse_repeated(words: list[str], command: click.Command, ctx: click.Contex
         _values, _rest, order = command.make_parser(ctx).parse_args(list(words))
     except click.UsageError:
         return  # the command itself refuses it, in the order of its own checks
-    for option in command.get_params(ctx):
+    options = [one for one in command.params if isinstance(one, click.Option)]
+    for option in options:
         times = sum(given is option for given in order)
-        if isinstance(option, click.Option) and _is_one_file(option) and times > 1:
+        if isinstance(option.type, click.Path) and not option.multiple and times > 1:
             raise click.UsageError(
                 f"{option.opts[0]}: expected once, got {times} times; leave out all but one", ctx
             )
-
-
-def _is_one_file(option: click.Option) -> bool:
-    return isinstance(option.type, click.Path) and not option.multiple
 
 
 def _usage_text(error: click.ClickException) -> str:

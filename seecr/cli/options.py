@@ -1,8 +1,10 @@
-"""Options and habits that all commands share."""
+"""How commands, their options and their progress are declared: what all commands share."""
 
 from __future__ import annotations
 
+import difflib
 import math
+import re
 import shlex
 import sys
 from collections.abc import Callable, Iterator
@@ -21,39 +23,42 @@ if TYPE_CHECKING:
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+# A number below zero, or an axis of a grid that begins with one.
+_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?(:.*)?")
+
 SECONDS_BETWEEN_LINES = 15.0
 """How often work that takes long tells where it is, without a terminal."""
 
 
-class WholeNumber(click.IntRange):
-    """A whole number in a range; what is none, or outside, is told what was expected."""
+class _Told(click.ParamType):  # type: ignore[type-arg]
+    """A number; what is none, or outside its range, is told what was expected."""
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """The number, or a usage error."""
+    kind: str
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
             return super().convert(value, param, ctx)
         except click.BadParameter:
-            self.fail(f"expected a whole number{_within(self)}, got {value!r}.", param, ctx)
+            self.fail(f"expected {self.kind}{_within(self)}, got {value!r}.", param, ctx)
 
 
-class Number(click.FloatRange):
-    """A number in a range; what is none, or outside, is told what was expected."""
+class WholeNumber(_Told, click.IntRange):
+    """A whole number in a range."""
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """The number, or a usage error."""
-        try:
-            return super().convert(value, param, ctx)
-        except click.BadParameter:
-            self.fail(f"expected a number{_within(self)}, got {value!r}.", param, ctx)
+    kind = "a whole number"
+
+
+class Number(_Told, click.FloatRange):
+    """A number in a range."""
+
+    kind = "a number"
 
     def _describe_range(self) -> str:
         """The range in the help; click describes one without ends as x<=None."""
         return "" if self.min is None and self.max is None else super()._describe_range()
 
 
-def _within(numbers: click.IntRange | click.FloatRange) -> str:
+def _within(numbers: Any) -> str:
     """A range in words, with a space before; nothing if there is none."""
     low, high = numbers.min, numbers.max
     if low is None:
@@ -66,55 +71,138 @@ class _File(click.Path):
     """A path; ``-`` is standard input, as everywhere."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The path of what is given."""
         return super().convert(STDIN if value == "-" else value, param, ctx)
 
+
+_PATHS = ("DIR", "FILE", ".toml", ".xml", ".csv", ".json")
 
 FILE = _File(path_type=Path)
 """A file that the command itself opens, so that the error is its own."""
 
 
-def out_option(default: str) -> Callable[[F], F]:
-    """``--out DIR``, given to the command as ``out``, a path."""
-    return click.option(
-        "--out",
-        type=FILE,
+class NumbersCommand(click.Command):
+    """A command whose negative numbers are values, not options."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Let negative numbers pass as arguments; refuse other unknown options as ever."""
+        known = {name for p in self.get_params(ctx) for name in (*p.opts, *p.secondary_opts)}
+        for arg in args[: args.index("--") if "--" in args else None]:
+            name = arg.partition("=")[0]
+            is_option = len(arg) > 1 and arg.startswith("-") and not _NUMBER.fullmatch(arg)
+            if is_option and name not in known:
+                near = difflib.get_close_matches(name, known, n=3)
+                raise click.NoSuchOption(name, possibilities=near, ctx=ctx)
+        ctx.ignore_unknown_options = True
+        return super().parse_args(ctx, args)
+
+
+def command(
+    *examples: str, cls: type[click.Command] = click.Command
+) -> Callable[[Callable[..., int]], click.Command]:
+    """A decorator that makes a command whose help ends with these examples."""
+    epilog = "\n  ".join(["\b\nExamples:", *examples])
+    return click.command(cls=cls, epilog=epilog)
+
+
+def option(
+    words: str, said: str, kind: click.ParamType[Any] | None = None, name: str | None = None,
+    **more: Any,
+) -> Callable[[F], F]:  # fmt: skip
+    """An option, as the help shows it: ``--count N``, ``--line X Y Z``, ``--up [y|z]``, ``--list``.
+
+    Args:
+        words: the option, with a word for each of its values, or none for a flag. Values in
+            brackets are those it can have; ``DIR``, ``FILE`` or ``M.toml`` is a path.
+        said: its help. kind: of other values than words and paths.
+        name: of the command's argument, if it is another. more: for click.
+    """
+    option, *values = words.split()
+    names = (option,) if name is None else (option, name)
+    if not values:
+        return click.option(*names, is_flag=True, help=said, **more)
+    metavar = " ".join(values)
+    if metavar.startswith("["):
+        kind = click.Choice(metavar.strip("[]").split("|"))
+    elif metavar.endswith(_PATHS):
+        kind = FILE
+    shown = {"show_default": "default" in more, **more}
+    return click.option(*names, type=kind, nargs=len(values), metavar=metavar, help=said, **shown)
+
+
+def out(default: str) -> Callable[[F], F]:
+    """``--out DIR``, a folder for several files."""
+    return option(
+        "--out DIR",
+        "Folder for the results; created if it does not exist. Older results there are replaced.",
         default=default,
-        show_default=True,
-        metavar="DIR",
-        help=(
-            "Folder for the results; created if it does not exist. Older results there are "
-            "replaced."
-        ),
     )
 
 
-json_option = click.option(
-    "--json",
-    "as_json",
-    is_flag=True,
-    help="Print the result as JSON on standard output, and nothing else there.",
-)
-"""``--json``, given to the command as ``as_json``."""
+def out_file(file: str) -> Callable[[F], F]:
+    """``--out DIR`` for this file alone, None without."""
+    return option("--out DIR", f"Folder for {file}.  [default: none]")
 
-jobs_option = click.option(
-    "--jobs",
-    type=WholeNumber(min=1),
-    default=None,
-    metavar="N",
-    help="Number of parallel processes.  [default: one per processor]",
-)
-"""``--jobs N``, given to the command as ``jobs``; None means :func:`seecr.parallel.processors`."""
 
-seed_option = click.option(
-    "--seed",
-    type=WholeNumber(min=0),
-    default=0,
-    show_default=True,
-    metavar="N",
-    help="Seed of the random numbers.",
+def together(*declared: Callable[[Any], Any]) -> Callable[[F], F]:
+    """Several arguments and options, in the order of the help."""
+
+    def declare(function: F) -> F:
+        for one in reversed(declared):
+            function = one(function)
+        return function
+
+    return declare
+
+
+as_json = option(
+    "--json", "Print the result as JSON on standard output, and nothing else there.", name="as_json"
 )
-"""``--seed N``, given to the command as ``seed``."""
+no_recording = option("--no-recording", "Do not write a recording (.rrd).")
+pictures = together(
+    option("--figure [png|svg|none]", "File type of the figure.", default="png"), no_recording
+)
+robot = together(
+    click.argument("robot", type=FILE, metavar="ROBOT"),
+    option(
+        "--cable NAME|N",
+        "k_c = E S of all cables, instead of that in the robot's file: vectran, fishing, or a "
+        "number [N].",
+    ),
+    option("--model M.toml", "Model file with the robot's effects.  [default: plain SEECR]"),
+)
+limits = together(
+    option("--lowest N", "Lowest allowed tension of every cable [N].", Number(), default=0.0),
+    option("--highest N", "Highest allowed tension of every cable [N].", Number()),
+)
+
+
+def files_of_pictures(name: str) -> list[str]:
+    """All files of that name that ``--figure`` and ``--no-recording`` write or leave out."""
+    return [f"{name}.{kind}" for kind in ("png", "svg", "rrd")]
+
+
+def turned(of: str) -> Callable[[F], F]:
+    """``--turned``, the orientation ``of`` what it is said to be of."""
+    said = f"Orientation of {of}.  [default: that of the reference pose]"
+    return option("--turned QW QX QY QZ", said, Number(), callback=_unit_turn)
+
+
+def _unit_turn(
+    _ctx: click.Context, _option: click.Parameter, value: tuple[float, ...] | None
+) -> tuple[float, ...] | None:
+    """``--turned`` as given, if it is a rotation."""
+    if value is not None:
+        from seecr.cli.arguments import check_unit
+
+        check_unit("--turned", value)
+    return value
+
+
+def check_finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
+    """A number as it is, as an option's callback; a usage error where it is none, or has no end."""
+    if value is not None and not math.isfinite(value):
+        raise click.BadParameter(f"{value} is not a finite number.", ctx, param)
+    return value
 
 
 def made_by(*files: Path | None) -> Made:
@@ -131,8 +219,7 @@ def progress_bar(text: str, total: int) -> Iterator[Callable[[int, str], None]]:
     """A progress bar on standard error; a line now and then where that is no terminal.
 
     Args:
-        text: what is going on.
-        total: steps to come.
+        text: what is going on. total: steps to come.
 
     Yields:
         a function to call with the steps done since the last call, and what is going on now.
@@ -143,12 +230,8 @@ def progress_bar(text: str, total: int) -> Iterator[Callable[[int, str], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-    )
+    name = TextColumn("{task.description}")
+    columns = (name, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(text, total=total)
 
@@ -176,9 +259,6 @@ def _lines(text: str, total: int) -> Callable[[int, str], None]:
 def progress_share(text: str) -> Iterator[Callable[[str, float], None]]:
     """A progress bar for work that tells its share done; it never goes back.
 
-    Args:
-        text: what is going on.
-
     Yields:
         a function to call with what is going on now and the share of it (0 to 1) that is done.
     """
@@ -194,8 +274,13 @@ def progress_share(text: str) -> Iterator[Callable[[str, float], None]]:
         yield tell
 
 
-def finite_option(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
-    """A number as it is, as an option's callback; a usage error where it is none, or has no end."""
-    if value is not None and not math.isfinite(value):
-        raise click.BadParameter(f"{value} is not a finite number.", ctx, param)
-    return value
+@contextmanager
+def result_in(out: Path | None, name: str) -> Iterator[Callable[[str], None]]:
+    """A function that keeps a result's text in a folder, if any; it is tried before the work."""
+    from seecr.files import staged, write_text
+
+    if out is None:
+        yield lambda _text: None
+        return
+    with staged(out) as folder:
+        yield lambda text: write_text(folder / name, text + "\n")

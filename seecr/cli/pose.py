@@ -7,38 +7,28 @@ from typing import TYPE_CHECKING
 
 import click
 
-from seecr.cli.arguments import NumbersCommand, model_at, notes_of, pose_of, robot_at, robot_options
+from seecr.cli import options
 from seecr.cli.following import after_pose
-from seecr.cli.options import FILE, Number, json_option, made_by, progress_share
 
 if TYPE_CHECKING:
     from seecr import Barrier
 
 
-@click.command(
-    cls=NumbersCommand,
-    short_help="Compute where the platform rests at one command.",
-    epilog="""\b
-Examples:
-  seecr pose demobot_parallel 0.17 0.25 0.1
-  seecr pose robot.xml -4.8 0 1.5 --model model.toml
-  seecr pose robot.xml 0.4 0.25 0.1 0.966 0 0.259 0 --json
-""",
+@options.command(
+    "seecr pose demobot_parallel 0.17 0.25 0.1",
+    "seecr pose robot.xml -4.8 0 1.5 --model model.toml",
+    "seecr pose robot.xml 0.4 0.25 0.1 0.966 0 0.259 0 --json",
+    cls=options.NumbersCommand,
 )
-@robot_options
-@click.argument("coordinates", nargs=-1, type=Number(), metavar="X Y Z [QW QX QY QZ]")
-@click.option("--alone", is_flag=True, help="Do not search for other equilibria.")
-@click.option("--out", type=FILE, metavar="DIR", help="Folder for pose.json.  [default: none]")
-@json_option
+@options.robot
+@click.argument("coordinates", nargs=-1, type=options.Number(), metavar="X Y Z [QW QX QY QZ]")
+@options.option("--alone", "Do not search for other equilibria.")
+@options.out_file("pose.json")
+@options.as_json
 def command(
-    robot: Path,
-    coordinates: tuple[float, ...],
-    cable: str | None,
-    model: Path | None,
-    alone: bool,
-    out: Path | None,
-    as_json: bool,
-) -> int:
+    robot: Path, coordinates: tuple[float, ...], cable: str | None, model: Path | None,
+    alone: bool, out: Path | None, as_json: bool,
+) -> int:  # fmt: skip
     """Show where the platform comes to rest when it is sent to a pose, and how each cable pulls.
 
     ROBOT is an MJCF file or the name of a shipped robot. X Y Z are metres in the base frame, QW
@@ -55,8 +45,9 @@ def command(
     import numpy as np
 
     from seecr import bar_balances, barriers, equilibria, midline_points, solve, spread_of
+    from seecr.cli.arguments import model_at, notes_of, pose_of, robot_at
     from seecr.equilibrium.search import elsewhere, on_their_way
-    from seecr.files import json_text, staged, write_text
+    from seecr.files import json_text
     from seecr.show.files import SweepRows
     from seecr.show.pose_words import (
         at_rest,
@@ -72,7 +63,7 @@ def command(
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
     command = pose_of(coordinates, machine)
-    with progress_share("solving") as tell:
+    with options.progress_share("solving") as tell:
         solution = solve(machine, command, effects=own or ())
         lasting = [] if alone or own is None else on_their_way(machine, command, own)
         tell("other equilibria", 0.1)
@@ -92,37 +83,23 @@ def command(
     met = midline_points(solution)
     notes = list(notes_of(own, solution))
     unsought = list(unsought_lines(lasting))
-    document = {
-        "made": made_by(machine.source, model),
-        "exit_status": status,
-        "robot": machine.name,
-        "cables": machine.cable_names,
-        **SweepRows(solution, spread=spread).as_json()[0],
-        "sentence": solution.sentence(0),
+    text = json_text({
+        "made": options.made_by(machine.source, model), "exit_status": status,
+        "robot": machine.name, "cables": machine.cable_names,
+        **SweepRows(solution, spread=spread).as_json()[0], "sentence": solution.sentence(0),
         "slack_cables": int(solution.slack[0].sum()) if solution.converged[0] else None,
         "midline_point": None if met is None else met.name,
         "bar": None if bars[1] is None else {"at_rest": bars[0], "at_command": bars[1]},
-        "softest_direction": softest_words(solution),
-        "frequencies_Hz": solution.frequencies[0],
-        "equilibria": None if others is None else SweepRows(others),
-        "barriers": passes,
+        "softest_direction": softest_words(solution), "frequencies_Hz": solution.frequencies[0],
+        "equilibria": None if others is None else SweepRows(others), "barriers": passes,
         "notes": [*notes, *unsought],
-    }
-    if out is not None:
-        with staged(out) as folder:
-            write_text(folder / "pose.json", json_text(document) + "\n")
-    if as_json:
-        click.echo(json_text(document))
-        return status
+    })  # fmt: skip
+    with options.result_in(out, "pose.json") as keep:
+        keep(text)
     lines = [
-        *pose_lines(solution, spread=spread),
-        *cable_lines(solution, spread=spread),
-        *midline_lines(solution),
-        *bar_lines(*bars),
-        *other_lines(solution, others, passes),
-        *unsought,
-        after_pose(solution, robot, coordinates[3:], cable, own),
-    ]
-    for line in [*notes, *lines]:
-        click.echo(line)
+        *notes, *pose_lines(solution, spread=spread), *cable_lines(solution, spread=spread),
+        *midline_lines(solution), *bar_lines(*bars), *other_lines(solution, others, passes),
+        *unsought, after_pose(solution, robot, coordinates[3:], cable, own),
+    ]  # fmt: skip
+    click.echo(text if as_json else "\n".join(lines))
     return status

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,108 +10,50 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from seecr.cli.arguments import (
-    NumbersCommand,
-    axes_of,
-    check_count,
-    check_places,
-    files_of_pictures,
-    model_at,
-    notes_of,
-    picture_options,
-    robot_at,
-    robot_options,
-    turned_option,
-)
+from seecr.cli import options
 from seecr.cli.following import after_sweep
-from seecr.cli.options import (
-    FILE,
-    Number,
-    WholeNumber,
-    json_option,
-    made_by,
-    out_option,
-    progress_bar,
-)
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from seecr import BarManifold, Commands, Model, Robot, SlackSpan, Solution
 
 
-_WANTED = "Lengths are commanded; deviations are from the wanted poses, columns want_*."
-# Poses of --line.
-_COUNT = 24
 # A bar's tilts are compared with the manifold in sweeps of at most so many poses: it takes nearly a
 # millisecond for each.
 _MOST_TILTS = 10_000
 # Zones of slack cables are computed for sweeps with at most so many changes of them.
 _MOST_CHANGES = 1000
-_COUNTED = "Poses are counted from 0, as the rows of sweep.json are."
+_WANTED = "Lengths are commanded; deviations are from the wanted poses, columns want_*."
 
 
-@click.command(
-    cls=NumbersCommand,
-    short_help="Compute where the platform rests at many commands.",
-    epilog="""\b
-Examples:
-  seecr sweep demobot_parallel --line 0.17 0.25 0.1 0.63 0.25 0.1
-  seecr sweep robot.xml poses.csv --model model.toml
-  seecr sweep robot.xml --grid 0.1:0.7:25 0.25 0.05:0.35:13 --json
-  seecr sweep demobot_parallel --line 0.17 0.25 0.1 0.63 0.25 0.1 --method fsolve
-""",
+@options.command(
+    "seecr sweep demobot_parallel --line 0.17 0.25 0.1 0.63 0.25 0.1",
+    "seecr sweep robot.xml poses.csv --model model.toml",
+    "seecr sweep robot.xml --grid 0.1:0.7:25 0.25 0.05:0.35:13 --json",
+    "seecr sweep demobot_parallel --line 0.17 0.25 0.1 0.63 0.25 0.1 --method fsolve",
+    cls=options.NumbersCommand,
 )
-@robot_options
-@click.argument("poses", type=FILE, metavar="[POSES.csv]", required=False)
-@click.option(
-    "--line",
-    nargs=6,
-    type=Number(),
-    metavar="X Y Z X Y Z",
-    help="From one position to another [m].",
-)
-@click.option(
-    "--count",
-    type=WholeNumber(min=1),
-    metavar="N",
-    help=f"Poses of --line.  [default: {_COUNT}]",
-)
-@click.option(
-    "--grid",
-    nargs=3,
-    metavar="X Y Z",
-    help="Each FIRST:LAST:COUNT or one number [m]; z varies fastest.",
-)
-@click.option(
+@options.robot
+@click.argument("poses", type=options.FILE, metavar="[POSES.csv]", required=False)
+@options.option("--line X Y Z X Y Z", "From one position to another [m].", options.Number())
+@options.option("--count N", "Poses of --line.  [default: 24]", options.WholeNumber(min=1))
+@options.option("--grid X Y Z", "Each FIRST:LAST:COUNT or one number [m]; z varies fastest.")
+@options.option(
     "--follow",
-    is_flag=True,
-    help="Follow the commanded path from the reference pose, and report where the platform jumps.",
+    "Follow the commanded path from the reference pose, and report where the platform jumps.",
 )
-@click.option(
-    "--method",
-    type=click.Choice(["newton", "fsolve", "least_squares"]),
-    help="Solve by this method, and report its time and how often it evaluates the equations: the "
+@options.option(
+    "--method [newton|fsolve|least_squares]",
+    "Solve by this method, and report its time and how often it evaluates the equations: the "
     "compiled one, or one of the paper's two, from SciPy.",
 )
-@turned_option("--line and --grid")
-@picture_options
-@out_option("seecr-sweep")
-@json_option
+@options.turned("--line and --grid")
+@options.pictures
+@options.out("seecr-sweep")
+@options.as_json
 def command(
-    robot: Path,
-    poses: Path | None,
-    cable: str | None,
-    model: Path | None,
-    follow: bool,
-    method: str | None,
-    figure: str,
-    no_recording: bool,
-    out: Path,
-    as_json: bool,
-    **ways: Any,
-) -> int:
+    robot: Path, poses: Path | None, cable: str | None, model: Path | None, follow: bool,
+    method: str | None, figure: str, no_recording: bool, out: Path, as_json: bool, **ways: Any,
+) -> int:  # fmt: skip
     """Show where the platform comes to rest at each of many commands.
 
     ROBOT is an MJCF file or the name of a shipped robot. POSES.csv holds commands in the same
@@ -136,6 +77,7 @@ def command(
     is free to move.
     """
     from seecr import midline_points, spread_of
+    from seecr.cli.arguments import commands_of, model_at, notes_of, robot_at
     from seecr.files import check_replaces, json_text, staged, with_toml, write_text
     from seecr.show.batch_words import jump_lines, span_lines, sweep_lines
     from seecr.show.files import SweepRows, toml_beside
@@ -144,42 +86,35 @@ def command(
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
-    given = _Commanded(**ways)
-    commands, more, said, wanted = _commands(machine, poses, given)
+    commands, more, said, wanted, runs = commands_of(machine, poses, **ways)
     check_replaces(out, ("sweep.csv", "sweep.toml"), "sweep.json", read=with_toml(poses))
-    sometimes = ("sweep.toml", *files_of_pictures("sweep"))
+    sometimes = ("sweep.toml", *options.files_of_pictures("sweep"))
     with staged(out, sometimes=sometimes, read=with_toml(poses)) as folder:
-        with progress_bar("solving", len(commands)) as tell:
+        with options.progress_bar("solving", len(commands)) as tell:
             solution, search = _solved(machine, commands, own, follow, method)
+            spread = None
             if own is not None:
                 tell(0, "errors")
-            spread = None if own is None else spread_of(machine, commands, own)
+                spread = spread_of(machine, commands, own)
             tell(len(commands), "solved")
         rows = SweepRows(solution, commands.lengths, more, spread, wanted, commands.loads)
         commanded = commands.lengths is None or rows.aimed
         bar, too_many = _bar(solution, commands, own, commanded)
         rows = replace(rows, bar=bar)
         status = 0 if at_rest(solution) else 3
-        runs = _runs(machine, given, more)
         spans, why_not = _spans(solution, commands, own, runs)
         gave_up = _gave_up(solution, method)
         met = midline_points(solution)
         if rows.aimed:
             said = (*said, _WANTED)
         notes = [*notes_of(own, solution, commands), *said, *gave_up, *why_not, *too_many]
-        document = {
-            "made": made_by(machine.source, poses, model),
-            "exit_status": status,
-            "robot": machine.name,
-            "cables": machine.cable_names,
-            "model": None if own is None else own.names,
-            "notes": notes,
-            **({} if search is None else {"search": search}),
-            "zones": spans,
-            "midline_point": None if met is None else met.name,
-            "rows": rows,
-        }
-        text = json_text(document)
+        text = json_text({
+            "made": options.made_by(machine.source, poses, model), "exit_status": status,
+            "robot": machine.name, "cables": machine.cable_names,
+            "model": None if own is None else own.names, "notes": notes,
+            **({} if search is None else {"search": search}), "zones": spans,
+            "midline_point": None if met is None else met.name, "rows": rows,
+        })  # fmt: skip
         write_text(folder / "sweep.json", text + "\n")
         write_text(folder / "sweep.csv", rows.csv_text())
         if beside := toml_beside(commands.told, commands):
@@ -190,37 +125,17 @@ def command(
                 zones=spans or (), bar=bar,
             )  # fmt: skip
         if not no_recording:
-            # takes a second or two to import
             from seecr.show.sweep_recording import write_sweep_recording
 
             write_sweep_recording(solution, folder / "sweep.rrd", commanded)
-    if as_json:
-        click.echo(text)
-        return status
     lines = [
-        *sweep_lines(solution, commanded, spread), *span_lines(spans or ()), *jump_lines(solution),
-        *(() if met is None else met.lines()), *(() if bar is None else bar.lines()),
+        *notes, *sweep_lines(solution, commanded, spread), *span_lines(spans or ()),
+        *jump_lines(solution), *(() if met is None else met.lines()),
+        *(() if bar is None else bar.lines()), *(() if search is None else [search.words]),
+        f"Results in {out}/", after_sweep(solution, commands, robot, poses, cable, own),
     ]  # fmt: skip
-    if search is not None:
-        lines.append(search.words)
-    then = after_sweep(solution, commands, robot, poses, cable, own)
-    for line in [*notes, *lines, f"Results in {out}/", then]:
-        click.echo(line)
+    click.echo(text if as_json else "\n".join(lines))
     return status
-
-
-_Columns = dict[str, Sequence[Any]]
-"""Further values of each row, by the column's name."""
-
-
-@dataclass(frozen=True)
-class _Commanded:
-    """The options that say where the platform is commanded to, as typed."""
-
-    line: tuple[float, ...] | None
-    count: int | None
-    grid: tuple[str, ...] | None
-    turned: tuple[float, ...] | None
 
 
 @dataclass(frozen=True)
@@ -270,53 +185,8 @@ def _solved(
     return found, Effort(method, *counted, seconds)
 
 
-def _commands(
-    robot: Robot, poses: Path | None, given: _Commanded
-) -> tuple[Commands, _Columns, tuple[str, ...], NDArray[np.float64] | None]:
-    """The commands, what else their file says, notes on it, and the poses that lengths are for."""
-    from seecr import Commands, InputError
-    from seecr.columns.commands import read_commands
-
-    ways = [name for name in ("line", "grid") if getattr(given, name)]
-    if len(ways) + (poses is not None) != 1:
-        got = " and ".join([*(["POSES.csv"] if poses else []), *(f"--{w}" for w in ways)])
-        raise InputError(f"expected one of POSES.csv, --line, --grid; got {got or 'none'}")
-    if poses is not None and given.turned:
-        raise InputError(
-            "--turned applies to --line and --grid; commands of a file are turned by columns such "
-            f"as cmd_rx_deg; leave it out, or add them to {poses}"
-        )
-    if given.count and not given.line:
-        raise InputError(
-            f"--count applies to --line, got it together with {poses or '--grid'}, which sets the "
-            "number of poses; leave it out"
-        )
-    if poses is None:
-        return Commands(_along(robot, given)), {}, (_COUNTED,), None
-    read = read_commands(poses, robot)
-    return read.commands, read.conditions, read.notes, read.wanted
-
-
-def _along(robot: Robot, given: _Commanded) -> NDArray[np.float64]:
-    """Poses (n, 7) of --line or --grid."""
-    import numpy as np
-
-    from seecr.statics.starts import commanded_poses
-
-    if given.line:
-        check_places(given.line, robot)
-        count = given.count or _COUNT
-        check_count("--count", count)
-        places = np.linspace(given.line[:3], given.line[3:], count)
-    else:
-        axes = axes_of(given.grid or (), robot)
-        places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    turned = given.turned or robot.reference_pose[3:]
-    return commanded_poses(np.column_stack([places, np.tile(turned, (len(places), 1))]))
-
-
 def _spans(
-    solution: Solution, commands: Commands, model: Model | None, runs: Sequence[int] | None
+    solution: Solution, commands: Commands, model: Model | None, runs: Sequence[Any] | None
 ) -> tuple[tuple[SlackSpan, ...] | None, tuple[str, ...]]:
     """The zones of slack cables between commanded poses, and why there are none."""
     import numpy as np
@@ -363,12 +233,3 @@ def _bar(
         most = counted(_MOST_TILTS, "pose")
         return None, (f"Tilts of the manifold are not computed: more than {most}.",)
     return bar_manifold(solution, commanded), ()
-
-
-def _runs(robot: Robot, given: _Commanded, more: _Columns) -> Sequence[int] | None:
-    """Which poses follow on each other: a column of --grid, a run of a file; None: all do."""
-    if not given.grid:
-        return more.get("run")
-    counts = [len(axis) for axis in axes_of(given.grid, robot)]
-    column = next((n for n in reversed(counts) if n > 1), 1)
-    return [k // column for k in range(math.prod(counts))]

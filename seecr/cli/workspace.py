@@ -2,101 +2,65 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from seecr.cli.arguments import (
-    NumbersCommand,
-    axes_of,
-    files_of_pictures,
-    limit_options,
-    model_at,
-    picture_options,
-    robot_at,
-    robot_options,
-    turned_option,
-)
+from seecr.cli import options
 from seecr.cli.following import following
-from seecr.cli.options import Number, finite_option, json_option, made_by, out_option, progress_bar
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from seecr import Workspace
 
 
-@click.command(
-    "map",
-    cls=NumbersCommand,
-    short_help="Draw the workspace: where the platform can be held, and where it comes to rest.",
-    epilog="""\b
-Examples:
-  seecr map demobot_cogiro
-  seecr map robot.xml --grid 0:0.8:81 0:0.5:51 0.1:0.3:3 --lowest 1 --highest 50
-  seecr map robot.xml --model model.toml --lowest 1 --at-least 0.95
-  seecr map demobot_cogiro --lowest 0.1 --edge 0.0001
-  seecr map robot.xml --wrench 1 0 0 0 0 0 --wrench -1 0 0 0 0 0 --model model.toml
-""",
+@options.command(
+    "seecr map demobot_cogiro",
+    "seecr map robot.xml --grid 0:0.8:81 0:0.5:51 0.1:0.3:3 --lowest 1 --highest 50",
+    "seecr map robot.xml --model model.toml --lowest 1 --at-least 0.95",
+    "seecr map demobot_cogiro --lowest 0.1 --edge 0.0001",
+    "seecr map robot.xml --wrench 1 0 0 0 0 0 --wrench -1 0 0 0 0 0 --model model.toml",
+    cls=options.NumbersCommand,
 )
-@robot_options
-@click.option(
-    "--grid",
-    nargs=3,
-    metavar="X Y Z",
-    help="Each FIRST:LAST:COUNT or one number [m]; of a robot in a plane oblique to x, y and z "
-    "along the directions u, v and w that are printed.  [default: over the exit points, down to as "
-    "far below the reference pose as they are above it, or to the floor of the MJCF]",
+@options.robot
+@options.option(
+    "--grid X Y Z",
+    "Each FIRST:LAST:COUNT or one number [m]; of a robot in a plane oblique to x, y and z along "
+    "the directions u, v and w that are printed.  [default: over the exit points, down to as far "
+    "below the reference pose as they are above it, or to the floor of the MJCF]",
 )
-@turned_option("all poses")
-@limit_options
-@click.option(
-    "--wrench",
-    "wrenches",
-    nargs=6,
-    type=Number(),
-    multiple=True,
-    metavar="FX FY FZ MX MY MZ",
-    help="External wrench [N, N m] under which the platform must be held, besides weight; may be "
+@options.turned("all poses")
+@options.limits
+@options.option(
+    "--wrench FX FY FZ MX MY MZ",
+    "External wrench [N, N m] under which the platform must be held, besides weight; may be "
     "repeated for a set. 0 0 0 0 0 0 is none, and is only in the set if it is given.",
+    options.Number(),
+    "wrenches",
+    multiple=True,
 )
-@click.option(
-    "--at-least",
-    type=Number(0.0, 1.0, min_open=True),
-    metavar="P",
-    help="Also show where poses can be held with this probability, from the model's covariance.",
+@options.option(
+    "--at-least P",
+    "Also show where poses can be held with this probability, from the model's covariance.",
+    options.Number(0.0, 1.0, min_open=True),
 )
-@click.option(
-    "--edge",
-    type=Number(0.0, min_open=True),
-    callback=finite_option,
-    metavar="M",
-    help="Also find the edge of the workspace, to this many metres, between poses of the grid.",
+@options.option(
+    "--edge M",
+    "Also find the edge of the workspace, to this many metres, between poses of the grid.",
+    options.Number(0.0, min_open=True),
+    callback=options.check_finite,
 )
-@click.option("--no-elastic", is_flag=True, help="Only compute which poses can be held; faster.")
-@picture_options
-@out_option("seecr-map")
-@json_option
+@options.option("--no-elastic", "Only compute which poses can be held; faster.")
+@options.pictures
+@options.out("seecr-map")
+@options.as_json
 def command(
-    robot: Path,
-    cable: str | None,
-    model: Path | None,
-    grid: tuple[str, ...] | None,
-    turned: tuple[float, ...] | None,
-    lowest: float,
-    highest: float | None,
-    wrenches: tuple[tuple[float, ...], ...],
-    at_least: float | None,
-    edge: float | None,
-    no_elastic: bool,
-    figure: str,
-    no_recording: bool,
-    out: Path,
-    as_json: bool,
-) -> int:
+    robot: Path, cable: str | None, model: Path | None, grid: tuple[str, ...] | None,
+    turned: tuple[float, ...] | None, lowest: float, highest: float | None,
+    wrenches: tuple[tuple[float, ...], ...], at_least: float | None, edge: float | None,
+    no_elastic: bool, figure: str, no_recording: bool, out: Path, as_json: bool,
+) -> int:  # fmt: skip
     """Show on a grid where tensions within limits hold the platform, and where it really comes to
     rest.
 
@@ -119,10 +83,17 @@ def command(
     import numpy as np
 
     from seecr import boundary, default_axes, workspace_map
+    from seecr.cli.arguments import axes_of, model_at, robot_at
     from seecr.columns.plausible import scalar_last
     from seecr.equilibrium.solving import strained
     from seecr.files import json_text, staged, write_text
-    from seecr.show.batch_words import beyond_line
+    from seecr.show.batch_words import (
+        beyond_line,
+        edge_line,
+        likely_lines,
+        sag_lines_of,
+        softest_line,
+    )  # fmt: skip
     from seecr.show.files import write_arrays
     from seecr.show.map_figure import map_figure
     from seecr.workspace.grid import own_directions
@@ -134,13 +105,13 @@ def command(
         if grid
         else list(default_axes(machine, None, turned or None))
     )
-    total = int(np.prod([len(axis) for axis in axes]))
+    total = math.prod(map(len, axes))
     asked: dict[str, Any] = {
         "lowest": lowest, "highest": np.inf if highest is None else highest,
         "wrenches": wrenches or None, "effects": own or (),
     }  # fmt: skip
-    with staged(out, sometimes=files_of_pictures("map")) as folder:
-        with progress_bar("mapping", total) as tell:
+    with staged(out, sometimes=options.files_of_pictures("map")) as folder:
+        with options.progress_bar("mapping", total) as tell:
             found = workspace_map(
                 machine, *axes, orientation=turned or None, elastic=not no_elastic,
                 chance=at_least is not None, progress=lambda done: tell(done, ""), **asked,
@@ -157,7 +128,7 @@ def command(
             notes += [*own.notes, *beyond_line(found, own.reach)]
         status = 3 if found.elastic and not np.any(found.rests) else 0
         text = json_text({
-            "made": made_by(machine.source, model), "exit_status": status, "notes": notes,
+            "made": options.made_by(machine.source, model), "exit_status": status, "notes": notes,
             **found.as_json(at_least),
             "edge": None if places is None else {"tolerance_m": edge, "places": len(places)},
         })  # fmt: skip
@@ -167,19 +138,22 @@ def command(
         if figure != "none" and not flat:
             map_figure(folder / f"map.{figure}", found, edge=places, at_least=at_least)
         if not no_recording:
-            # takes a second or two to import
             from seecr.show.map_recording import write_map_recording
 
             write_map_recording(found, folder / "map.rrd", places)
-    if as_json:
-        click.echo(text)
-        return status
     where = [] if grid else [found.region]  # of their own grids people know it
-    lines = [*notes, *where, *_lines(found, own.names if own else (), at_least, places, edge)]
+    lines = [
+        *notes, *where, *found.lines(), *softest_line(found), *likely_lines(found, at_least),
+        *sag_lines_of(found, own.names if own else ()),
+    ]  # fmt: skip
+    if places is not None and edge is not None:
+        lines.append(edge_line(found, places, edge, at_least))
     if figure != "none" and flat:
         lines.append("no figure: the grid has more than one value along fewer than two axes")
-    for line in [*lines, f"Results in {out}/", _next(robot, lowest, highest)]:
-        click.echo(line)
+    least = ("--lowest", f"{lowest:g}") if lowest else ()
+    most = () if highest is None else ("--highest", f"{highest:g}")
+    then = following("crosscheck", "plan", robot, "--rows", 40, *least, *most)
+    click.echo(text if as_json else "\n".join([*lines, f"Results in {out}/", then]))
     return status
 
 
@@ -189,37 +163,13 @@ def _holds_none(found: Workspace, lowest: float, highest: float) -> Exception:
     from seecr.counted import counted
     from seecr.description.robot import ITS_A_POINT
 
-    by_place = found.robot.n_cables < found.robot.n_dof
-    what, stays = (
-        ("in no orientation do ", " so that the platform stays") if by_place else ("no ", "")
-    )
-    cure = (
-        f": {ITS_A_POINT}"
-        if found.robot.is_point
-        else ("; expected another grid, orientation or wider limits")
-    )
+    what, stays = "no ", ""
+    if found.robot.n_cables < found.robot.n_dof:
+        what, stays = "in no orientation do ", " so that the platform stays"
+    cure = "; expected another grid, orientation or wider limits"
+    if found.robot.is_point:
+        cure = f": {ITS_A_POINT}"
     return InputError(
         f"no pose of the grid can be held: {what}tensions from {lowest:g} to {highest:g} N balance "
         f"the load{stays} at any of {counted(found.margin.size, 'pose')}{cure}"
     )
-
-
-def _lines(
-    found: Workspace, effects: Sequence[str], at_least: float | None,
-    places: NDArray[np.float64] | None, edge: float | None,
-) -> list[str]:  # fmt: skip
-    """What is told of a map, and of its edge."""
-    from seecr.show.batch_words import edge_line, likely_lines, sag_lines_of, softest_line
-
-    lines = [*found.lines(), *softest_line(found), *likely_lines(found, at_least)]
-    lines += sag_lines_of(found, effects)
-    if places is not None and edge is not None:
-        lines.append(edge_line(found, places, edge, at_least))
-    return lines
-
-
-def _next(robot: Path, lowest: float, highest: float | None) -> str:
-    """To plan measurements within the same limits."""
-    least = ("--lowest", f"{lowest:g}") if lowest else ()
-    most = () if highest is None else ("--highest", f"{highest:g}")
-    return following("crosscheck", "plan", robot, "--rows", 40, *least, *most)

@@ -36,7 +36,13 @@ def test_added_one_after_the_other_the_error_falls_to_the_noise(both, tmp_path, 
     model, out = tmp_path / "model.toml", tmp_path / "out"
     gate = ("--max-position", "0.04mm", "--max-orientation", "0.025deg", "--no-recording")
     assert run("compare", *both, *gate, "--out", out).exit_code == 1
-    first = add("pulley_radius", both, model)
+    said = json.loads(add("pulley_radius", both, model, "--json", "--out", out).stdout)
+    assert said == json.loads((out / "add.json").read_text()) and said["written"] is True
+    assert set(said["made"]["sha256"]) == {"robot.xml", "measured.csv", "measured.toml"}
+    radius = said["effects"]["pulley_radius"]["radius_m"]
+    assert radius["unit"] == "m" and radius["at_bound"] is False
+    assert said["held_out"]["position_rms_m"] < said["held_out_before"]["position_rms_m"]
+    first = add("pulley_radius", both, tmp_path / "again.toml")
     assert first.exit_code == 0
     assert "before" in first.stdout and "on held-out runs" in first.stdout
     assert "crosscheck diagnose" in first.stdout  # something is still missing
@@ -99,51 +105,43 @@ def test_what_is_there_already_is_only_fitted_again_when_asked(both, tmp_path):
     )
 
 
-def test_json_and_out(both, tmp_path):
-    result = add("pulley_radius", both, tmp_path / "m.toml", "--json", "--out", tmp_path / "o")
-    document = json.loads(result.stdout)
-    assert document == json.loads((tmp_path / "o" / "add.json").read_text())
-    assert set(document["made"]["sha256"]) == {"robot.xml", "measured.csv", "measured.toml"}
-    assert document["written"] is True
-    radius = document["effects"]["pulley_radius"]["radius_m"]
-    assert radius["unit"] == "m" and radius["at_bound"] is False
-    assert document["held_out"]["position_rms_m"] < document["held_out_before"]["position_rms_m"]
-
-
-def test_unknown_effects_are_listed_nearest_first(both, tmp_path):
-    text = refused("add", "pulley_radus", *both, "--model", tmp_path / "m.toml")
-    assert "no effect 'pulley_radus'; known, nearest first: pulley_radius, " in text
-    assert not (tmp_path / "m.toml").exists()
-
-
-def test_what_the_data_cannot_carry_is_refused(both, tmp_path):
-    xml, _ = both
-    robot = load_robot(xml)
-    data = measured(robot)
-    model = ("--model", tmp_path / "m.toml")
-    few = tmp_path / "few.csv"
-    write_measurements(few, data.rows(slice(0, 10)))
-    text = refused("add", "exit_point_error", xml, few, *model)
-    assert (
-        "few.csv: exit_point_error cannot be fitted to these data: has 24 parameters, but the data "
-        "have only 10 rows" in text
-    )
-    text = refused("add", "thermal_expansion", xml, both[1], *model)
-    assert (
-        "thermal_expansion cannot be fitted to these data: needs the temperature, column "
-        "temperature_C" in text
-    )
-    text = refused("add", "tension_scale", xml, both[1], *model)
-    assert "tension_scale cannot be fitted to these data: needs measured tensions" in text
-    timeless = tmp_path / "timeless.csv"
-    write_measurements(timeless, replace(data, t_s=None))
-    assert "needs the time of each row, column t_s" in refused(
-        "add", "creep", xml, timeless, *model
-    )
-    still = tmp_path / "still.csv"
-    write_measurements(still, data.rows(np.zeros(30, dtype=int)))
-    text = refused("add", "stiffness", xml, still, *model)
-    assert "all commands are the same" in text
+@pytest.mark.parametrize(
+    ("effect", "name", "said"),
+    [
+        (
+            "exit_point_error",
+            "few.csv",
+            "few.csv: exit_point_error cannot be fitted to these data: has 24 parameters, but the "
+            "data have only 10 rows",
+        ),
+        (
+            "thermal_expansion",
+            "measured.csv",
+            "thermal_expansion cannot be fitted to these data: needs the temperature, column "
+            "temperature_C",
+        ),
+        (
+            "tension_scale",
+            "measured.csv",
+            "tension_scale cannot be fitted to these data: needs measured tensions",
+        ),
+        ("creep", "timeless.csv", "needs the time of each row, column t_s"),
+        ("stiffness", "still.csv", "all commands are the same"),
+        (
+            "pulley_radus",
+            "measured.csv",
+            "no effect 'pulley_radus'; known, nearest first: pulley_radius, ",
+        ),
+    ],
+)
+def test_what_the_data_cannot_carry_is_refused(both, tmp_path, effect, name, said):
+    data = measured(load_robot(both[0]))
+    write_measurements(tmp_path / "measured.csv", data)
+    write_measurements(tmp_path / "few.csv", data.rows(slice(0, 10)))
+    write_measurements(tmp_path / "timeless.csv", replace(data, t_s=None))
+    write_measurements(tmp_path / "still.csv", data.rows(np.zeros(30, dtype=int)))
+    words = ("add", effect, both[0], tmp_path / name, "--model", tmp_path / "m.toml")
+    assert said in refused(*words)
     assert not (tmp_path / "m.toml").exists()
 
 

@@ -30,31 +30,27 @@ def test_one_effect_has_its_formula_and_its_size_for_a_robot() -> None:
     assert "check by hand: measure a sheave with a caliper" in result.stdout
 
 
-def test_what_every_cable_has_is_told_as_one_per_cable() -> None:
-    assert "gain [no unit], one per cable" in run("effects", "drum_gain").stdout
-    assert ", x y z per cable" in run("effects", "exit_point_error").stdout
-
-
-def test_plausible_sizes_are_told_without_a_robot_too() -> None:
-    """As a number, or as a formula of the robot, with how to get its number."""
-    assert (
-        "factor [no unit]: absent at 1, plausible size 0.3\n" in run("effects", "stiffness").stdout
-    )
-    said = run("effects", "pulley_radius").stdout
-    assert "radius [mm]: absent at 0, plausible size 2 % of the mean cable length\n" in said
-    assert "plausible sizes depend on the robot: --robot ROBOT.xml gives their numbers" in said
-    assert "depend" not in run("effects", "gravity_tilt").stdout
-    said = run("effects", "creep").stdout
-    assert "time [s]: modifies the others, starts at 100" in said
-    for name in catalogue():  # each built-in one has its formula
-        rows = json.loads(run("effects", name, "--json").stdout)["parameters"]
-        assert all(row["plausible_size_words"] != "depends on the robot" for row in rows)
-        assert all((row["plausible_size"] is None) == ("%" in row["plausible_size_words"]
-                   or " / " in row["plausible_size_words"]) for row in rows)  # fmt: skip
-
-
-def test_units_are_those_that_people_read() -> None:
-    assert "sideways [mm/N]" in run("effects", "frame_compliance").stdout
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("drum_gain", "gain [no unit], one per cable"),
+        ("exit_point_error", ", x y z per cable"),
+        ("stiffness", "factor [no unit]: absent at 1, plausible size 0.3\n"),
+        (
+            "pulley_radius",
+            "radius [mm]: absent at 0, plausible size 2 % of the mean cable length\n",
+        ),
+        (
+            "pulley_radius",
+            "plausible sizes depend on the robot: --robot ROBOT.xml gives their numbers",
+        ),
+        ("creep", "time [s]: modifies the others, starts at 100"),
+        ("frame_compliance", "sideways [mm/N]"),
+    ],
+)
+def test_parameters_have_units_and_sizes_for_people(name: str, said: str) -> None:
+    """Also without a robot: a size is a number, or a formula of it."""
+    assert said in run("effects", name).stdout
 
 
 @pytest.mark.parametrize("name", list(catalogue()))
@@ -62,6 +58,11 @@ def test_every_effect_can_be_described(name: str) -> None:
     result = run("effects", name)
     assert result.exit_code == 0, result.output
     assert "{" not in result.stdout
+    assert name != "gravity_tilt" or "depend" not in result.stdout
+    for row in json.loads(run("effects", name, "--json").stdout)["parameters"]:
+        words = row["plausible_size_words"]
+        assert words != "depends on the robot"  # each built-in one has its formula
+        assert (row["plausible_size"] is None) == ("%" in words or " / " in words)
 
 
 def test_for_programs() -> None:

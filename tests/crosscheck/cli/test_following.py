@@ -2,51 +2,48 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from made_data import case, run
+from called import following, ran
+from made_data import case
 
 from crosscheck.cli.following import Given, after_comparison, after_diagnosis, after_fit
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.words import measured
 from crosscheck.show.effects import parameter_lines
 
-ONLY = ("--only", "pulley_radius")
-
-
-def last(result):
-    assert result.exit_code == 0, result.output
-    line = result.stdout.splitlines()[-1]
-    assert line.startswith("next: "), result.stdout
-    return shlex.split(line, comments=True)[1:]
+FOUND = DiagnosisVerdict.EFFECTS_FOUND
+OFF = SimpleNamespace(is_noise=False, refusal=None)
+NOISE = SimpleNamespace(is_noise=True, refusal=None)
 
 
 @pytest.mark.slow
-def test_from_a_plan_to_a_model_by_the_commands_that_each_names(tmp_path, monkeypatch, unpaged):
+@pytest.mark.usefixtures("unpaged")
+def test_from_a_plan_to_a_model_by_the_commands_that_each_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What a command says next is run as it is said, until nothing is missing."""
     monkeypatch.chdir(tmp_path)
-    xml, data = case(Path(), {"pulley_radius": {"radius_m": 0.01}}, points=4)
-    planned = last(run("plan", xml, data))
-    assert planned == ["crosscheck", "diagnose", str(xml), str(data)]
-    told = last(run("compare", xml, data))
-    assert told == planned
-    told = last(run(*told[1:], *ONLY, "--no-recording"))
-    assert told[1:4] == ["add", "--all-from", "crosscheck-diagnosis/diagnosis.json"]
-    told = last(run(*told[1:]))
-    assert told == ["crosscheck", "compare", str(xml), str(data), "--model", "model.toml"]
-    told = last(run(*told[1:], "--no-recording"))
-    assert told == ["seecr", "correct", str(xml), str(data), "--model", "model.toml"]
+    case(Path(), {"pulley_radius": {"radius_m": 0.01}}, points=4)
+    files = "robot.xml measured.csv"
+    planned = following(ran(f"crosscheck plan {files}"))
+    assert planned == f"crosscheck diagnose {files}"
+    assert following(ran(f"crosscheck compare {files}")) == planned
+    told = following(ran(f"{planned} --only pulley_radius --no-recording"))
+    listed = "--all-from crosscheck-diagnosis/diagnosis.json"
+    assert told == f"crosscheck add {listed} {files} --model model.toml"
+    told = following(ran(told))
+    assert told == f"crosscheck compare {files} --model model.toml"
+    told = following(ran(f"{told} --no-recording"))
+    assert told == f"seecr correct {files} --model model.toml"
 
 
-def test_the_catalogue_and_an_opened_twin_name_a_next_command():
-    assert last(run("effects"))[:2] == ["crosscheck", "effects"]
-    told = last(run("effects", "backlash"))
-    assert told == [
-        *["crosscheck", "add", "backlash", "ROBOT.xml", "DATA.csv", "--model", "model.toml"]
-    ]
+def test_the_catalogue_names_a_next_command() -> None:
+    assert following(ran("crosscheck effects")).startswith("crosscheck effects ")
+    told = following(ran("crosscheck effects backlash"))
+    assert told == "crosscheck add backlash ROBOT.xml DATA.csv --model model.toml"
 
 
 @pytest.mark.parametrize(
@@ -62,55 +59,51 @@ def test_the_catalogue_and_an_opened_twin_name_a_next_command():
         ("no_verdict", False, None, None, "plan R --rows 40"),
     ],
 )
-def test_after_each_verdict(verdict, missing, model, kept, expected):
-    found = SimpleNamespace(
-        verdict=DiagnosisVerdict(verdict), missing=("one",) * missing, refitted=()
-    )
+def test_after_each_verdict(
+    verdict: str, missing: bool, model: str | None, kept: str | None, expected: str
+) -> None:
+    lacking = ("one",) * missing
+    found = SimpleNamespace(verdict=DiagnosisVerdict(verdict), missing=lacking, refitted=())
     paths = [None if name is None else Path(name) for name in (model, kept)]
     line = after_diagnosis(found, Given(Path("R"), [Path("D")], paths[0]), paths[1], Path("out"))
     assert expected in line
 
 
-def test_names_with_blanks_are_quoted_and_all_files_named():
-    found = SimpleNamespace(is_noise=False, refusal=None)
+def test_names_with_blanks_are_quoted_and_all_files_named() -> None:
     given = Given(Path("my robot.xml"), [Path("a.csv"), Path("b.csv")])
-    line = after_comparison(found, given)
+    line = after_comparison(OFF, given)
     assert line == "next: crosscheck diagnose 'my robot.xml' a.csv b.csv"
-    noise = SimpleNamespace(is_noise=True, refusal=None)
-    assert after_comparison(noise, given) == "next: crosscheck plan 'my robot.xml' a.csv"
+    assert after_comparison(NOISE, given) == "next: crosscheck plan 'my robot.xml' a.csv"
     given = Given(Path("r.xml"), [Path("a.csv")], Path("none.toml"))
     assert after_fit(False, False, given) == "next: crosscheck diagnose r.xml a.csv"
 
 
-def test_noise_that_was_stated_is_stated_again():
+def test_noise_that_was_stated_is_stated_again() -> None:
     """Without it the next command would estimate it, and judge the same data otherwise."""
     given = Given(Path("r.xml"), [Path("a.csv")], Path("m.toml"), ["position=0.1mm"])
-    end = " --model m.toml --sigma position=0.1mm"
-    off = SimpleNamespace(is_noise=False, refusal=None)
-    assert after_comparison(off, given) == f"next: crosscheck diagnose r.xml a.csv{end}"
-    assert after_fit(True, True, given) == f"next: crosscheck compare r.xml a.csv{end}"
-    found = SimpleNamespace(verdict=DiagnosisVerdict.EFFECTS_FOUND, missing=("one",))
-    assert after_diagnosis(found, given, None, Path("out")).endswith(f"r.xml a.csv{end}")
+    end = "r.xml a.csv --model m.toml --sigma position=0.1mm"
+    assert after_comparison(OFF, given) == f"next: crosscheck diagnose {end}"
+    assert after_fit(True, True, given) == f"next: crosscheck compare {end}"
+    found = SimpleNamespace(verdict=FOUND, missing=("one",))
+    assert after_diagnosis(found, given, None, Path("out")).endswith(end)
 
 
-def test_data_that_are_fit_for_no_verdict_are_not_diagnosed_next():
+def test_data_that_are_fit_for_no_verdict_are_not_diagnosed_next() -> None:
     """A diagnosis would refuse them, too."""
     few = SimpleNamespace(is_noise=False, refusal="only 2 readings left")
     line = after_comparison(few, Given(Path("r.xml"), [Path("a.csv")]))
     assert line == "next: crosscheck plan r.xml --rows 40"
 
 
-def test_a_model_that_agrees_is_used_on_poses_or_mapped_where_none_are_known():
-    noise = SimpleNamespace(is_noise=True, refusal=None)
+def test_a_model_that_agrees_is_used_on_poses_or_mapped_where_none_are_known() -> None:
     files = Path("r.xml"), [Path("a.csv"), Path("b.csv")], Path("m.toml")
-    line = after_comparison(noise, Given(*files))
-    assert line.startswith(
-        "next: seecr correct r.xml a.csv --model m.toml  # corrects the poses commanded"
-    )
-    assert "any CSV of wanted poses will do" in line
-    line = after_comparison(noise, Given(*files, lengths=True))
+    correct, comment = after_comparison(NOISE, Given(*files)).split("  # ")
+    assert correct == "next: seecr correct r.xml a.csv --model m.toml"
+    assert comment.startswith("corrects the poses commanded")
+    assert "any CSV of wanted poses will do" in comment
+    line = after_comparison(NOISE, Given(*files, lengths=True))
     assert line == "next: seecr map r.xml --model m.toml"
-    line = after_comparison(noise, Given(*files, lengths=True, history=True))
+    line = after_comparison(NOISE, Given(*files, lengths=True, history=True))
     assert line == "next: seecr sweep r.xml a.csv --model m.toml"  # a map would refuse it
 
 
@@ -126,11 +119,11 @@ def test_a_model_that_agrees_is_used_on_poses_or_mapped_where_none_are_known():
         (1.5e-13, 0.0, "N", "0 N (fixed)"),
     ],
 )
-def test_digits_are_those_of_the_error(value, error, unit, words):
+def test_digits_are_those_of_the_error(value: float, error: float, unit: str, words: str) -> None:
     assert measured(value, error, unit) == words
 
 
-def test_what_a_twin_hid_is_in_the_units_of_a_diagnosis():
+def test_what_a_twin_hid_is_in_the_units_of_a_diagnosis() -> None:
     values = {"shift_x_m": 0.00836, "shift_y_m": -0.002}
     lines = parameter_lines("centre_of_mass", values)
     assert lines == ["shift_x = 8.36 mm", "shift_y = -2 mm"]

@@ -16,12 +16,12 @@ from crosscheck.cli.compare import command as compare_command
 from crosscheck.comparison.limits import RULES, option
 from seecr.cli import options
 from seecr.cli.group import LazyGroup
-from seecr.cli.options import json_option, out_option, progress_bar, progress_share
+from seecr.cli.options import progress_bar, progress_share
 
 
 @click.command()
-@out_option("results")
-@json_option
+@options.out("results")
+@options.as_json
 def shared(out: object, as_json: bool) -> None:
     click.echo(f"{out} {as_json}")
 
@@ -95,26 +95,22 @@ def test_short_work_says_nothing_without_a_terminal(capsys: pytest.CaptureFixtur
 @pytest.mark.parametrize("group", [crosscheck.cli.main, seecr.cli.main])
 def test_of_an_option_for_one_file_several_are_refused(group: LazyGroup) -> None:
     """Of two models the last was taken, and nothing said."""
-    refused = []
-    ctx = click.Context(group)
+    refused = set()
     for name in group.table:
-        command = group.get_command(ctx, name)
+        command = group.get_command(click.Context(group), name)
         assert command is not None
-        for param in command.params:
-            if (
-                isinstance(param, click.Option)
-                and isinstance(param.type, click.Path)
-                and not param.multiple
-            ):
-                words = [param.opts[0], "file"]
+        options = [one for one in command.params if isinstance(one, click.Option)]
+        for one in options:
+            if isinstance(one.type, click.Path) and not one.multiple:
+                words = [one.opts[0], "file"]
                 said = CliRunner().invoke(group, [name, *words, *words], prog_name="it")
                 assert said.exit_code == 2 and said.stdout == ""
-                assert f"{param.opts[0]}: expected once, got 2 times" in said.stderr
+                assert f"{one.opts[0]}: expected once, got 2 times" in said.stderr
                 assert f"(see it {name} --help)" in said.stderr
-                refused.append(param.opts[0])
-    assert {"--model", "--out"} <= set(refused)
+                refused.add(one.opts[0])
+    assert {"--model", "--out"} <= refused
 
 
 def test_other_options_may_be_repeated() -> None:
-    repeated = ["diagnose", "robot.xml", "data.csv", "--only", "a", "--only", "b", "--figures", "f"]
-    assert "expected once" not in CliRunner().invoke(crosscheck.cli.main, repeated).stderr
+    words = "diagnose robot.xml data.csv --only a --only b --figures f"
+    assert "expected once" not in CliRunner().invoke(crosscheck.cli.main, words.split()).stderr

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import shlex
 import warnings
 from pathlib import Path
 
 import pytest
-from made_data import case, refused, run
+from made_data import refused, run
 
 import crosscheck
 import seecr
@@ -16,38 +17,112 @@ from seecr.errors import SeecrError
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
-def stiff(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    return case(tmp_path_factory.mktemp("stiff"), {"stiffness": {"factor": 1.4}})
+Files = tuple[Path, Path]
+IMPORT = "import poses log.csv --robot ROBOT --commands DATA"
 
 
-@pytest.mark.usefixtures("unpaged")
-def test_sizes_that_nothing_measures(stiff: tuple[Path, Path], tmp_path: Path) -> None:
-    """Their squares are nought or without end, and no noise can be made of them."""
-    for size in ("1e-300mm", "1e-9mm", "1e300mm"):
-        said = refused("compare", *stiff, "--sigma", f"position={size}", "--out", tmp_path / "o")
-        assert f"--sigma position: expected a size that can be measured, got '{size}'" in said
-    # a limit may be as small: a model may be as near to another
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        *(
+            (
+                f"compare ROBOT DATA --sigma position={size}",
+                f"--sigma position: expected a size that can be measured, got '{size}'",
+            )
+            for size in ("1e-300mm", "1e-9mm", "1e300mm")
+        ),
+        (
+            "compare ROBOT tiny.csv",
+            "position_m must be a positive number [m] between 1e-09 and 1e+15",
+        ),
+        ("compare ROBOT huge.csv", "column meas_x_m: expected a number, or an empty cell"),
+        ("compare ROBOT DATA --model NOISE", "is not a model, it has sigma; expected a model as"),
+        (
+            "compare ROBOT DATA --limits none.toml",
+            "none.toml: is empty; expected a TOML file with lines such as",
+        ),
+        (
+            "compare ROBOT DATA --sigma position=0.1mm --sigma position=1mm",
+            "--sigma position=1mm: expected one for the position, got two; leave one out",
+        ),
+        (f"{IMPORT} --clock nan", "nan is not a finite number"),
+        (f"{IMPORT} --rest-for inf", "inf is not a finite number"),
+        (f"{IMPORT} --rest-for -1", "expected a number above 0, got '-1'"),
+        # where names have their unit, too
+        (f"{IMPORT} --unit parsec", "--unit: expected one of m, cm, mm, um, got 'parsec'"),
+        # quaternions of noughts
+        (IMPORT, "the body is seen in 0 rows; expected at least 5"),
+        (
+            "add stiffness ROBOT DATA --model m.toml --all-from d.json",
+            "expected EFFECT or --all-from, not both; got stiffness and",
+        ),
+        ("add --all-from gone.json ROBOT DATA --model m.toml", "gone.json: no such file"),
+        *(
+            (
+                f"twin --open . {other}",
+                "--open shows an existing case; leave out all other options but --json",
+            )
+            for other in ("ROBOT", "--hide 3", "--tensions", "--poses DATA", "--out there")
+        ),
+        # an unset variable of a shell would let all effects in, or read what the user left out
+        ("plan R D --reads ''", "--reads: expected a value, got an empty one"),
+        ("plan R D --reads ' , '", "'--reads': expected KIND,..., got ' , '."),
+        ("diagnose R D --only ''", "--only: expected a value, got an empty one"),
+        ("diagnose R D --only=", "--only: expected a value, got none; leave it out"),
+        ("diagnose R D --only ,", "'--only': expected EFFECT,..., got ','."),
+        ("calibrate R D --exclude ,", "'--exclude': expected EFFECT,..., got ','."),
+        ("compare R ''", "expected a value, got an empty one; leave it out"),
+        *(
+            (
+                f"{verb} demobot_4 d.csv",
+                "demobot_4: neither a file nor a shipped robot; expected an MJCF file or one of de",
+            )
+            for verb in ("compare", "diagnose", "plan", "add stiffness --model m.toml")
+        ),
+        *(
+            (f"compare ROBOT {column}.csv", f"column {column}_mm: ")
+            for column in ("cmd_x", "meas_x", "meas_y")
+        ),
+    ],
+)
+def test_a_mistake_is_one_sentence(
+    stiff: Files, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str, said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    robot, data = stiff
+    Path("log.csv").write_text(
+        "t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n" + "".join(f"{k},1,2,3,0,0,0,0\n" for k in range(9))
+    )
+    Path("none.toml").write_text("# none yet\n")
+    Path("tiny.csv").write_bytes(data.read_bytes())
+    Path("tiny.toml").write_text("[sigma]\nposition_m = 1e-300\n")
+    header, first, *rows = data.read_text().splitlines()
+    cells = dict(zip(header.split(","), first.split(","), strict=True)) | {"meas_x_m": "1e300"}
+    Path("huge.csv").write_text("\n".join([header, ",".join(cells.values()), *rows]))
+    for column in ("cmd_x", "meas_x", "meas_y"):  # metres under millimetres
+        renamed = header.replace(f"{column}_m", f"{column}_mm")
+        assert renamed != header
+        Path(f"{column}.csv").write_text("\n".join([renamed, first, *rows]))
+    given = {"ROBOT": str(robot), "DATA": str(data), "NOISE": str(data.with_suffix(".toml"))}
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    told = refused(*(given.get(word, word) for word in shlex.split(words)))
+    assert said in told and "thousands of digits" not in told
+    assert "_mm: " not in said or "are these really mm?" in told
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_limit_may_be_smaller_than_any_noise(stiff: Files, tmp_path: Path, unpaged: None) -> None:
+    """A model may be as near to another."""
     tight = ("--max-position", "1e-9mm", "--no-recording", "--out", tmp_path / "o")
     assert run("compare", *stiff, *tight).exit_code == 1
-    robot, data = stiff
-    other = tmp_path / "other.csv"
-    other.write_bytes(data.read_bytes())
-    other.with_suffix(".toml").write_text("[sigma]\nposition_m = 1e-300\n")
-    assert "position_m must be a positive number [m] between 1e-09 and 1e+15" in refused(
-        "compare", robot, other
-    )
-    header, first, *rows = data.read_text().splitlines()
-    place = header.split(",").index("meas_x_m")
-    cells = first.split(",")
-    cells[place] = "1e300"
-    other.write_text("\n".join([header, ",".join(cells), *rows]))
-    assert "column meas_x_m: expected a number, or an empty cell" in refused(
-        "compare", robot, other
-    )
 
 
-def test_where_nothing_can_be_written(stiff: tuple[Path, Path], tmp_path: Path) -> None:
+def test_of_many_cases_the_nearest_three_are_named() -> None:
+    said = refused("run", "--case", "nosuch")
+    assert said.count(",") == 3 and "--list has all" in said
+
+
+def test_where_nothing_can_be_written(stiff: Files, tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_text("mine")
     out = tmp_path / "out"
@@ -67,7 +142,7 @@ def test_where_nothing_can_be_written(stiff: tuple[Path, Path], tmp_path: Path) 
 
 @pytest.mark.parametrize("words", [("add", "stiffness"), ("calibrate",)])
 def test_what_cannot_be_written_is_told_before_the_fit(
-    stiff: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str]
+    stiff: Files, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str]
 ) -> None:
     def fitted(*_given: object, **_options: object) -> None:
         pytest.fail("it was fitted first")
@@ -86,14 +161,7 @@ def test_what_cannot_be_written_is_told_before_the_fit(
     assert list(tmp_path.iterdir()) == [file]
 
 
-def test_a_toml_of_another_kind_is_no_model(stiff: tuple[Path, Path]) -> None:
-    noise = stiff[1].with_suffix(".toml")
-    assert "is not a model, it has sigma; expected a model as" in refused(
-        "compare", *stiff, "--model", noise
-    )
-
-
-def test_one_row_or_rows_all_alike_are_compared(stiff: tuple[Path, Path], tmp_path: Path) -> None:
+def test_one_row_or_rows_all_alike_are_compared(stiff: Files, tmp_path: Path) -> None:
     robot, data = stiff
     header, first, *_ = data.read_text().splitlines()
     for times in (1, 6):
@@ -108,77 +176,13 @@ def test_one_row_or_rows_all_alike_are_compared(stiff: tuple[Path, Path], tmp_pa
         assert "Where the model fails" in (out / "comparison.html").read_text()
 
 
-@pytest.mark.parametrize(
-    ("option", "value", "said"),
-    [
-        ("--clock", "nan", "nan is not a finite number"),
-        ("--rest-for", "inf", "inf is not a finite number"),
-        ("--rest-for", "-1", "expected a number above 0, got '-1'"),
-    ],
-)
-def test_times_of_an_import_are_numbers(option: str, value: str, said: str) -> None:
-    words = ("import", "poses", "log.csv", "--robot", "r.xml", "--commands", "c.csv")
-    assert said in refused(*words, option, value)
-
-
-def test_a_unit_that_is_none_is_told_where_names_have_theirs_too(
-    stiff: tuple[Path, Path], tmp_path: Path
-) -> None:
-    log = tmp_path / "log.csv"
-    log.write_text("t_s,x_mm,y_mm,z_mm\n0,1,2,3\n")
-    words = ("import", "poses", log, "--robot", stiff[0], "--commands", stiff[1])
-    assert "--unit: expected one of m, cm, mm, um, got 'parsec'" in refused(
-        *words, "--unit", "parsec"
-    )
-
-
-def test_quaternions_of_noughts_are_a_body_not_seen(
-    stiff: tuple[Path, Path], tmp_path: Path
-) -> None:
-    log = tmp_path / "log.csv"
-    rows = "".join(f"{k},1,2,3,0,0,0,0\n" for k in range(9))
-    log.write_text(f"t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n{rows}")
-    words = ("import", "poses", log, "--robot", stiff[0], "--commands", stiff[1])
-    assert "the body is seen in 0 rows; expected at least 5" in refused(*words)
-
-
-def test_of_many_cases_the_nearest_three_are_named() -> None:
-    said = refused("run", "--case", "nosuch")
-    assert said.count(",") == 3 and "--list has all" in said
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("plan", "R", "D", "--reads", ""), "--reads: expected a value, got an empty one"),
-        (("plan", "R", "D", "--reads", " , "), "'--reads': expected KIND,..., got ' , '."),
-        (("diagnose", "R", "D", "--only", ""), "--only: expected a value, got an empty one"),
-        (("diagnose", "R", "D", "--only="), "--only: expected a value, got none; leave it out"),
-        (("diagnose", "R", "D", "--only", ","), "'--only': expected EFFECT,..., got ','."),
-        (("calibrate", "R", "D", "--exclude", ","), "'--exclude': expected EFFECT,..., got ','."),
-        (("compare", "R", ""), "expected a value, got an empty one; leave it out"),
-    ],
-)
-def test_nothing_given_is_not_the_same_as_not_given(words: tuple[str, ...], said: str) -> None:
-    """An unset variable of a shell would let all effects in, or read what the user left out."""
-    assert said in refused(*words)
-
-
-@pytest.mark.parametrize("verb", [("compare",), ("diagnose",), ("plan",), ("add", "stiffness")])
-def test_an_unknown_robot_lists_the_shipped_ones_nearest_first(verb: tuple[str, ...]) -> None:
-    said = refused(*verb, "demobot_4", "d.csv", *(("--model", "m.toml") if "add" in verb else ()))
-    assert (
-        "demobot_4: neither a file nor a shipped robot; expected an MJCF file or one of de" in said
-    )
-
-
 @pytest.mark.parametrize("which", [0, 1])
 @pytest.mark.parametrize(
     "words",
     [("diagnose", "--model-out"), ("calibrate", "--model"), ("add", "stiffness", "--model")],
 )
 def test_what_is_no_model_is_not_replaced_by_one(
-    stiff: tuple[Path, Path], which: int, words: tuple[str, ...], tmp_path: Path
+    stiff: Files, which: int, words: tuple[str, ...], tmp_path: Path
 ) -> None:
     """The only robot and the only measurements had been, with status 0."""
     mine = stiff[which]
@@ -194,44 +198,14 @@ def test_what_is_no_model_is_not_replaced_by_one(
     assert mine.read_bytes() == before
 
 
-def saved(folder: Path, stiff: tuple[Path, Path]) -> Path:
+def saved(folder: Path, stiff: Files) -> Path:
     """A model of the robot with nothing in it."""
     path = folder / "empty.toml"
     crosscheck.save_model(path, seecr.new_model(seecr.load_robot(stiff[0])))
     return path
 
 
-def test_an_effect_beside_all_from(stiff: tuple[Path, Path], tmp_path: Path) -> None:
-    words = ("add", "stiffness", *stiff, "--model", tmp_path / "m.toml", "--all-from", "d.json")
-    assert "expected EFFECT or --all-from, not both; got stiffness and" in refused(*words)
-    gone = tmp_path / "gone.json"
-    said = refused("add", "--all-from", gone, *stiff, "--model", tmp_path / "m.toml")
-    assert (
-        f"{gone}: " in said and "thousands of digits" not in said and "no such file" in said.lower()
-    )
-
-
-def test_what_else_had_no_effect(stiff: tuple[Path, Path], tmp_path: Path) -> None:
-    robot, data = stiff
-    empty = tmp_path / "limits.toml"
-    empty.write_text("# none yet\n")
-    assert "limits.toml: is empty; expected a TOML file with lines such as" in refused(
-        "compare", *stiff, "--limits", empty
-    )
-    twice = ("--sigma", "position=0.1mm", "--sigma", "position=1mm")
-    assert "--sigma position=1mm: expected one for the position, got two; leave one out" in refused(
-        "compare", *stiff, *twice
-    )
-    folder = ("--out", tmp_path / "there")
-    for other in ((robot,), ("--hide", 3), ("--tensions",), ("--poses", data), folder):
-        assert "--open shows an existing case; leave out all other options but --json" in refused(
-            "twin", "--open", tmp_path, *other
-        )
-
-
-def test_measurements_are_not_replaced_by_those_of_a_twin(
-    stiff: tuple[Path, Path], tmp_path: Path
-) -> None:
+def test_measurements_are_not_replaced_by_those_of_a_twin(stiff: Files, tmp_path: Path) -> None:
     robot, data = stiff
     mine = tmp_path / "measured.csv"
     mine.write_bytes(data.read_bytes())
@@ -252,16 +226,3 @@ def test_measurements_are_not_replaced_by_those_of_a_twin(
     (tmp_path / "plan.json").write_text('{"files": ["add-payload.csv"]}')
     assert "says that it wrote it" in refused("plan", robot, "--rows", 8, "--out", tmp_path)
     assert poses.read_text() == "cmd_x_m\n0.4\n"
-
-
-@pytest.mark.parametrize("column", ["cmd_x", "meas_x", "meas_y"])
-def test_metres_under_millimetres_in_one_column(
-    stiff: tuple[Path, Path], tmp_path: Path, column: str
-) -> None:
-    robot, data = stiff
-    header, *rows = data.read_text().splitlines()
-    other = tmp_path / "other.csv"
-    assert f"{column}_m" in header
-    other.write_text("\n".join([header.replace(f"{column}_m", f"{column}_mm"), *rows]))
-    said = refused("compare", robot, other)
-    assert f"column {column}_mm: " in said and "are these really mm?" in said

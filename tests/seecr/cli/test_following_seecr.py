@@ -11,27 +11,18 @@ import sys
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from called import BARE, as_json, following, ran
 
-from crosscheck.cli import main as crosscheck_main
-from seecr.cli import main as seecr_main
+from seecr import load_robot, model_path
 from seecr.cli.following import following as next_line
-from seecr.description.mjcf import load_robot, model_path
 
-QUIET = ("--figure", "none", "--no-recording")
-COGIRO = model_path("demobot_cogiro")
+COGIRO = "demobot_cogiro"
 
 
-def run(program: str, *args: object) -> Result:
-    main = {"seecr": seecr_main, "crosscheck": crosscheck_main}[program]
-    return CliRunner().invoke(main, [str(a) for a in args], prog_name=program)
-
-
-def following(result: Result) -> list[str]:
-    assert result.exit_code == 0, result.output
-    line = result.stdout.splitlines()[-1]
-    assert line.startswith("next: "), result.stdout
-    return shlex.split(line, comments=True)[1:]
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands write into a folder of the test."""
+    monkeypatch.chdir(tmp_path)
 
 
 def test_programs_of_an_environment_that_is_not_active_are_named_by_their_path(
@@ -43,10 +34,8 @@ def test_programs_of_an_environment_that_is_not_active_are_named_by_their_path(
     for name in ("crosscheck", "rerun"):
         (programs / name).touch(mode=0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["bin/crosscheck", "run"])
-    beside = str(Path("bin", "rerun"))
-    assert next_line("rerun", "a file.rrd") == f"next: {shlex.join([beside, 'a file.rrd'])}"
+    assert next_line("rerun", "a file.rrd") == "next: bin/rerun 'a file.rrd'"
     assert next_line("seecr", "map") == "next: seecr map"  # there is none
     monkeypatch.setenv("PATH", str(programs))
     assert next_line("rerun", "a.rrd") == "next: rerun a.rrd"
@@ -55,104 +44,66 @@ def test_programs_of_an_environment_that_is_not_active_are_named_by_their_path(
     assert next_line("rerun", "a.rrd") == "next: rerun a.rrd"
 
 
-def test_from_a_pose_to_a_workspace_to_a_plan(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    place = ("0.3", "0.2", "0.15")
-    told = following(run("seecr", "pose", "demobot_cogiro", *place, "--alone", "--cable", "3000"))
-    line = ["--line", "0.4", "0.25", "0.15", *place]
-    assert told == ["seecr", "sweep", "demobot_cogiro", *line, "--cable", "3000"]
-    told = following(run(*told, "--count", 2, *QUIET))
-    assert told == ["seecr", "map", "demobot_cogiro", "--cable", "3000"]
-    grid = ("--grid", "0.4", "0.25", "0.1:0.15:2", "--no-elastic", "--highest", "40")
-    told = following(run(*told, *grid, *QUIET))
-    assert told == ["crosscheck", "plan", "demobot_cogiro", "--rows", "40", "--highest", "40"]
-
-
-PLAY = """format = 1
-[[effect]]
-name = "backlash"
-[effect.parameters]
-gap_m = 0.002
-"""
+def test_from_a_pose_to_a_workspace_to_a_plan() -> None:
+    told = following(ran(f"seecr pose {COGIRO} 0.3 0.2 0.15 --alone --cable 3000"))
+    assert told == f"seecr sweep {COGIRO} --line 0.4 0.25 0.15 0.3 0.2 0.15 --cable 3000"
+    told = following(ran(f"{told} --count 2 {BARE}"))
+    assert told == f"seecr map {COGIRO} --cable 3000"
+    told = following(ran(f"{told} --grid 0.4 0.25 0.1:0.15:2 --no-elastic --highest 40 {BARE}"))
+    assert told == f"crosscheck plan {COGIRO} --rows 40 --highest 40"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "place", "told"),
     [
-        ("demobot_cogiro", ("0.4", "0.25", "0.15"), ["--model", "m.toml", "--no-elastic"]),
-        ("planar_two_cable", ("0.5", "0", "0.5"), []),  # without the model
+        (COGIRO, "0.4 0.25 0.15", " --model m.toml --no-elastic"),
+        ("planar_two_cable", "0.5 0 0.5", ""),  # without the model
     ],
 )
 def test_a_model_with_history_is_mapped_as_far_as_a_map_knows_it(
-    robot: str, place: tuple[str, ...], told: list[str], tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
-    """A map refuses to solve its poses, which are in no order; it was proposed all the same."""
-    monkeypatch.chdir(tmp_path)
-    Path("m.toml").write_text(PLAY)
-    at, model = load_robot(robot).reference_pose[:3].tolist(), ("--model", "m.toml")
-    for words in (("pose", robot, *at), ("sweep", robot, "--line", *at, *at, *QUIET)):
-        said = following(run("seecr", *words, *model))
-        assert said == ["seecr", "map", robot, *told]
-    grid = ("--grid", *place)
-    assert run(*said, *grid, *QUIET).exit_code == 0
-
-
-def test_from_wanted_poses_to_what_is_told_and_back(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    robot: str, place: str, told: str
 ) -> None:
-    monkeypatch.chdir(tmp_path)
+    """A map refuses to solve its poses, which are in no order; it was proposed all the same."""
+    Path("m.toml").write_text('[[effect]]\nname = "backlash"\nparameters.gap_m = 0.002\n')
+    at = " ".join(map(str, load_robot(robot).reference_pose[:3].tolist()))
+    for words in (f"pose {robot} {at}", f"sweep {robot} --line {at} {at} {BARE}"):
+        said = following(ran(f"seecr {words} --model m.toml"))
+        assert said == f"seecr map {robot}{told}"
+    ran(f"{said} --grid {place} {BARE}", 0)
+
+
+def test_from_wanted_poses_to_what_is_told_and_back() -> None:
     Path("my poses.csv").write_text("cmd_x_m,cmd_y_m,cmd_z_m\n0.4,0.25,0.1\n0.42,0.25,0.1\n")
     Path("m.toml").write_text("format = 1\n")
-    model = ["--model", "m.toml"]
-    told = following(run("seecr", "sweep", "demobot_cogiro", "my poses.csv", *model, *QUIET))
-    assert told == ["seecr", "correct", "demobot_cogiro", "my poses.csv", *model]
-    told = following(run(*told))
+    told = following(ran(f"seecr sweep {COGIRO} 'my poses.csv' --model m.toml {BARE}"))
+    assert told == f"seecr correct {COGIRO} 'my poses.csv' --model m.toml"
+    told = following(ran(told))
     corrected = "seecr-correction/corrected.csv"
-    assert told == ["seecr", "sweep", "demobot_cogiro", corrected, *model]
-    told = following(run(*told, *QUIET))
-    assert told == ["crosscheck", "plan", "demobot_cogiro", corrected]
-    told = following(run("seecr", "export", "demobot_cogiro", "out.xml"))
-    assert told == ["seecr", "pose", "out.xml", "0.4", "0.25", "0.15"]
-    assert following(run(*told, "--alone"))[:3] == ["seecr", "map", "out.xml"]
+    assert told == f"seecr sweep {COGIRO} {corrected} --model m.toml"
+    assert following(ran(f"{told} {BARE}")) == f"crosscheck plan {COGIRO} {corrected}"
+    told = following(ran(f"seecr export {COGIRO} out.xml"))
+    assert told == "seecr pose out.xml 0.4 0.25 0.15"
+    assert following(ran(f"{told} --alone")).startswith("seecr map out.xml")
     for name in ("seecr-correction/correction.json", "seecr-sweep/sweep.json"):
         made = json.loads(Path(name).read_text())["made"]
         assert made["command"].startswith("seecr ") and "--model m.toml" in made["command"]
         assert made["sha256"]["m.toml"] == hashlib.sha256(b"format = 1\n").hexdigest()[:16]
-        assert COGIRO.name in made["sha256"] and len(made["sha256"]) >= 3
+        assert model_path(COGIRO).name in made["sha256"] and len(made["sha256"]) >= 3
 
 
 @pytest.mark.parametrize(
-    "args",
+    "words",
     [
-        ("pose", "demobot_cogiro", "0.4", "0.25", "0.1", "--alone"),
-        ("map", "demobot_cogiro", "--grid", "0.4", "0.25", "0.1:0.15:2", "--no-elastic", *QUIET),
-        ("export", "demobot_cogiro", "out.xml"),
+        f"seecr pose {COGIRO} 0.4 0.25 0.1 --alone",
+        f"seecr map {COGIRO} --grid 0.4 0.25 0.1:0.15:2 --no-elastic {BARE}",
+        f"seecr export {COGIRO} 'my out.xml'",
     ],
-    ids=lambda args: args[0],
 )
-def test_each_json_says_how_it_was_made(
-    args: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    made = json.loads(run("seecr", *args, "--json").stdout)["made"]
-    assert made["command"] == shlex.join(["seecr", *args, "--json"])
-    assert list(made["sha256"]) == [COGIRO.name] and made["version"] and made["date"]
-
-
-@pytest.mark.slow
-def test_where_no_pose_can_be_corrected_the_workspace_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The file of what to tell the winches is empty then: nothing can be swept."""
-    monkeypatch.chdir(tmp_path)
-    Path("p.csv").write_text("cmd_x_m,cmd_y_m,cmd_z_m\n0.4,0.25,0.1\n")
-    lost = run("seecr", "correct", "demobot_cogiro", "p.csv", "--lowest", "1e9")
-    assert lost.exit_code == 3
-    assert lost.stdout.splitlines()[-1] == "next: seecr map demobot_cogiro"
+def test_each_json_says_how_it_was_made(words: str) -> None:
+    made = as_json(words)["made"]
+    assert made["command"] == f"{words} --json"
+    assert list(made["sha256"]) == [model_path(COGIRO).name] and made["version"] and made["date"]
 
 
 @pytest.mark.parametrize("given", ["/dev/stdin", "/dev/fd/63", "pipe"])
@@ -161,18 +112,16 @@ def test_what_came_through_a_pipe_is_not_named_again(given: str, tmp_path: Path)
     os.mkfifo(tmp_path / "pipe")
     saved = "  # INPUT: what came through the pipe, saved as a file"
     line = next_line("seecr", "map", tmp_path / given, "--turned", 1)
-    assert line.split(" ", 1)[1].partition("map")[2] == f" INPUT --turned 1{saved}"
+    assert line.partition("map")[2] == f" INPUT --turned 1{saved}"
     assert next_line("seecr", "map", Path("a.csv")).endswith("map a.csv")
 
 
 @pytest.mark.skipif(not Path("/dev/stdin").exists(), reason="no standard input with a path here")
-def test_a_dash_is_standard_input(tmp_path: Path) -> None:
+def test_a_dash_is_standard_input() -> None:
     """It was no such file."""
     text = "cmd_x_m,cmd_y_m,cmd_z_m\n0.3,0.25,0.15\n0.35,0.25,0.15\n"
-    args = ["-m", "seecr", "sweep", "demobot_cogiro", "-", *QUIET, "--out", str(tmp_path / "out")]
-    done = subprocess.run(
-        [sys.executable, *args], input=text, capture_output=True, text=True, check=False
-    )
+    args = [sys.executable, "-m", "seecr", "sweep", COGIRO, "-", *shlex.split(BARE)]
+    done = subprocess.run(args, input=text, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert "demobot_cogiro: 2 of 2 poses at rest" in done.stdout
-    assert " correct demobot_cogiro INPUT  # INPUT: what came" in done.stdout
+    assert f"{COGIRO}: 2 of 2 poses at rest" in done.stdout
+    assert f" correct {COGIRO} INPUT  # INPUT: what came" in done.stdout
