@@ -405,7 +405,7 @@ class Settler:
         rest = self._rest(observe)
         for nudges in range(1 + _NUDGES):
             if rest.status is not SettleStatus.SETTLED:
-                return _failure(physics, rest, nudges)
+                return _result(physics, rest, nudges)
             settled_pose = physics.pose()
             polished = polish(physics)
             if not polished.unstable or nudges == _NUDGES:
@@ -413,7 +413,7 @@ class Settler:
             physics.move(_NUDGE * physics.length * polished.softest / physics.metre)
             physics.update()
             rest = self._rest(observe).after(rest)
-        return _result(physics, rest, polished, settled_pose, nudges)
+        return _result(physics, rest, nudges, polished, settled_pose)
 
     @quiet_mujoco()
     def energy(self, pose: Array, rest_lengths: Array) -> float:
@@ -451,23 +451,32 @@ def settle_batch(settler: Settler, poses: Array, rest_lengths: Array) -> Settlin
 
 
 def _result(
-    physics: Physics, rest: Rest, polished: Polished, settled_pose: Array, nudges: int
+    physics: Physics,
+    rest: Rest,
+    nudges: int,
+    polished: Polished | None = None,
+    settled_pose: Array | None = None,
 ) -> Settling:
-    status = _judge(physics, polished)
-    if status is not SettleStatus.SETTLED:
-        return _failure(physics, rest, nudges, status, polished)
+    """The settling in the physics' present state; without numbers unless it is an answer."""
+    nan = np.nan
+    status = rest.status if polished is None else _judge(physics, polished)
+    fine = status is SettleStatus.SETTLED
+
+    def known(values: Array) -> Array:
+        return values.copy() if fine else np.full_like(values, nan)
+
     tensions = physics.tensions()
     return Settling(
         status=status,
-        pose=physics.pose(),
-        qpos=physics.data.qpos.copy(),
-        tensions=tensions,
-        slack=tensions == 0.0,
-        energy=physics.energy(),
-        settled_pose=settled_pose,
+        pose=known(physics.pose()),
+        qpos=known(physics.data.qpos),
+        tensions=known(tensions),
+        slack=(tensions == 0.0) & fine,
+        energy=physics.energy() if fine else nan,
+        settled_pose=np.full(7, nan) if settled_pose is None else known(settled_pose),
         rounding=physics.rounding(),
         rest=rest,
-        polished=polished,
+        polished=polished or Polished(nan, 0, nan, nan, nan, np.full(0, nan), nan, 0.0),
         nudges=nudges,
     )
 
@@ -481,26 +490,3 @@ def _judge(physics: Physics, polished: Polished) -> SettleStatus:
     if not polished.residual <= max(_POLISHED, 10.0 * physics.rounding()):
         return SettleStatus.POLISH_STALLED
     return SettleStatus.SETTLED
-
-
-def _failure(
-    physics: Physics,
-    rest: Rest,
-    nudges: int,
-    status: SettleStatus | None = None,
-    polished: Polished | None = None,
-) -> Settling:
-    m, nan = physics.n_cables, np.nan
-    return Settling(
-        status=status or rest.status,
-        pose=np.full(7, nan),
-        qpos=np.full(physics.model.nq, nan),
-        tensions=np.full(m, nan),
-        slack=np.zeros(m, dtype=bool),
-        energy=nan,
-        settled_pose=np.full(7, nan),
-        rounding=physics.rounding(),
-        rest=rest,
-        polished=polished or Polished(nan, 0, nan, nan, nan, np.full(0, nan), nan, 0.0),
-        nudges=nudges,
-    )

@@ -6,7 +6,7 @@ import difflib
 import fnmatch
 import math
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -134,7 +134,7 @@ def allowances(thresholds: Thresholds, solution: Solution, settling: SettlingBat
         # A soft direction is soft because tensions hardly change along it.
         "tension_N": np.zeros_like(fine),
     }
-    base = _by_quantity(thresholds)
+    base = by_quantity(thresholds)
     wide = {name: np.maximum(base[name], slack[name]) for name in QUANTITIES}
     widened = np.any([slack[name] > base[name] for name in QUANTITIES], axis=0)
     return Allowance(**wide, widened=widened)
@@ -177,11 +177,10 @@ def within(difference: Differences, allowance: Allowance) -> NDArray[np.bool_]:
     return np.asarray(close & difference.slack_same)
 
 
-def _by_quantity(thresholds: Thresholds) -> dict[str, float]:
-    settled = {f"settled_{f.name}": f.name for f in fields(thresholds.settled)}
-    values = {name: getattr(thresholds.settled, key) for name, key in settled.items()}
-    polished = {f.name: getattr(thresholds.polished, f.name) for f in fields(thresholds.polished)}
-    return {**values, **polished}
+def by_quantity(thresholds: Thresholds) -> dict[str, float]:
+    """The thresholds by ``QUANTITIES``, in that order."""
+    settled = {f"settled_{name}": value for name, value in vars(thresholds.settled).items()}
+    return settled | vars(thresholds.polished)
 
 
 def _known(residual: Array) -> Array:
@@ -295,35 +294,24 @@ def _check_names(file: Toml, got: Iterable[str], known: Collection[str], what: s
 
 def _value(file: Toml, table: str, key: str, value: Any) -> Any:
     """A value in the form that the dataclasses hold, checked for the kind that its key needs."""
-    expected, fits, hold = _KINDS.get(key, ("a positive number", _is_positive, float))
+    expected, fits, hold = _KINDS.get(key, _POSITIVE)
     if not fits(value):
         raise file.error(f"[{table}] {key}: expected {expected}, got {value!r}", key)
     return hold(value)
 
 
-def _is_number(value: Any) -> bool:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and math.isfinite(value)
-
-
-def _is_positive(value: Any) -> bool:
-    return _is_number(value) and value > 0
-
-
-def _is_count(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
-
-
-def _is_share(value: Any) -> bool:
-    return _is_number(value) and 0 <= value <= 1
+def _is_number(value: Any, kind: Any = int | float) -> bool:
+    return isinstance(value, kind) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _are_names(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(name, str) for name in value)
 
 
-_KINDS: dict[str, tuple[str, Callable[[Any], bool], Callable[[Any], Any]]] = {
-    "branches": ("a whole number from 0 on", _is_count, int),
+_Kind = tuple[str, Callable[[Any], bool], Callable[[Any], Any]]
+_POSITIVE: _Kind = ("a positive number", lambda v: _is_number(v) and v > 0, float)
+_KINDS: dict[str, _Kind] = {
+    "branches": ("a whole number from 0 on", lambda v: _is_number(v, int) and v >= 0, int),
     "free_to_move": ('a list of names "CASE POSE"', _are_names, tuple),
-    "free_elsewhere": ("a share from 0 to 1", _is_share, float),
+    "free_elsewhere": ("a share from 0 to 1", lambda v: _is_number(v) and 0 <= v <= 1, float),
 }

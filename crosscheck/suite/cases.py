@@ -13,6 +13,7 @@ import numpy as np
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.given import GivenRobot, file_of, robot_of
+from crosscheck.twin.lab import onto_joints
 from seecr.arguments import whole
 from seecr.description.mjcf import CABLES, model_path, robot_file
 from seecr.pose import Array, pose_add, quat_from_rotvec
@@ -39,6 +40,9 @@ _TILTED = {
     "vectran": (0.351, 0.216, 0.109, 0.943, 0.163, -0.288, -0.038),
     "fishing": (0.189, 0.410, 0.143, 0.956, -0.218, 0.196, -0.001),
 }
+# Where the planar robot on two cables is balanced on its head above its reference pose: whichever
+# way it falls, it comes to rest at the same pose.
+_ON_ITS_HEAD = (0.5, 0.0, 0.773026237116659, 0.0, 0.0, 1.0, 0.0)
 # Part of the distance from the reference position to the exit points that a user's robot covers.
 _USER_REACH = 0.6
 _USER_TURN = np.deg2rad(10.0)
@@ -84,7 +88,7 @@ def robot_sweep(robot: Robot, n: int = N_SWEEP) -> Array:
     steps = np.linspace(_USER_REACH * min(along.min(), 0.0), _USER_REACH * max(along.max(), 0.0), n)
     poses = np.tile(robot.reference_pose, (n, 1))
     poses[:, :3] += steps[:, None] * spread
-    return _reachable(robot, poses)
+    return onto_joints(robot, poses)
 
 
 def robot_random(robot: Robot, random: np.random.Generator, n: int) -> Array:
@@ -99,7 +103,7 @@ def robot_random(robot: Robot, random: np.random.Generator, n: int) -> Array:
     change[:, :3] = random.uniform(0.0, _USER_REACH, (n, 1)) * towards
     change[:, 3:] = _turns(random, n, _USER_TURN)
     poses = pose_add(np.tile(robot.reference_pose, (n, 1)), change)
-    return _reachable(robot, poses)
+    return onto_joints(robot, poses)
 
 
 def _turns(random: np.random.Generator, n: int, largest: float) -> Array:
@@ -115,19 +119,6 @@ def _level(robot: Robot, vectors: Array) -> Array:
     if not np.any(robot.gravity):
         return vectors
     return np.asarray(vectors - np.outer(vectors @ robot.up, robot.up))
-
-
-def _reachable(robot: Robot, poses: Array) -> Array:
-    """The poses (n, 7), or for a robot on joints the nearest that one Gauss-Newton step gives."""
-    if not robot.joints:
-        return poses
-    from seecr.description.joints import motion_columns, pose_of_values
-    from seecr.pose import pose_difference
-
-    start, screws = pose_of_values(robot, np.zeros((1, len(robot.joints))))
-    columns = motion_columns(screws, start[:, :3])[0]
-    values = pose_difference(poses, start) @ np.linalg.pinv(columns).T
-    return pose_of_values(robot, values)[0]
 
 
 class Named(Protocol):
@@ -223,6 +214,7 @@ def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
             poses = demobot_random(_generator(seed, name), n_random, turn)
             cases.append(Case(name, path, path, cable, "random", poses, has_names=seed == 0))
     cases += [_tilted_case(cable) for cable in CABLES]
+    cases.append(_inverted_case())
     for robot in ("two_cable", "vertical", "horizontal"):
         cases += _planar_cases(robot)
     for robot, turn in (("uneven", 0.0), ("off_centre", _COGIRO_TURN)):
@@ -299,6 +291,15 @@ def _tilted_case(cable: str) -> Case:
     starts = np.stack([command, load_robot(path).reference_pose])
     commands = np.stack([command, command])
     return Case(f"parallel-{cable}-tilted", path, path, cable, "starts", commands, starts=starts)
+
+
+def _inverted_case() -> Case:
+    """A start in balance that is unstable: each physics has to leave it."""
+    from seecr.description.mjcf import load_robot
+
+    path = model_path("planar_two_cable")
+    command, start = load_robot(path).reference_pose[None], np.array([_ON_ITS_HEAD])
+    return Case("planar-two-cable-inverted", path, path, None, "starts", command, starts=start)
 
 
 def _planar_cases(robot: str) -> list[Case]:

@@ -5,9 +5,9 @@ The functions at the end give its numbers units and rounding, as people read the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -185,7 +185,7 @@ class CaseResult(Result):
             "cable": case.cable,
             "kind": case.kind,
             "exit_status": self.outcome.exit_status,
-            "poses": {"total": len(self), **counts(self)},
+            "poses": {"total": len(self), **counts(self.count)},
             "worst": self.worst,
             "widened": np.flatnonzero(self.allowance.widened),
             "findings": self.findings,
@@ -213,16 +213,9 @@ def worst_of(results: Sequence[CaseResult]) -> tuple[CaseResult, Worst] | None:
     return max(pairs, key=lambda pair: pair[1].ratio, default=None)
 
 
-class Counted(Protocol):
-    """Objects that count poses by their verdict."""
-
-    def count(self, verdict: Verdict) -> int:
-        """Number of poses with a verdict."""
-
-
-def counts(counted: Counted) -> dict[str, int]:
+def counts(count: Callable[[Verdict], int]) -> dict[str, int]:
     """Number of poses with each verdict, by the verdict's name in lower case."""
-    return {verdict.name.lower(): counted.count(verdict) for verdict in Verdict}
+    return {verdict.name.lower(): count(verdict) for verdict in Verdict}
 
 
 def _timing(result: CaseResult) -> dict[str, float]:
@@ -234,11 +227,6 @@ def _timing(result: CaseResult) -> dict[str, float]:
         "mujoco_polish_ms_per_pose": 1e3 * float(polish_s),
         "case_s": result.wall_s,
     }
-
-
-def difference_cell(worst: Worst | None) -> str:
-    """A difference for a cell of a table."""
-    return "–" if worst is None else f"{worst.value:.1e}"
 
 
 def remarks(result: CaseResult) -> str:
@@ -262,7 +250,7 @@ def case_cells(result: CaseResult) -> list[str]:
     return [
         result.case.name,
         str(len(result)),
-        *(difference_cell(worst.get(name)) for name in QUANTITIES),
+        *(f"{worst[name].value:.1e}" if name in worst else "–" for name in QUANTITIES),
         f"{result.seecr_us:.0f}",
         f"{result.mujoco_ms:.1f}",
         result.outcome.value,

@@ -17,7 +17,13 @@ import numpy as np
 from crosscheck.errors import CrosscheckError
 from crosscheck.given import GivenRobot
 from crosscheck.settle.physics import ignored_note
-from crosscheck.suite.agreement import Thresholds, allowances, differences_of, load_thresholds
+from crosscheck.suite.agreement import (
+    Thresholds,
+    allowances,
+    by_quantity,
+    differences_of,
+    load_thresholds,
+)
 from crosscheck.suite.cases import Case, select, shipped_cases, user_cases
 from crosscheck.suite.effects import (
     GROUP,
@@ -200,7 +206,7 @@ class Run(Result):
             "verdict": self.outcome,
             "exit_status": self.outcome.exit_status,
             "worst": None if worst is None else {"case": worst[0].case.name, **worst[1].as_json()},
-            "poses": {"total": sum(len(r) for r in self.results), **counts(self)},
+            "poses": {"total": sum(len(r) for r in self.results), **counts(self.count)},
             "thresholds": self.thresholds,
             "notes": self.notes,
             "seed": self.seed,
@@ -236,14 +242,7 @@ def verdict_line(run: Run) -> str:
 
 def threshold_cells(run: Run) -> list[str]:
     """The thresholds as a row of the same table."""
-    settled, polished = run.thresholds.settled, run.thresholds.polished
-    values = [
-        settled.position_m,
-        settled.orientation_rad,
-        polished.position_m,
-        polished.orientation_rad,
-        polished.tension_N,
-    ]
+    values = by_quantity(run.thresholds).values()
     return ["allowed", "", *(f"{value:.0e}" for value in values), "", "", "", ""]
 
 

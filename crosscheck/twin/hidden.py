@@ -7,8 +7,8 @@ import binascii
 import json
 import textwrap
 import zlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -155,23 +155,17 @@ def _with_numbers(layout: Layout, robot: Robot, random: Generator) -> Term:
 
 
 def _shape(layout: Layout, k: int, robot: Robot, random: Generator) -> float:
-    draw = _SHAPES.get((layout.name, layout.names[k]))
-    return float(layout.null[k]) if draw is None else draw(layout, k, robot, random)
-
-
-def _radius(layout: Layout, k: int, robot: Robot, random: Generator) -> float:
-    length = float(np.mean(robot.nominal_lengths(robot.reference_pose[None])))
-    return length * float(random.uniform(0.04, 0.1))
-
-
-_SHAPES: dict[tuple[str, str], Callable[[Layout, int, Robot, Generator], float]] = {
-    ("drum_eccentricity", "drum_radius_m"): _radius,
-    ("thermal_expansion", "zero_temperature_C"): lambda *_: 20.0,
-    ("hysteresis", "stretch_m"): lambda layout, k, robot, random: float(
-        layout.scale[k] * random.uniform(0.3, 2.0)
-    ),
-    ("creep", "time_s"): lambda layout, k, robot, random: float(random.uniform(20.0, 200.0)),
-}
+    match layout.name, layout.names[k]:
+        case "drum_eccentricity", "drum_radius_m":
+            length = np.mean(robot.nominal_lengths(robot.reference_pose[None]))
+            return float(length * random.uniform(0.04, 0.1))
+        case "thermal_expansion", "zero_temperature_C":
+            return 20.0
+        case "hysteresis", "stretch_m":
+            return float(layout.scale[k] * random.uniform(0.3, 2.0))
+        case "creep", "time_s":
+            return float(random.uniform(20.0, 200.0))
+    return float(layout.null[k])
 
 
 # What a twin hides, and the file that keeps it from being read by accident.
@@ -244,12 +238,10 @@ class Answer:
         Raises:
             KeyError, TypeError: the document is something else.
         """
-        moves = {name: Moves(**one) for name, one in document["moves_over_noise"].items()}
-        together = Moves(**document["all_move_over_noise"])
-        rest = {
-            key: document[key] for key in ("robot", "seed", "values", "sigma", "poses", "truth")
-        }
-        return cls(moves_over_noise=moves, all_move_over_noise=together, **rest)
+        own = {field.name: document[field.name] for field in fields(cls)}
+        own["moves_over_noise"] = {k: Moves(**one) for k, one in own["moves_over_noise"].items()}
+        own["all_move_over_noise"] = Moves(**own["all_move_over_noise"])
+        return cls(**own)
 
 
 def seal(answer: Answer) -> str:

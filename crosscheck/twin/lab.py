@@ -54,7 +54,8 @@ def trajectory(robot: Robot, points: int = 18, extent: float = 1.0) -> Trajector
     _to_and_fro(runs, "across", _across(points, reach))
     changes = {name: _base_change(frame, reach, part) for name, part in runs.items()}
     changes["loop"] = _loop(frame, reach, 2 * points)
-    poses = np.concatenate([_reachable(robot, extent * change) for change in changes.values()])
+    change = extent * np.concatenate([*changes.values()])
+    poses = onto_joints(robot, pose_add(np.tile(robot.reference_pose, (len(change), 1)), change))
     counts = [len(change) for change in changes.values()]
     return Trajectory(poses, np.repeat(np.array(list(changes)), counts), _clock(counts))
 
@@ -114,17 +115,16 @@ def _loop(frame: Array, reach: Array, points: int) -> Array:
     return np.concatenate([local @ frame, tilt @ frame], axis=1)
 
 
-def _reachable(robot: Robot, change: Array) -> Array:
-    """Poses (n, 7) changed from the reference; on joints, the part of the change along them."""
-    start = np.tile(robot.reference_pose, (len(change), 1))
+def onto_joints(robot: Robot, poses: Array) -> Array:
+    """The poses (n, 7), or for a robot on joints the nearest that one Gauss-Newton step gives."""
     if not robot.joints:
-        return pose_add(start, change)
+        return poses
     from seecr.description.joints import motion_columns, pose_of_values
 
-    at, screws = pose_of_values(robot, np.zeros((1, len(robot.joints))))
-    columns = motion_columns(screws, at[:, :3])[0]
-    wanted = pose_difference(pose_add(start, change), start)
-    return pose_of_values(robot, wanted @ np.linalg.pinv(columns).T)[0]
+    start, screws = pose_of_values(robot, np.zeros((1, len(robot.joints))))
+    columns = motion_columns(screws, start[:, :3])[0]
+    values = pose_difference(poses, start) @ np.linalg.pinv(columns).T
+    return pose_of_values(robot, values)[0]
 
 
 def _clock(counts: list[int]) -> Array:

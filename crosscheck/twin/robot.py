@@ -128,20 +128,6 @@ def _zero_pose(true: TrueRobot, effect: Any) -> None:
     true.zero_pose = np.concatenate([true.zero_pose[:3] + effect.position, turned])
 
 
-def _yielding(true: TrueRobot, effect: Any) -> None:
-    true.compliance += effect.sideways
-    true.compliance_up += effect.upwards
-
-
-def _length_scale(true: TrueRobot, effect: Any) -> None:
-    true.gain = true.gain + effect.factor
-
-
-def _exit_friction(true: TrueRobot, effect: Any) -> None:
-    true.friction += effect.friction
-    true.winch_side += effect.length
-
-
 def _hysteresis(true: TrueRobot, effect: Any) -> None:
     true.hysteresis += effect.amplitude
     true.hysteresis_stretch = effect.stretch
@@ -150,11 +136,6 @@ def _hysteresis(true: TrueRobot, effect: Any) -> None:
 def _creep(true: TrueRobot, effect: Any) -> None:
     true.creep += effect.amount
     true.creep_time = effect.time
-
-
-def _elasticity(true: TrueRobot, effect: Any) -> None:
-    true.quadratic += effect.quadratic
-    true.cubic += effect.cubic
 
 
 def _tilt(true: TrueRobot, effect: Any) -> None:
@@ -170,14 +151,14 @@ def _eccentricity(true: TrueRobot, effect: Any) -> None:
     true.run_out.append((effect.sine, effect.cosine, effect.drum_radius))
 
 
-def _add(name: str, parameter: str) -> Callable[[TrueRobot, Any], None]:
-    """An effect that adds its parameter to a number of the robot."""
+def _add(**parameters: str) -> Callable[[TrueRobot, Any], None]:
+    """An effect that adds its parameters, by the names of the robot's numbers."""
 
     def act(true: TrueRobot, effect: Any) -> None:
-        value = getattr(true, name)
-        more = getattr(effect, parameter)
-        setattr(true, name, value + np.reshape(more, np.shape(value)) if np.ndim(value) else
-                value + more)  # fmt: skip
+        for name, parameter in parameters.items():
+            value, more = getattr(true, name), getattr(effect, parameter)
+            more = np.reshape(more, np.shape(value)) if np.ndim(more) else more
+            setattr(true, name, value + more)
 
     return act
 
@@ -224,27 +205,27 @@ _SENSING: dict[str, Callable[[Any], Sensor]] = {
 }
 
 _BODILY: dict[str, Callable[[TrueRobot, Any], None]] = {
-    "cable_length_offset": _add("offset", "offset"),
+    "cable_length_offset": _add(offset="offset"),
     "initial_pose_error": _zero_pose,
-    "drum_gain": _add("gain", "gain"),
-    "length_scale": _length_scale,
+    "drum_gain": _add(gain="gain"),
+    "length_scale": _add(gain="factor"),
     "drum_eccentricity": _eccentricity,
-    "backlash": _add("backlash", "gap"),
+    "backlash": _add(backlash="gap"),
     "thermal_expansion": _thermal,
-    "pulley_radius": _add("pulley_radius", "radius"),
-    "exit_point_error": _add("exit_points", "error"),
-    "anchor_point_error": _add("anchor_points", "error"),
+    "pulley_radius": _add(pulley_radius="radius"),
+    "exit_point_error": _add(exit_points="error"),
+    "anchor_point_error": _add(anchor_points="error"),
     "stiffness": _stiffen,
     "cable_stiffness": _stiffen,
-    "nonlinear_elasticity": _elasticity,
-    "winch_side_length": _add("winch_side", "length"),
-    "cable_weight": _add("cable_weight", "weight"),
+    "nonlinear_elasticity": _add(quadratic="quadratic", cubic="cubic"),
+    "winch_side_length": _add(winch_side="length"),
+    "cable_weight": _add(cable_weight="weight"),
     "hysteresis": _hysteresis,
     "creep": _creep,
-    "exit_friction": _exit_friction,
-    "frame_compliance": _yielding,
-    "platform_mass": _add("mass", "added"),
-    "centre_of_mass": _add("centre_of_mass", "shift"),
+    "exit_friction": _add(friction="friction", winch_side="length"),
+    "frame_compliance": _add(compliance="sideways", compliance_up="upwards"),
+    "platform_mass": _add(mass="added"),
+    "centre_of_mass": _add(centre_of_mass="shift"),
     "external_wrench": _wrench,
     "gravity_tilt": _tilt,
 }

@@ -43,13 +43,9 @@ class World(Physics):
         self.cable_dofs = np.concatenate([hubs, nodes], axis=1)
         self.coupling = _coupling(places, self.n_dof, segments)
         self.set_load(true.wrench, true.gravity)
-        self._start_springs(true)
-        self._start_sheaves(true.up)
-
-    def _start_springs(self, true: TrueRobot) -> None:
-        self._rest = true.robot.rest_lengths.copy()
         self.free_share = np.ones(true.n_cables)
         self.set_springs(Springs.plain(true.robot.rest_lengths, true))
+        self._start_sheaves(true.up)
 
     def _start_sheaves(self, up: Array) -> None:
         """The frame in which sheaves turn: up, and two horizontal directions."""
@@ -144,7 +140,8 @@ class World(Physics):
         weight = self.true.cable_weight * up
         start = self._leaves_towards(end)
         nodes = hang(start, end, free, self.true.ea, weight, self.segments)
-        self.data.qpos[self._address(self.places.node_dofs)] = nodes
+        # a free platform has one more number in qpos than coordinates
+        self.data.qpos[self.places.node_dofs + (1 if self.is_free else 0)] = nodes
 
     def _leaves_towards(self, ends: Array) -> Array:
         """Where straight cables to points (m, 3) leave: exit points, or about sheaves' tangents."""
@@ -152,10 +149,6 @@ class World(Physics):
         if self.true.pulley_radius:
             start += (1.0 - self.free_share)[:, None] * (ends - start)
         return start
-
-    def _address(self, dofs: Index) -> Index:
-        """Indices in qpos: a free platform has one more number there."""
-        return dofs + (1 if self.is_free else 0)
 
     def update(self) -> None:
         """Update poses, sheaves and cable lengths to the present qpos."""

@@ -13,7 +13,6 @@ from crosscheck.suite.effects import (
     Counterpart,
     EffectCase,
     EffectResult,
-    _number,
     against_line,
     effect_cases,
     effect_cells,
@@ -21,7 +20,6 @@ from crosscheck.suite.effects import (
     shipped_effect_cases,
 )
 from crosscheck.suite.verdicts import Outcome
-from crosscheck.twin.hidden import CONTAINED
 from crosscheck.twin.robot import TRUE_EFFECTS
 from seecr.description.mjcf import model_path
 
@@ -116,9 +114,3 @@ def test_a_difference_outweighs_a_solve_without_an_answer():
     assert Outcome.of_all(every[:2]) is Outcome.NOT_CONVERGED
     assert Outcome.of_all([]) is Outcome.NOT_CONVERGED
     assert [one.exit_status for one in every] == [0, 3, 1]
-
-
-def test_an_effect_that_another_contains_moves_no_one_s_random_numbers():
-    numbers = [_number(name) for name in TRUE_EFFECTS if name not in CONTAINED]
-    assert numbers == list(range(len(numbers)))
-    assert sorted(map(_number, TRUE_EFFECTS)) == list(range(len(TRUE_EFFECTS)))

@@ -1,4 +1,4 @@
-"""The suite: its cases, how far two answers may be apart, and what each kind of pose is called."""
+"""The suite's cases in both physics: agreement, findings, limits, and several processes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import math
 from concurrent.futures import BrokenExecutor
 from dataclasses import replace
 from pathlib import Path
-from shutil import copyfile
 
 import numpy as np
 import pytest
@@ -16,16 +15,13 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.settle.settler import Settling, SettlingBatch
 from crosscheck.suite import agreement, verdicts
 from crosscheck.suite import run as suite
-from crosscheck.suite.agreement import SHIPPED, FindingLimits, load_thresholds, thresholds_toml
+from crosscheck.suite.agreement import FindingLimits, gap, load_thresholds
 from crosscheck.suite.cases import (
     Case,
     demobot_random,
     demobot_sweep,
-    robot_random,
-    robot_sweep,
     select,
     shipped_cases,
-    user_cases,
 )
 from crosscheck.suite.mujoco_robot import MujocoRobot, screw_motion
 from crosscheck.suite.results import CaseResult, failure_lines, finding_lines, remarks, worst_of
@@ -33,8 +29,7 @@ from crosscheck.suite.run import run_case, run_suite
 from crosscheck.suite.verdicts import Outcome, Verdict
 from seecr.description.mjcf import CABLES, model_path
 from seecr.errors import InputFileError
-from seecr.files import plain
-from seecr.pose import pose_add, pose_difference, quat_from_rotvec
+from seecr.pose import pose_add, pose_difference, quat_from_rotvec, quat_multiply
 
 PARALLEL, COGIRO = model_path("demobot_parallel"), model_path("demobot_cogiro")
 # Near a corner of the frame two taut cables are left, and their line meets the centre of mass.
@@ -79,210 +74,6 @@ def ends() -> dict[tuple[str, float], CaseResult]:
     }
 
 
-# --- cases ---------------------------------------------------------------------------------
-
-
-def test_shipped_cases_are_the_papers(shipped):
-    names = [case.name for case in shipped]
-    assert len(set(names)) == len(names)
-    for robot in ("cogiro", "parallel"):
-        for cable in CABLES:
-            kinds = ("z0.10", "z0.20", "random")
-            assert [f"{robot}-{cable}-{kind}" in names for kind in kinds] == [True] * 3
-    by_name = {case.name: case for case in shipped}
-    sweep = by_name["parallel-fishing-z0.20"].poses
-    assert sweep.shape == (24, 7)
-    assert (sweep[0, 0], sweep[-1, 0]) == (0.17, 0.63)
-    assert np.all(sweep[:, 1:] == [0.25, 0.2, 1, 0, 0, 0])
-    assert by_name["parallel-fishing-z0.20"].ea == 300.0
-    assert by_name["cogiro-vectran-random"].poses.shape == (200, 7)
-
-
-def test_random_poses_lie_in_the_frame_and_crossed_cables_turn(shipped):
-    for case in shipped:
-        if not case.name.endswith("-random") or not case.model.stem.startswith("demobot"):
-            continue
-        assert np.all(case.poses[:, :3] > 0.0)
-        assert np.all(case.poses[:, :3] < [0.8, 0.5, 0.45])
-        turn = 2 * np.arccos(np.clip(case.poses[:, 3], -1, 1))
-        if case.name.startswith(("cogiro", "off-centre")):
-            assert np.deg2rad(8) < turn.max() <= np.deg2rad(12)
-        else:
-            assert np.all(turn == 0.0)
-
-
-def test_turned_sweeps_turn_about_every_axis_and_planar_ones_about_theirs(shipped):
-    for case in shipped:
-        if not case.name.endswith("-turned"):
-            continue
-        turns = np.ptp(case.poses[:, 4:], axis=0)
-        axes = [1] if case.name.startswith("planar") else [0, 1, 2]
-        assert np.all(turns[axes] > np.sin(np.deg2rad(5.0)))
-        assert np.all(np.delete(turns, axes) == 0.0)
-
-
-def test_planar_robots_run_on_both_cables_at_more_heights(shipped):
-    by_name = {case.name: case for case in shipped}
-    for robot in ("two-cable", "vertical", "horizontal"):
-        for cable in CABLES:
-            case = by_name[f"planar-{robot}-{cable}-heights"]
-            assert case.cable == cable
-            heights = {*case.poses[:, 2], *by_name[f"planar-{robot}"].poses[:, 2]}
-            assert len(heights) == 5
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("cable", "mm", "degrees"), [("vectran", 15.7, 26.2), ("fishing", 4.7, 19.2)]
-)
-def test_a_tilted_command_is_compared_at_both_of_its_rests(shipped, cable, mm, degrees):
-    (case,) = select(shipped, [f"parallel-{cable}-tilted"])
-    result = run_case(case, load_thresholds())
-    assert result.outcome is Outcome.AGREE and result.compared.all() and not result.findings
-    for answers in (result.solution, result.settling):
-        away = pose_difference(answers.pose[:1], answers.pose[1:])[0]
-        assert 1e3 * np.linalg.norm(away[:3]) == pytest.approx(mm, abs=0.1)
-        assert np.degrees(np.linalg.norm(away[3:])) == pytest.approx(degrees, abs=0.1)
-    # there are no more: what SEECR finds beside its own rest is where the second start leads
-    found = seecr.solve(result.robot, case.poses[0], others=True)
-    np.testing.assert_allclose(found.pose, result.settling.pose[:1], rtol=0, atol=1e-8)
-    (others,) = found.others
-    np.testing.assert_allclose(others.pose, result.settling.pose[1:], rtol=0, atol=1e-8)
-    assert np.array_equal(result.as_json()["start"], case.starts)
-
-
-@pytest.mark.parametrize("cable", CABLES)
-@pytest.mark.parametrize("side", ["SEECR", "MuJoCo"])
-def test_the_other_rest_of_a_tilted_command_does_not_pass(shipped, cable, side, monkeypatch):
-    """A stable equilibrium of that very command, and still not the one that the start leads to."""
-    (case,) = select(shipped, [f"parallel-{cable}-tilted"])
-    if side == "SEECR":
-
-        def solve(robot, poses, *, start=None, **options):
-            other = None if start is None else start[::-1]
-            return seecr.solve(robot, poses, start=other, **options)
-
-        monkeypatch.setattr(suite, "seecr_solve", solve)
-    else:
-        settle = MujocoRobot.settle
-        monkeypatch.setattr(MujocoRobot, "settle", lambda s, p, starts: settle(s, p, starts[::-1]))
-    result = run_case(case, load_thresholds())
-    assert list(result.verdict) == [Verdict.BRANCH] * 2
-    assert result.outcome is Outcome.DIFFER
-    assert remarks(result) == "2 two equilibria (2 beyond limits)"
-    assert ", started at (0.4 0.25 0.15; 1 0 0 0): two stable" in failure_lines(result)[1]
-
-
-@pytest.mark.slow
-def test_the_seed_decides_the_random_poses():
-    one, same, other = shipped_cases(3), shipped_cases(3), shipped_cases(4)
-    for a, b, c in zip(one, same, other, strict=True):
-        assert np.array_equal(a.poses, b.poses)
-        assert np.array_equal(a.poses, c.poses) != a.name.endswith("-random")
-    poses = {case.name: case.poses for case in one}
-    assert not np.array_equal(poses["cogiro-vectran-random"], poses["cogiro-fishing-random"])
-
-
-@pytest.mark.parametrize("name", ["demobot_cogiro", "planar_two_cable", "planar_vertical"])
-def test_poses_for_any_robot_scale_with_it(name):
-    robot = seecr.load_robot(model_path(name))
-    hull = np.vstack([robot.exit_points, robot.reference_pose[:3]])
-    for poses in (robot_sweep(robot), robot_random(robot, np.random.default_rng(1), 50)):
-        assert np.all(poses[:, :3] >= hull.min(axis=0) - 1e-12)
-        assert np.all(poses[:, :3] <= hull.max(axis=0) + 1e-12)
-        # also with joints, whose manifold these poses must not leave
-        assert seecr.solve(robot, poses).converged.all()
-    assert np.ptp(robot_sweep(robot)[:, 0]) > 0.4
-
-
-def test_a_robot_a_hundred_times_larger_gets_poses_a_hundred_times_larger():
-    robot = seecr.load_robot(COGIRO)
-    pose = robot.reference_pose.copy()
-    pose[:3] *= 100
-    large = replace(
-        robot,
-        exit_points=100 * robot.exit_points,
-        anchor_points=100 * robot.anchor_points,
-        rest_lengths=100 * robot.rest_lengths,
-        reference_pose=pose,
-    )
-    small_poses, large_poses = robot_sweep(robot), robot_sweep(large)
-    np.testing.assert_allclose(large_poses[:, :3], 100 * small_poses[:, :3], rtol=1e-12)
-
-
-def test_select_by_pattern_and_refuses_unknown_names(shipped):
-    chosen = select(shipped, ["parallel-*-z0.10", "planar-vertical"])
-    names = ["parallel-vectran-z0.10", "parallel-fishing-z0.10", "planar-vertical"]
-    assert [case.name for case in chosen] == names
-    assert select(shipped, []) == shipped
-    with pytest.raises(CrosscheckError, match=r"^cogiro-vektran-z0\.1: .*cogiro-vectran-z0"):
-        select(shipped, ["planar-*", "cogiro-vektran-z0.1"])
-
-
-# --- thresholds ----------------------------------------------------------------------------
-
-
-def test_shipped_thresholds_are_those_agreed():
-    found = plain(load_thresholds())
-    assert found["settled"] == {"position_m": 1e-6, "orientation_rad": 1e-5}
-    assert found["polished"] == {"position_m": 1e-8, "orientation_rad": 1e-7, "tension_N": 1e-6}
-    assert found["findings"]["branches"] == 0
-    assert len(found["findings"]["free_to_move"]) == 14
-
-
-def test_a_copy_may_change_one_value_and_is_written_back(tmp_path):
-    copy = tmp_path / "mine.toml"
-    copy.write_text("[polished]\ntension_N = 2e-3\n")
-    thresholds = load_thresholds(copy)
-    assert thresholds.polished.tension_N == 2e-3
-    assert thresholds.polished.position_m == 1e-8
-    copy.write_text(thresholds_toml(thresholds))
-    assert load_thresholds(copy) == thresholds
-    assert thresholds_toml(load_thresholds()) == SHIPPED.read_text()
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (
-            "[polish]\nposition_m = 1",
-            r"'polish' is not a table of thresholds; expected polished or",
-        ),
-        (
-            "[polished]\nposition_mm = 1",
-            r"'position_mm' is not a key of \[polished\] of thresholds; expected position_m or",
-        ),
-        ("[settled]\nposition_m = 0", r"\[settled\] position_m: expected a positive number, got 0"),
-        ("[settled]\nposition_m = -1e-6", r"expected a positive number, got -1e-06"),
-        ("[settled]\nposition_m = nan", r"expected a positive number, got nan"),
-        ("[settled]\nposition_m = inf", r"expected a positive number, got inf"),
-        ("[settled]\nposition_m = true", r"expected a positive number, got True"),
-        ("[settled]\nposition_m = '1e-6'", r"expected a positive number, got '1e-6'"),
-        ("settled = 3", r"settled: expected a table \[settled\], got 3"),
-        ("[settled\n", r"is not TOML: .*line 1"),
-        ("[findings]\nbranches = 0.5", r"\[findings\] branches: expected a whole number from 0"),
-        ("[findings]\nbranches = -1", r"branches: expected a whole number from 0 on, got -1"),
-        ("[findings]\nfree_to_move = 'x 1'", r"free_to_move: expected a list of names"),
-        ("[findings]\nfree_elsewhere = 2", r"free_elsewhere: expected a share from 0 to 1, got 2"),
-    ],
-)
-def test_bad_thresholds(tmp_path, text, message):
-    path = tmp_path / "bad.toml"
-    path.write_text(text)
-    with pytest.raises(InputFileError, match=message) as caught:
-        load_thresholds(path)
-    assert str(caught.value).startswith(f"{path}: ")
-    assert "\n" not in str(caught.value)
-
-
-def test_thresholds_that_cannot_be_read(tmp_path):
-    with pytest.raises(InputFileError, match=r"none\.toml: no such file; expected thresh"):
-        load_thresholds(tmp_path / "none.toml")
-    (tmp_path / "latin.toml").write_bytes(b"# caf\xe9\n")
-    with pytest.raises(InputFileError, match=r"is not UTF-8 \(byte number 6\)"):
-        load_thresholds(tmp_path / "latin.toml")
-
-
 # --- both physics --------------------------------------------------------------------------
 
 
@@ -305,18 +96,6 @@ def test_agreement_leaves_room(ends):
     # far inside the thresholds: what is left is rounding, not luck
     for result in ends.values():
         assert all(worst.ratio < 0.05 for worst in result.worst.values())
-
-
-@pytest.mark.parametrize("model", [PARALLEL, COGIRO, model_path("planar_vertical")])
-def test_a_stiffness_changed_by_a_thousandth_on_one_side_differs(tmp_path, model):
-    changed = with_stiffer_cable(model, tmp_path, 1.001)
-    robot = seecr.load_robot(model)
-    case = case_of(model, robot_sweep(robot, 3), mujoco_model=changed, cable=None)
-    result = run_case(case, load_thresholds())
-    assert result.outcome is Outcome.DIFFER
-    assert result.count(Verdict.DIFFERS) >= 2
-    assert "further apart than allowed" in result.findings[0].text
-    assert result.worst["position_m"].ratio > 1 or result.worst["tension_N"].ratio > 1
 
 
 def test_another_mjcf_for_mujoco_keeps_its_own_stiffness(tmp_path):
@@ -639,10 +418,47 @@ def test_worst_is_the_largest_share_of_what_is_allowed(ends):
     assert worst_of([]) is None
 
 
-def test_user_cases_name_the_file(tmp_path):
-    file = tmp_path / "my robot.xml"
-    copyfile(COGIRO, file)
-    sweep, random = user_cases(file, n_random=7)
-    assert (sweep.name, random.name) == ("my robot-sweep", "my robot-random")
-    assert len(random.poses) == 7
-    assert sweep.mujoco_model == sweep.model
+AXIS = np.array([0.48, -0.6, 0.64])
+
+
+def turned(angle: float) -> np.ndarray:
+    """A pose turned by an angle about AXIS from one that is turned itself."""
+    home = quat_from_rotvec(np.array([0.3, -1.1, 0.7]))
+    return np.r_[1.0, 2.0, 3.0, quat_multiply(quat_from_rotvec(angle * AXIS), home)]
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-9, 1e-5, 0.1, 2.0, 3.0, np.pi - 1e-6])
+def test_the_angle_is_that_of_the_turn(angle):
+    distance, found = gap(turned(angle), turned(0.0))
+    assert distance == 0.0
+    assert found == pytest.approx(angle, rel=1e-7, abs=4e-16 if angle < 1 else 1e-9)
+
+
+def test_small_angles_keep_their_digits():
+    angles = np.array([1e-14, 1e-10, 1e-7])
+    found = gap(np.stack([turned(a) for a in angles]), turned(0.0))[1]
+    np.testing.assert_allclose(found, angles, rtol=0, atol=1e-15)
+
+
+def test_a_quaternion_and_its_negative_are_one_rotation():
+    other = turned(0.4) * np.r_[1, 1, 1, -1, -1, -1, -1]
+    assert gap(other, turned(0.4))[1] < 1e-15
+
+
+def test_both_rotations_of_two_random_poses_say_the_same():
+    random = np.random.default_rng(2)
+    a, b = random.normal(size=(2, 50, 7))
+    a[:, 3:] /= np.linalg.norm(a[:, 3:], axis=1, keepdims=True)
+    b[:, 3:] /= np.linalg.norm(b[:, 3:], axis=1, keepdims=True)
+    distance, angle = gap(a, b)
+    change = pose_difference(a, b)
+    np.testing.assert_allclose(distance, np.linalg.norm(change[:, :3], axis=1), rtol=1e-14)
+    np.testing.assert_allclose(angle, np.linalg.norm(change[:, 3:], axis=1), rtol=1e-7)
+
+
+def test_where_there_is_no_pose_there_is_no_gap():
+    nowhere = np.full(7, np.nan)
+    distance, angle = gap(np.stack([nowhere, turned(0.2)]), turned(0.0))
+    assert np.isnan(distance[0]) and np.isnan(angle[0])
+    assert distance[1] == 0.0 and angle[1] == pytest.approx(0.2, rel=1e-12)
+    assert np.isnan(gap(nowhere, nowhere)[1])

@@ -16,7 +16,6 @@ from crosscheck.twin.lab import (
     Measured,
     key_of,
     lacking_in,
-    random_of,
     read_of,
     rest_of,
     sweeps,
@@ -85,19 +84,6 @@ def test_nothing_is_read_at_way_points_and_without_rest() -> None:
         assert np.isnan(part).all(axis=1).tolist() == [False, True, True, False]
     none = read_of(measured(commands(2), Sigma(1e-3, 1e-3)), np.random.default_rng(0))
     assert none.read.all() and np.isnan(none.tensions).all()
-
-
-def test_noise_does_not_depend_on_whether_tensions_are_read() -> None:
-    both = [
-        read_of(measured(commands(3), Sigma(1e-3, 1e-3, pull)), random_of(5, 2)).position
-        for pull in (None, 0.1)
-    ]
-    np.testing.assert_array_equal(*both)
-
-
-def test_each_purpose_and_other_commands_have_noise_of_their_own() -> None:
-    drawn = [random_of(*key).standard_normal() for key in ((1, 2), (1, 3), (2, 2), (1, 2, (7,)))]
-    assert len(set(drawn)) == 4 and random_of(1, 2).standard_normal() == drawn[0]
 
 
 def test_commands_are_the_same_to_a_tenth_of_a_nanometre() -> None:

@@ -1,18 +1,98 @@
-"""Newton's method on MuJoCo's forces against closed forms of one cable and plain linear algebra."""
+"""A user's MJCF made ready for settling, and Newton's method on MuJoCo's forces."""
 
 from __future__ import annotations
+
+import re
+from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
-from crosscheck.settle.newton import minimise, neutral_stiffness, stiffness
-from crosscheck.settle.physics import Physics
+from crosscheck.settle.newton import minimise, stiffness
+from crosscheck.settle.physics import (
+    Physics,
+    compile_model,
+    ignored_in,
+    ignored_note,
+    platform_of,
+)
 from crosscheck.twin.build import Springs
 from crosscheck.twin.robot import true_robot
 from crosscheck.twin.world import World
-from seecr.description.mjcf import load_robot, model_path
+from seecr.description.mjcf import load_robot, model_names, model_path, quiet_mujoco
 from seecr.effects import effect_named
+from seecr.errors import RobotError
+
+PLANAR = model_path("planar_vertical").read_text(encoding="utf-8")
+
+
+def planar(old: str = "", new: str = "") -> mujoco.MjModel:
+    assert PLANAR.count(old) >= 1
+    return mujoco.MjModel.from_xml_string(PLANAR.replace(old, new, 1) if old else PLANAR)
+
+
+SLIDE = '<joint name="x" type="slide"'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "name"),
+    [
+        (SLIDE, f'{SLIDE} range="-1 1"', "joint limits"),
+        ('width="0.0012"', 'width="0.0012" range="0 2" limited="true"', "tendon limits"),
+        (SLIDE, f'{SLIDE} frictionloss="0.1"', "dry friction"),
+        ('width="0.0012"', 'width="0.0012" frictionloss="0.1"', "dry friction"),
+        (SLIDE, f'{SLIDE} damping="0.1"', "damping"),
+        ('contype="0" conaffinity="0"', 'contype="1" conaffinity="1"', "contacts"),
+    ],
+)
+def test_what_hinders_is_named_one_by_one(old, new, name):
+    model = planar(old, new)
+    assert ignored_in(model, platform_of(model, "r")) == (name,)
+    assert Physics.of(planar(old, new)).ignored == (name,)
+
+
+@pytest.mark.parametrize("name", model_names())
+def test_nothing_hinders_a_shipped_robot(name):
+    model = compile_model(model_path(name))
+    assert ignored_in(model, platform_of(model, name)) == ()
+
+
+def test_the_note_is_one_sentence_with_the_file_and_all_names():
+    note = ignored_note(Path("my.xml"), ("damping", "contacts"))
+    assert note.startswith("my.xml: switched off here: damping, contacts; ")
+    assert "\n" not in note and not note.endswith(".")
+
+
+def test_mujoco_is_quiet_inside_and_speaks_again_after():
+    assert mujoco.get_mju_user_warning() is None
+    with quiet_mujoco(), quiet_mujoco():
+        assert mujoco.get_mju_user_warning() is not None
+    assert mujoco.get_mju_user_warning() is None
+
+
+def test_a_singular_platform_leaves_no_log(tmp_path, monkeypatch):
+    """Its mass 1e6 m away makes MuJoCo warn wherever it is compiled, placed or settled."""
+    monkeypatch.chdir(tmp_path)
+    inertial = re.compile(r'<inertial pos="[^"]*"')
+    Path("far.xml").write_text(inertial.sub('<inertial pos="0 0 1e6"', PLANAR), encoding="utf-8")
+    with pytest.raises(RobotError, match="has its centre of mass 1e"):
+        load_robot("far.xml")
+    Physics.of("far.xml").update()
+    assert [file.name for file in tmp_path.iterdir()] == ["far.xml"]
+
+
+def test_without_a_load_residuals_are_relative_to_what_cables_pull() -> None:
+    physics = Physics.of(model_path("planar_vertical"))
+    physics.set_load(gravity=np.zeros(3))
+    assert 0.0 < physics.force_scale < np.inf and 0.0 < physics.rounding() < 1e-6
+    before = physics.force_scale
+    physics.set_cables(0.9 * physics.rest_lengths, physics.stiffness * physics.rest_lengths)
+    physics.place(physics.pose())
+    assert physics.force_scale == pytest.approx(np.sum(physics.tensions())) != before
+    physics.set_load()
+    assert physics.force_scale == pytest.approx(physics.mass * 9.81)
+
 
 EA, REST, MASS, G = 100.0, 0.75, 0.4, 9.81
 POINT_MASS = f"""<mujoco>
@@ -58,26 +138,6 @@ def test_where_nothing_pulls_there_is_no_way_to_go(hanging):
     hanging.data.qpos[:] = [0.0, 0.2]
     assert minimise(hanging, 1e-12, 200) == (pytest.approx(1.0), 0)
     assert hanging.data.qpos.tolist() == [0.0, 0.2]
-
-
-def test_it_stops_after_the_steps_it_may_take(hanging):
-    hanging.data.qpos[:] = [0.05, 0.03]
-    size, steps = minimise(hanging, 1e-12, 1)
-    assert steps == 1 and size > 1e-12
-
-
-def test_directions_without_stiffness_are_left_alone(hanging):
-    matrix, force = np.diag([1e-9, 100.0]), np.array([1.0, 5.0])
-    np.testing.assert_allclose(hanging.solve(matrix, force, 0.0, neutral=1e-6), [0.0, 0.05])
-    np.testing.assert_allclose(hanging.solve(matrix, force, 25.0, neutral=1e-6), [0.0, 0.04])
-    assert hanging.solve(np.diag([-3.0, 100.0]), force, 0.0, neutral=1e-6) is None
-    np.testing.assert_allclose(
-        hanging.solve(np.diag([-3.0, 100.0]), force, 5.0, neutral=1e-6), [0.5, 5.0 / 105.0]
-    )
-
-
-def test_what_rounding_can_pretend_is_far_below_a_cable(hanging):
-    assert 0.0 < neutral_stiffness(hanging) < 1e-6 * EA / REST
 
 
 def world_of(name: str, segments: int, **values: float) -> World:

@@ -1,0 +1,75 @@
+"""Faults planted in the code itself: one piece of a module's text becomes another.
+
+Only the changed functions get new code, in place, so that whoever imported them runs it too.
+Compiled functions run as plain Python meanwhile: nothing is compiled, and nothing cached.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import sys
+from pathlib import Path
+from types import CodeType, ModuleType
+from typing import Any
+
+import pytest
+from numba.core.dispatcher import Dispatcher
+
+import seecr.compiled
+
+COMPILED = "seecr.compiled."
+
+
+def run_in_python(patch: pytest.MonkeyPatch) -> None:
+    """Let every compiled function run as the Python that it is written in."""
+    for module in pkgutil.iter_modules(seecr.compiled.__path__):
+        importlib.import_module(COMPILED + module.name)
+    for module in [
+        m for name, m in sys.modules.items() if name.startswith(("seecr", "crosscheck"))
+    ]:
+        for name, value in list(vars(module).items()):
+            if isinstance(value, Dispatcher):
+                patch.setattr(module, name, value.py_func)
+
+
+def plant(patch: pytest.MonkeyPatch, name: str, old: str, new: str) -> None:
+    """Replace a piece of the text of a module, which must stand there once."""
+    module = importlib.import_module(name)
+    assert module.__file__ is not None
+    path = Path(module.__file__)
+    text = path.read_text(encoding="utf-8")
+    assert text.count(old) == 1, f"{path.name}: expected {old!r} once, got {text.count(old)} times"
+    before, after = (_functions(compile(t, path, "exec")) for t in (text, text.replace(old, new)))
+    changed = [key for key in before if before[key].co_code != after[key].co_code
+               or before[key].co_consts != after[key].co_consts
+               or before[key].co_names != after[key].co_names]  # fmt: skip
+    planted = [key for key in changed if _set_code(patch, module, key, after[key])]
+    assert planted, f"{path.name}: {old!r} is in no function"
+
+
+def _functions(code: CodeType, place: str = "") -> dict[str, CodeType]:
+    """Code of the functions and methods of a module, by qualified name; their parts are theirs."""
+    found = {}
+    for one in code.co_consts:
+        if not isinstance(one, CodeType) or one.co_name.startswith("<"):
+            continue
+        if one.co_flags & 0x2:  # CO_NEWLOCALS: a function, not the body of a class
+            found[place + one.co_name] = one
+        else:
+            found |= _functions(one, f"{place}{one.co_name}.")
+    return found
+
+
+def _set_code(patch: pytest.MonkeyPatch, module: ModuleType, key: str, code: CodeType) -> bool:
+    owner: Any = module
+    *classes, name = key.split(".")
+    for one in classes:
+        owner = getattr(owner, one)
+    value = vars(owner).get(name)
+    for wrapped in ("fget", "func", "__func__", "py_func", "__wrapped__"):
+        value = getattr(value, wrapped, value)
+    if not hasattr(value, "__code__"):
+        return False
+    patch.setattr(value, "__code__", code)
+    return True
