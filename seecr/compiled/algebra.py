@@ -401,13 +401,11 @@ def _softest(matrix, scaled, factor, work, direction):
 
 @jit_allocating
 def softest_batch(matrices, values, directions):
-    """Smallest eigenvalues and eigenvectors of symmetric matrices (n, d, d), from lower triangles.
+    """Smallest eigenvalues (n,) and eigenvectors (n, d) of symmetric matrices (n, d, d), filled.
 
-    Args:
-        matrices: only read.
-        values: (n,), filled; nan if an entry is not finite.
-        directions: (n, d), filled: of unit length, with a positive largest component; for a
-            repeated eigenvalue, any of its eigenvectors.
+    Only lower triangles are read; values are nan if an entry is not finite. Directions have unit
+    length and a positive largest component; for a repeated eigenvalue they are any of its
+    eigenvectors.
     """
     d = matrices.shape[1]
     scaled, factor, work = np.empty((d, d)), np.empty((d, d)), np.empty((4, d))
@@ -473,15 +471,10 @@ def _motion_of(direction, factor, columns, motion):
 
 @jit_allocating
 def softest_motions(matrices, columns, values, motions):
-    """The same on joints, as motions of the platform: of K v = value M v, M their products.
+    """The same on joints, as motions (n, 6) of the platform: of K v = value M v, M their products.
 
-    Unlike eigenvalues of K itself they do not depend on the order and places of joints.
-
-    Args:
-        matrices: (n, d, d) K by steps of the joints, only read.
-        columns: (n, d, 6) motion of the platform per step of each joint.
-        values: (n,), filled; nan if an entry is not finite.
-        motions: (n, 6), filled: of unit length, with a positive largest component.
+    Unlike eigenvalues of K, which is by steps of the joints, they do not depend on the order and
+    places of joints. ``columns`` (n, d, 6) are the platform's motion per step of each joint.
     """
     d = matrices.shape[1]
     scaled, factor, work = np.empty((d, d)), np.empty((d, d)), np.empty((4, d))

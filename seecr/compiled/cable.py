@@ -52,17 +52,16 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
 
     Args:
         row: the cable (N_COLUMNS,).
-        start: (3,) [m] its anchor point at the commanded pose, base frame.
-        move: (3,) [m] displacement of the anchor point from there. It is separate, since the
-            stretch of a stiff cable would be lost in the rounding of absolute coordinates.
+        start, move: (3,) [m] its anchor point at the commanded pose, base frame, and displacement
+            from there. They are separate, since the stretch of a stiff cable would be lost in the
+            rounding of absolute coordinates.
         up: (3,) unit vector against gravity.
         guess: (3,) start of the catenary, overwritten with its solution.
         work: (N_WORK, 6) scratch.
-        force: (3,) [N], filled.
-        stiffness: (3, 3) [N/m], minus the derivative of the force by ``move``, filled; with weight
-            over a pulley its symmetric part, see :func:`seecr.compiled.catenary.catenary_energy`.
-        gradient: (3,) [N/m], derivative of the reported tension by ``move``, filled.
-        state: (N_STATE,), filled.
+        force: (3,) [N].
+        stiffness: (3, 3) [N/m], minus the derivative of the force by ``move``; with weight over a
+            pulley its symmetric part, see :func:`seecr.compiled.catenary.catenary_energy`.
+        gradient: (3,) [N/m], derivative of the reported tension by ``move``. state: (N_STATE,).
 
     Returns:
         False if the cable's own equations could not be solved.

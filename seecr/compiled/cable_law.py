@@ -297,16 +297,12 @@ def strain_of_tension(row, tension):
 
 @jit
 def pulley_geometry(across, rise, radius):
-    """Length and direction of a straight cable over its swivelling pulley.
+    """Total and free length of a cable over its swivelling pulley, and (sin psi, -cos psi).
 
     In the pulley's own vertical plane, seen from the exit point A, the anchor point is ``across``
-    [m] away horizontally and ``rise`` [m] above (negative: below). The cable enters at A from
-    below, runs over the top, and leaves along the tangent at the angle psi, measured at the centre
-    from the horizontal direction upwards.
-
-    Returns:
-        total length (arc and free part), free length, and the direction from the pulley to the
-        anchor point, (sin psi, -cos psi).
+    [m] away horizontally and ``rise`` [m] above. The cable enters at A from below, runs over the
+    top, and leaves along the tangent at the angle psi, measured at the centre from the horizontal
+    direction upwards, in the direction returned.
     """
     dx, dz = across - radius, rise
     distance = math.sqrt(dx * dx + dz * dz)

@@ -106,22 +106,20 @@ def catenary_energy(row, unknown, fall, raised):
     It is the elastic energy, E = int T^2/(2 EA) ds, and the weight's, both in the complementary
     form E = h x + v z - int (T + T^2/(2 EA)) ds (our own derivation), which is stationary in h and
     v where x and z are the catenary's spans; large terms are cancelled by hand. Everything else in
-    series with the tension T at the exit point is added: each metre paid out by it contributes
-    T + T^2/(2 EA).
+    series with the tension T at the exit point is added: each metre paid out by it contributes T +
+    T^2/(2 EA).
+
+    It is nan for a law without one, and over a pulley, where the pull has no potential: cable that
+    reaches the free span brings its height along, w r sin psi per metre. For cable paid out by the
+    wheel's rotation, d(psi), that is the work of an unstretched cable's weight on the wheel. But
+    the stretch S(T, psi) of arc and series is that of a weightless cable, so that on a closed path
+    the pull does the work w r int sin psi dS.
 
     Args:
-        row: the cable (N_COLUMNS,).
-        unknown: (3,) its pull (h, v) [N] and unstretched length [m], solved.
+        row, unknown: the cable, and its pull (h, v) [N] and unstretched length [m], solved.
         fall: [m] height of the exit point above the anchor point.
-        raised: [m] height of the anchor point above that at the commanded pose; the weight's energy
-            is relative to a cable that hangs straight there.
-
-    Returns:
-        The energy; nan for a law without one, and over a pulley, where the pull has no potential:
-        cable that reaches the free span brings its height along, w r sin psi per metre. For cable
-        paid out by the wheel's rotation, d(psi), that is the work of an unstretched cable's weight
-        on the wheel. But the stretch S(T, psi) of arc and series is that of a weightless cable, so
-        that on a closed path the pull does the work w r int sin psi dS.
+        raised: [m] height of the anchor point above that at the commanded pose, where a cable that
+            hangs straight has no energy of its weight.
     """
     if row[RADIUS] > 0.0 or not has_energy(row):
         return np.nan
@@ -146,8 +144,8 @@ def catenary_energy(row, unknown, fall, raised):
 def _other_stretch(row, tension):
     """Unstretched length [m] equivalent to all stretch but the catenary's own T/EA, and its slope.
 
-    It is taken at the tension of the upper end. A cable with this additional stretch is equivalent
-    to one that is longer by stretch/(1 + T/EA) before the catenary stretches it again.
+    It is taken at the upper end: a cable with this additional stretch is equivalent to one that is
+    longer by stretch/(1 + T/EA) before the catenary stretches it again.
     """
     ea, rest = row[EA], row[REST]
     behind, behind_slope = winch_tension(row, tension)
@@ -314,12 +312,7 @@ def _vertical_pull(h, rise, w, length, ea, v):
 
 @jit
 def bracketed_pull(across, rise, w, length, ea):
-    """Horizontal and vertical pull (h, v) [N] of a catenary at its lower end.
-
-    Args:
-        across, rise: spans [m] from the lower to the upper end, across > 0.
-        w: weight per metre [N/m]. length: unstretched [m]. ea: E S [N].
-    """
+    """Pull (h, v) [N] of a catenary at its lower end, by spans [m] to the upper, across > 0."""
     # logarithmic, since the pull of a cable that hangs in a loop is extremely small
     u, v = math.log(0.5 * w * length), 0.5 * w * (rise - length)
     low, high = u, u

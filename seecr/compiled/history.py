@@ -65,14 +65,10 @@ def _shares(span):
 
 @jit_inner
 def take_past(row, kept, elapsed, fresh):
-    """Fill the columns OF_THE_PAST of a cable with its history.
+    """Fill the columns OF_THE_PAST of a cable with its history (N_KEPT,), ``elapsed`` [s] after it.
 
     At the start of a run the platform waits at the reference pose with its history cleared: there
     the cable has neither hysteresis nor friction.
-
-    Args:
-        row: the cable (N_COLUMNS,). kept: (N_KEPT,).
-        elapsed: [s] since the row before. fresh: whether a run starts.
     """
     before, now = _shares(elapsed / row[CREEP_TIME])
     share = row[CREEP_PART] / row[EA]
@@ -91,12 +87,9 @@ def take_past(row, kept, elapsed, fresh):
 
 @jit_inner
 def keep_past(row, state, fresh, kept):
-    """Store the history that the next row needs of a solved cable.
+    """Store the history (N_KEPT,) that the next row needs of a cable as it was solved.
 
-    Args:
-        row: the cable as it was solved. state: (N_STATE,) from its law; the hysteretic part of a
-            slack cable's tension is filled in.
-        kept: (N_KEPT,), filled.
+    The hysteretic part of a slack cable's tension is filled in its ``state``.
     """
     kept[_CREPT] = row[CREEP] + row[CREEP_RATE] * state[TENSION]
     strain = state[STRAIN]
@@ -145,15 +138,10 @@ def walk_in_order(
 ):  # fmt: skip
     """Solve waypoints in order, each from the one before; all outputs are filled.
 
-    A waypoint that is not solved ends its run, since the path to later rows is then unknown. The
-    later ones count as stalled; searching for each would take up to ``limit`` steps.
-
-    Args:
-        cables: (N, m, N_COLUMNS); the columns OF_THE_PAST are filled.
-        fresh: (N,) waypoints that start a run. elapsed: (N,) [s] since the one before.
-        onward: (N,) waypoints that go on from the one before as that went on from its own.
-        enough: (N,) residual/scale at which to stop.
-        Other arguments are those of solve_batch.
+    A waypoint that is not solved ends its run, since the path to later rows is then unknown: these
+    count as stalled. Arguments are those of solve_batch, and (N,) each: ``fresh`` waypoints start a
+    run, ``onward`` ones go on from the one before as that went on from its own, ``elapsed`` [s]
+    since the one before, ``enough`` residual/scale at which to stop.
     """
     n, m = cables.shape[0], cables.shape[1]
     softened = np.empty_like(cables[0])
@@ -217,12 +205,10 @@ def _normalise(deviation):
 def _pull_side(
     table, load, part, pose, screws, deviation, values, length, guess, elapsed, fresh, side, space
 ):
-    """Tensions and gradient of one side, at a small displacement from the equilibrium.
+    """Tensions and gradient of one side, at a displacement ``part`` (d,) [m] from the equilibrium.
 
-    Args:
-        table, load: of that side. part: (d,) [m] the displacement.
-        side: rows with their history, the history kept, tensions, gradient; all but the second are
-            filled.
+    ``side`` is rows with their history, the history kept, tensions and gradient; all but the second
+    are filled.
     """
     rows, kept, pulls, gradient = side
     advance(deviation, values, part, length, screws, pose, space[12], space[13], space[1])
@@ -243,14 +229,9 @@ def _keep_side(
 ):  # fmt: skip
     """Store the history that the next row needs of one side's cables, at that side's equilibrium.
 
-    Args:
-        part: (d,) [m] displacement of that side from the equilibrium. more: (d,) [m] the part of it
-            since the tensions were computed.
-        side: as _pull_side left it; tensions are updated.
-
-    Returns:
-        Whether a tension changed otherwise than its slope says: then a cable turned round between,
-        and that side's equilibrium is not quite there.
+    It is ``part`` (d,) [m] from the equilibrium, of which ``more`` since the tensions were
+    computed. Returns whether a tension changed otherwise than its slope says: then a cable turned
+    round between, and that side's equilibrium is not quite there.
     """
     rows, kept, pulls, _gradient = side
     placed, bent = False, False
@@ -294,13 +275,8 @@ def change_on_the_way(
     reverses on either side and the stiffness holds. Where a cable turned round between there and
     where that side then is, it is evaluated again there.
 
-    Args:
-        plus, minus: (N, m, N_COLUMNS), the columns OF_THE_PAST are ignored.
-        deviation, values: (N, 7), (N, d) equilibria of the path between the two.
-        slopes, inverse: (N, m, d) of the tensions, (N, d, d) inverse of the stiffness there.
-        solved: (N,) rows with an equilibrium; others end their run and get zero changes.
-        step: (N, d) [m] in the loop's coordinates, of plus minus minus, filled.
-        tension: (N, m) [N], the same, filled.
+    Filled are ``step`` (N, d) [m] in the loop's coordinates and ``tension`` (N, m) [N], of plus
+    minus minus. Rows that are not solved end their run and get zero changes.
     """
     n, m, d = plus.shape[0], plus.shape[1], step.shape[1]
     ahead = (np.empty_like(plus[0]), np.zeros((m, N_KEPT)), np.zeros(m), np.zeros(d))

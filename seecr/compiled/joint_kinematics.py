@@ -130,12 +130,7 @@ _IDLE = 1e-15
 
 @jit_allocating
 def make_placing_space(current, columns, turns):
-    """Scratch arrays: those given, basis (turns, d), its rotations, steps, and a linear system.
-
-    Args:
-        current: (d, N_CURRENT) joints as they are, and columns: (d, 6) their motion; none for a
-            free platform. turns: independent rotations that keep the origin.
-    """
+    """Scratch arrays: those given, basis (turns, d), its rotations, steps, and a linear system."""
     d = current.shape[0]
     return (
         current, columns, np.zeros((turns, d)), np.zeros((d, 3)), np.zeros((d, d)),
@@ -172,17 +167,10 @@ def _least_turn(x, y, z, space):
 
 @jit_inner
 def bring(screws, values, length, pose, x, y, z, deviation, space):
-    """Bring the origin of a platform on joints to a displacement x, y, z from ``pose``.
+    """Bring the origin of a platform on joints to x, y, z from ``pose``; whether it is there.
 
-    It turns as little as its joints allow, not at all if slides can move it. Does nothing to a free
-    platform.
-
-    Args:
-        screws: (d, 7). values: (d,) [m], changed. length: [m]. pose: (7,). deviation: (7,), filled.
-        space: scratch arrays, those of make_placing_space.
-
-    Returns:
-        whether it is there.
+    It turns as little as its joints allow, not at all if slides can move it. ``values`` (d,) [m]
+    are changed, ``deviation`` (7,) is filled. Does nothing to a free platform.
     """
     if screws.shape[0] == 0:
         return True
@@ -248,12 +236,10 @@ def turning_basis(space):
 
 @jit_allocating
 def bring_batch(screws, poses, rows, away, length, places, there):
-    """Bring the origins of k displaced platforms on joints to given displacements, see bring.
+    """Bring the origins of k displaced platforms on joints to places (k, 3) [m], see bring.
 
-    Args:
-        screws: (n, d, 7). poses: (n, 7). rows: (k,) which of these each is displaced from.
-        away: (k, d) [m] joint values minus those at the poses, changed. length: [m].
-        places: (k, 3) [m] displacements of the origin. there: (k,) bool, filled.
+    ``rows`` (k,) says which of the poses (n, 7) each is displaced from, by ``away`` (k, d) [m],
+    which is changed; ``there`` (k,) is filled.
     """
     d, deviation = screws.shape[1], np.zeros(7)
     space = make_placing_space(np.zeros((d, N_CURRENT)), np.zeros((d, 6)), 0)
@@ -490,12 +476,10 @@ def reach_batch(screws, home, poses, length, near, values, reached, current, off
     Of two sets of angles it takes the one that leads to the pose; if both do, the smaller ones.
 
     Args:
-        screws: (d, 7) kind (0 slide, 1 hinge), axis and point of each joint at the reference pose.
-        home: (7,) reference pose. poses: (n, 7).
+        screws: (d, 7) of the joints at the reference pose ``home`` (7,). poses: (n, 7).
         length: [m] over which positions count. near: a pose is reached if it is no farther off.
-        values: (n, d) [m, rad]; reached: (n, 7) pose at these values; current: (n, d, 8) the
-            joints there, as place_joints has them; off: (n,) how far off that is, in lengths or
-            rad, infinite if there is no closed form. All are filled.
+        values, reached, current: (n, d) [m, rad], (n, 7) pose and (n, d, 8) joints there, filled.
+        off: (n,) how far off, in lengths or rad, infinite if there is no closed form, filled.
         scratch: (3, N_SCRATCH).
     """
     count = 0
@@ -538,15 +522,11 @@ def _fill_turn(deviation, length, apart):
 
 @jit_allocating
 def apart_batch(screws, poses, rows, away, length, apart, columns):
-    """Displacements and motions of k platforms on joints.
+    """Displacements (k, 6) [m] and motions (k, d, 6) of k platforms on joints; both are filled.
 
-    Args:
-        screws: (n, d, 7). poses: (n, 7). rows: (k,) which of these each is displaced from.
-        away: (k, d) [m] joint values minus those at the poses, hinges times the length.
-        length: [m].
-        apart: (k, 6) [m], filled: of the origin, and the rotation vector times the length.
-        columns: (k, d, 6), filled: the platform's twist at its origin per step of each joint there,
-            base axes, rotations times the length.
+    ``rows`` (k,) says which of the poses (n, 7) each is displaced from, by ``away`` (k, d) [m].
+    Motions are the platform's twist at its origin per step of each joint there, in base axes.
+    Rotations are times the length.
     """
     current, deviation = np.zeros((screws.shape[1], N_CURRENT)), np.zeros(7)
     for r in range(rows.shape[0]):

@@ -216,16 +216,9 @@ def solve_one(
     moments), the work along the step, by the trapezium rule, takes its place. From a stationary
     point that is not a minimum the descent continues along the softest direction.
 
-    Args:
-        scale: load [N] that residuals are measured against.
-        radius: first trust region [m].
-        reach: deviations beyond this [m] count as falling.
-        limit: most evaluations.
-        enough: residual/scale at which to stop; FINE for as many digits as possible.
-        space: from make_space.
-
-    Returns:
-        (outcome, evaluations, residual/scale)
+    Residuals are measured against the load ``scale`` [N]; ``radius`` is the first trust region, and
+    deviations beyond ``reach`` count as falling [m]; ``limit`` is most evaluations, ``enough`` the
+    residual/scale at which to stop. Returns outcome, evaluations and residual/scale.
     """
     (step, factor, trial, trial_values, trial_gradient, trial_hessian, trial_states, trial_slopes,
      trial_guess, current, work, ready) = space  # fmt: skip

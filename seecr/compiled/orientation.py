@@ -170,14 +170,10 @@ def make_turning_space(m, d, joints, turns):
 def straight_balance_batch(
     cables, load, poses, screws, rows, away, length, matrices, loads
 ):  # fmt: skip
-    """The balance of platforms on straight cables at k displaced poses; fills the last two.
+    """The balance of platforms on straight cables at k displaced poses: matrix tau = load.
 
-    Args:
-        cables: (n, m, N_COLUMNS). load: (n, N_LOAD). poses: (n, 7). screws: (n, d or 0, 7).
-        rows: (k,) which of these each displacement is for.
-        away: (k, d) [m] displacements of a step's kind, rotations times the length.
-        length: [m].
-        matrices: (k, d, m), loads: (k, d) [N], torques over the length: matrix tau = load.
+    ``rows`` (k,) says which of the n rows each displacement (k, d) [m] is for, rotations times the
+    length. Fills matrices (k, d, m) and loads (k, d) [N], torques over the length.
     """
     m, d = cables.shape[1], loads.shape[1]
     joints, still, values = screws.shape[1], np.zeros(7), np.zeros(d)
@@ -439,14 +435,12 @@ def turn_batch(
     """Orientations that hold n platforms, from k starts each; better ones replace those known.
 
     Args:
-        cables: (n, m, N_COLUMNS). load: (n, N_LOAD). poses: (n, 7). screws: (n, d or 0, 7).
-        turns: independent rotations about the origin. length: [m]. scale: (n,) [N].
-        low, high: (n, m) [N] limits.
-        starts: (n, k, 7) deviations. start_values: (n, k, d) joint values, hinges times length; on
-            joints only their rotations count.
+        turns: independent rotations about the origin. scale: (n,) [N]. low, high: (n, m) [N].
+        starts: (n, k, 7) deviations. start_values: (n, k, d) joint values; on joints only their
+            rotations count.
         farther: try all starts, and turn on to where tensions are farther inside; otherwise the
             first orientation that holds will do.
-        best: (n, 7), best_values: (n, d), margins: (n,) [N] the best so far, updated; minus
+        best, best_values, margins: (n, 7), (n, d), (n,) [N] the best so far, updated; minus
             infinity where there is none.
     """
     m, d = cables.shape[1], start_values.shape[2]

@@ -240,25 +240,18 @@ def _evaluate(
 def evaluate(
     cables, ready, load, deviation, current, length, guess, gradient, hessian, states, slopes, work
 ):
-    """Gradient of the energy (minus the wrench) and stiffness at a deviation; returns the energy.
+    """Gradient of the energy (minus the wrench) and stiffness at a deviation; and the energy.
+
+    It is nan under a moment whose work depends on the way and if a law has none in closed form; inf
+    if a cable's own equations could not be solved.
 
     Args:
-        cables: (m, N_COLUMNS).
-        ready: (m + 1, N_READY), prepared.
-        load: (N_LOAD,).
-        deviation: (7,) from the commanded pose.
+        cables: (m, N_COLUMNS). ready: (m + 1, N_READY), prepared. load: (N_LOAD,).
+        deviation: (7,) from the commanded pose. length: the robot's [m].
         current: (n, N_CURRENT) current joints, none for a free platform.
-        length: the robot's length [m].
-        guess: (m, 3) warm start of the catenaries.
-        gradient: (d,) [N], filled.
-        hessian: (d, d) [N/m], filled: the stiffness; under a moment its symmetric part.
-        states: (m, N_STATE), filled.
-        slopes: (m, d) [N/m], derivative of the tensions, filled.
-        work: (N_WORK + m, 6) scratch.
-
-    Returns:
-        energy [J]; nan under a moment whose work depends on the way and if a law has none in closed
-        form; inf if a cable's own equations could not be solved.
+        guess: (m, 3) warm start of the catenaries. work: (N_WORK + m, 6) scratch.
+        gradient: (d,) [N]; hessian: (d, d) [N/m], under a moment its symmetric part; states:
+            (m, N_STATE); slopes: (m, d) [N/m] of the tensions. All are filled.
     """
     n, m = current.shape[0], cables.shape[0]
     if n == 0:

@@ -294,9 +294,9 @@ def pull_and_change(
 ):  # fmt: skip
     """Gradient (n, d) and tensions (n, m) [N], and their derivatives by each cable's rest length.
 
-    The derivatives [N/m] are ``by_length`` (n, m, d) of the gradient and ``tension`` (n, m) of each
-    cable's own tension. NaN where a cable's equations could not be solved. All four are filled;
-    ``guess`` (n, m, 3) is overwritten with the catenaries found.
+    These [N/m] are ``by_length`` (n, m, d) of the gradient and ``tension`` (n, m) of each cable's
+    own; NaN where a cable's equations could not be solved. All four are filled, and ``guess`` (n,
+    m, 3).
     """
     n, m = cables.shape[:2]
     space, per, total = make_change_space(screws.shape[1]), 1.0 / length, np.empty(6)
@@ -331,11 +331,9 @@ def rest_lengths_for(cables, spans, tensions, follows, out):
     """Rest lengths (n, m) [m] at which straight cables of given spans have given tensions.
 
     For every law, with its history, l0 (1 + eps + creep) + compliance T + winch_side/EA T_winch is
-    the span: to rounding, or to some nanometres where a cable with hysteresis sticks.
-
-    Args:
-        follows: whether the tension behind a cable that sticks is ``STUCK`` only at the rest length
-            in the table, and changes with what is paid out; otherwise it is that at any length.
+    the span: to rounding, or to some nanometres where a cable with hysteresis sticks. If it
+    ``follows``, the tension behind a cable that sticks is ``STUCK`` only at the rest length in the
+    table, and changes with what is paid out; otherwise it is that at any length.
     """
     row = cables[0, 0].copy()
     for r in range(cables.shape[0]):
@@ -389,12 +387,8 @@ def _rest_for(row, known, span, tension, follows):
 
     While a cable sticks, paying out changes the tension behind it and hardly that in front. So a
     wanted tension nearly always takes a length at which the cable slips, one way or the other
-    (Euler-Eytelwein).
-
-    Args:
-        row: the cable at the present iterate, on which its hysteresis depends.
-        known: the cable as it is in the table, with the rest length at which ``STUCK`` holds.
-        span: [m]. tension: [N]. follows: as for :func:`rest_lengths_for`.
+    (Euler-Eytelwein). ``row`` is the cable at the present iterate, on which its hysteresis depends,
+    ``known`` that at whose rest length ``STUCK`` holds.
     """
     strain, soft = _strain(row, tension), row[WINCH_SIDE] / row[EA]
     left = span - row[COMPLIANCE] * tension

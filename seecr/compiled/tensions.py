@@ -287,8 +287,7 @@ def _crossing(null, first, second, to_first, to_second):
 def least_beyond(matrix, load, low, high, tension):
     """Fill the tensions (m,) [N] that exceed their limits least; False if W is singular.
 
-    Args:
-        matrix: (d, m), m - d from 0 to 2. load: (d,). low, high: (m,) [N].
+    The matrix is (d, m), with m - d from 0 to 2.
     """
     d, m = matrix.shape
     own, particular = np.empty((m, m - d)), np.empty(m)
@@ -372,9 +371,7 @@ def _have_a_point(count, normals, offsets, rounding):
 def feasible_of(matrices, loads, low, high, room, rounding, out):
     """Fill ``out`` (n,) with 1.0 where tensions balance, 0.0 where none do, nan if W is singular.
 
-    Args:
-        matrices: (n, d, m), m - d at most MOST. loads: (n, d). low, high: (n, m) [N].
-        room: (n,) [N] by which limits may be exceeded. rounding: (n,) [N], less than that.
+    With m - d at most MOST. Limits may be exceeded by ``room`` (n,) [N]; ``rounding`` is less.
     """
     d, m = matrices.shape[1:]
     work, particular, null = np.empty((m, d + 1)), np.empty(m), np.empty((m, m - d))
@@ -501,12 +498,9 @@ def project(matrix, load, aim, low, high, tension):
     """min |tension - aim|^2 with A tension = load, low <= tension <= high; returns the outcome.
 
     A semismooth Newton method on the dual, whose gradient A clip(aim + A^T dual) - load is
-    piecewise linear (Qi and Sun 1993; for projections on polyhedra Qi and Sun 2006): it ends
-    after finitely many steps, most often two or three. Returns FOUND, NONE with a proof by
-    Farkas' lemma, or UNDECIDED if tensions are so many times the load that convergence is slow.
-
-    Args:
-        matrix: (d, m). load: (d,). aim, low, high: (m,). tension: (m,), filled.
+    piecewise linear (Qi and Sun 1993; for projections on polyhedra Qi and Sun 2006): it ends after
+    finitely many steps, most often two or three. Returns FOUND, NONE with a proof by Farkas' lemma,
+    or UNDECIDED if tensions are so many times the load that convergence is slow.
     """
     d = matrix.shape[0]
     dual, tried, step, left = np.zeros(d), np.zeros(d), np.zeros(d), np.zeros(d)
@@ -590,11 +584,7 @@ def _sweep(matrix, low, high, tension, left):
 
 @jit_allocating
 def nearest_batch(matrix, load, low, high, tension):
-    """Tensions (n, m) within limits that minimise |A tension - load|, one after another in turn.
-
-    Args:
-        matrix: (n, d, m). load: (n, d). low, high: (n, m). tension: (n, m), filled.
-    """
+    """Tensions (n, m) within limits that minimise |A tension - load|, one after another in turn."""
     left = np.empty(matrix.shape[1])
     for r in range(matrix.shape[0]):
         largest = 0.0

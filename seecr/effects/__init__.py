@@ -7,21 +7,7 @@ from seecr.effects.registry import BUILT_IN, catalogue, effect_named, layout_of
 from seecr.effects.terms import Apart, ApartLayout, Own, Term, Terms, Values, apart
 
 __all__ = [
-    "BUILT_IN",
-    "PLACES",
-    "Apart",
-    "ApartLayout",
-    "Effect",
-    "Knowledge",
-    "Layout",
-    "Own",
-    "Readings",
-    "Term",
-    "Terms",
-    "Values",
-    "apart",
-    "catalogue",
-    "effect_named",
-    "layout_of",
+    "BUILT_IN", "PLACES", "Apart", "ApartLayout", "Effect", "Knowledge", "Layout", "Own",
+    "Readings", "Term", "Terms", "Values", "apart", "catalogue", "effect_named", "layout_of",
     "parameter",
-]
+]  # fmt: skip

@@ -28,8 +28,6 @@ from seecr.effects.setup import Setup
 from seecr.errors import InputError
 from seecr.pose import Array
 
-# What is known of an effect's parameters beside the data that a fit sees.
-
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
@@ -54,11 +52,8 @@ class Knowledge:
     def joined(cls, parts: Sequence[Knowledge]) -> Knowledge:
         """Of several effects' parameters, one after another."""
         whole = [cls.nothing(0), *parts]
-        return cls(
-            np.concatenate([part.fixed for part in whole]),
-            np.concatenate([part.value for part in whole]),
-            np.concatenate([part.stderr for part in whole]),
-        )
+        columns = zip(*((p.fixed, p.value, p.stderr) for p in whole), strict=True)
+        return cls(*map(np.concatenate, columns))
 
     @property
     def measured(self) -> NDArray[np.bool_]:
@@ -71,19 +66,11 @@ class Knowledge:
         return bool(np.any(self.fixed) or np.any(self.measured))
 
 
-# What a person who measures would find: totals, and those that no robot can have.
-#
-# An effect's parameter is often a difference: a platform 0.047 kg heavier. A scale shows 0.447 kg.
-
-
 @dataclass(frozen=True)
 class Total:
-    """A number as it can be measured on the robot.
+    """A number as it can be measured on the robot, with the effect and as the robot's file has it.
 
-    Attributes:
-        value: with the effect. nominal: as the robot's file has it.
-        unit: of both, as in the suffixes of CSV columns.
-        lower, upper: what is possible lies between.
+    What is possible lies between ``lower`` and ``upper``; the unit is that of CSV columns.
     """
 
     value: float
@@ -146,14 +133,7 @@ def parameter(
             while the others are null, and the effect says with ``shapes`` where to look.
     """
     _check_parameter(unit, scale, null, bounds, size)
-    metadata = {
-        "unit": unit,
-        "scale": scale,
-        "null": null,
-        "bounds": bounds,
-        "size": size,
-        "shape": shape,
-    }
+    metadata = dict(unit=unit, scale=scale, null=null, bounds=bounds, size=size, shape=shape)
     return field(default=None if size != "one" else null, metadata=metadata)
 
 
@@ -254,31 +234,25 @@ class Layout:
     @classmethod
     def of(cls, effect: type[Effect], robot: Robot) -> Layout:
         """The flat parameters of an effect for a robot."""
-        names: list[str] = []
-        units: list[str] = []
-        columns: dict[str, list[float]] = {"null": [], "lower": [], "upper": [], "scale": []}
-        shape: list[bool] = []
+        rows: list[tuple[Any, ...]] = []
         parts = []
         for item in fields(effect):
             meta = item.metadata
             suffix = f"_{meta['unit']}" if meta["unit"] else ""
             endings = _SIZES[meta["size"]](robot.n_cables)
-            names += [f"{item.name}{ending}{suffix}" for ending in endings]
-            units += [meta["unit"]] * len(endings)
-            one_row = [meta["null"], *meta["bounds"], meta["scale"]]
-            one_row = [value(robot) if callable(value) else value for value in one_row]
-            for key, value in zip(columns, one_row, strict=True):
-                columns[key] += [float(value)] * len(endings)
-            shape += [bool(meta["shape"])] * len(endings)
+            given = (meta["null"], *meta["bounds"], meta["scale"])
+            numbers = [float(one(robot) if callable(one) else one) for one in given]
+            # a shape starts where it may be: bounds go with the robot's size
+            if meta["shape"]:
+                numbers[0] = min(max(numbers[0], numbers[1]), numbers[2])
+            own = (meta["unit"], *numbers, meta["shape"])
+            rows += [(f"{item.name}{ending}{suffix}", *own) for ending in endings]
             parts.append((item.name, len(endings), meta["size"]))
-        arrays = {key: np.array(column) for key, column in columns.items()}
-        # a shape starts where it may be: bounds go with the robot's size
-        inside = np.clip(arrays["null"], arrays["lower"], arrays["upper"])
-        arrays["null"] = np.where(shape, inside, arrays["null"])
-        return cls(
-            effect, tuple(names), tuple(units), arrays["null"], arrays["lower"], arrays["upper"],
-            arrays["scale"], np.array(shape, dtype=bool), tuple(parts),
-        )  # fmt: skip
+        columns: list[Any] = list(zip(*rows, strict=True)) or [()] * 7
+        names, units, *values, shape = columns
+        null, lower, upper, scale = (np.array(value, float) for value in values)
+        shaped = np.array(shape, dtype=bool)
+        return cls(effect, names, units, null, lower, upper, scale, shaped, tuple(parts))
 
     def __len__(self) -> int:
         return len(self.names)
@@ -362,12 +336,8 @@ def of_length(part: float) -> OfRobot:
     return OfRobot(words, lambda robot: part * mean_length(robot))
 
 
-# How large the values of an effect may be, in a model's file or by name.
-#
-# Most parameters have physical bounds in their effect; these limits are for the others. They are
-# far beyond anything that a robot can have, so they only stop typing errors, units and damaged
-# files, whose squares the solver could not even compute.
-
+# Limits of values without physical bounds, far beyond what a robot can have: they stop typing
+# errors, other units and damaged files, whose squares the solver could not even compute.
 # A value may differ from null by so many plausible sizes, an angle by one full turn. What a tracker
 # reads may be in the coordinates of its hall.
 _LARGEST_SIZE, _LARGEST_READ, _TURN = 1e4, 1e5, 2.0 * np.pi
@@ -391,8 +361,6 @@ def beyond(layout: Layout, i: int, value: float) -> str:
         return ""
     return f"{value:g} is out of bounds; expected {low:g} to {high:g}"
 
-
-# Effects that do nothing because commands lack what they depend on: their times, temperatures.
 
 # What commands may lack: as an effect names it, and its column in a file.
 _COLUMNS = {"time": "t_s", "temperature": "temperature_C"}

@@ -30,11 +30,6 @@ def usual_stretch(robot: Robot) -> float:
 _STRAIN = "the strain of a cable under half the weight (of the pretension, if that is more)"
 
 
-def _tenth_of_its_share(robot: Robot) -> float:
-    """A tenth of a cable's share [N] of the weight."""
-    return 0.1 * robot.usual_load / robot.n_cables
-
-
 def _heaviest(robot: Robot) -> float:
     """Weight per metre [N/m] of a cable that is as heavy as the platform: none is."""
     return robot.weight / mean_length(robot) if robot.weight > 0.0 else 1e5
@@ -203,16 +198,16 @@ class Hysteresis(Effect):
 
     amplitude: float = parameter(
         "N",
-        OfRobot("10 % of the weight / the number of cables", _tenth_of_its_share),
+        OfRobot(
+            "10 % of the weight / the number of cables", lambda r: 0.1 * r.usual_load / r.n_cables
+        ),
         bounds=(0.0, 1e6),
     )
     stretch: float = parameter(
         "m",
         OfRobot(f"30 % of the mean cable length x {_STRAIN}", lambda r: 0.3 * usual_stretch(r)),
-        null=1e-3,
-        bounds=(1e-9, 10.0),
-        shape=True,
-    )
+        null=1e-3, bounds=(1e-9, 10.0), shape=True,
+    )  # fmt: skip
 
     def edit_setup(self, setup: Setup) -> None:
         setup.hysteresis = setup.hysteresis + self.amplitude

@@ -16,17 +16,9 @@ from seecr.effects.setup import QUANTITIES, Setup, plain_setup
 from seecr.errors import InputError
 from seecr.pose import Array
 
-# Effects from other people's packages: what they declare and what they return, checked.
-#
-# A wrong shape or a NaN would else surface as a pose that does not converge, or not at all.
-
 
 def check_class(effect: type[Effect], where: str) -> None:
-    """Check that a class declares an effect as :mod:`seecr.effects.base` says.
-
-    Raises:
-        InputError: naming ``where`` it comes from and what is amiss.
-    """
+    """Raise an InputError if a class does not declare an effect as it should."""
     if effect.place not in PLACES:
         raise InputError(
             f"{where}: effect {effect.name} has place {effect.place!r}; expected one of "
@@ -118,12 +110,7 @@ def is_built_in(effect: type[Effect]) -> bool:
 def setup_with(
     effects: Sequence[Effect], robot: Robot, commands: Commands, wrench: Array | None = None
 ) -> Setup:
-    """The setup of commands as the effects leave it, in their order.
-
-    Args:
-        effects: with values.
-        robot, commands, wrench: as for :func:`seecr.effects.setup.plain_setup`.
-    """
+    """The setup of commands as the effects leave it, in their order; see :func:`plain_setup`."""
     setup = plain_setup(robot, commands, wrench)
     for effect in effects:
         edit_setup(effect, setup)
@@ -153,7 +140,7 @@ class Edits:
             if one is not effect:
                 break
             same += 1
-        setup = self._left_by(same)
+        setup = (self._kept[same - 1][1] if same else self._plain).shared()
         if same < len(effects) == len(self._kept):
             later = [effect for effect, _left in self._kept[same + 1 :]]
             if all(map(is_, later, effects[same + 1 :])):
@@ -167,10 +154,6 @@ class Edits:
             self._kept.append((effect, setup))
             setup = setup.shared()
         return setup
-
-    def _left_by(self, count: int) -> Setup:
-        """What the first of the effects left, to be edited."""
-        return (self._kept[count - 1][1] if count else self._plain).shared()
 
 
 def _edits(effect: type[Effect]) -> bool:

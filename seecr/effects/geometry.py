@@ -100,15 +100,11 @@ def _points(nominal: Array, error: Array) -> dict[str, Total]:
     }
 
 
-# What holds the exit points.
-
-
-def _third(robot: Robot) -> float:
-    """A frame that yields a third as much as its cables stretch."""
-    return 0.3 * mean_length(robot) / float(np.mean(robot.ea))
-
-
-_PLAUSIBLE = OfRobot("0.3 x the mean cable length / the mean E S", _third)
+# A frame that yields a third as much as its cables stretch.
+_PLAUSIBLE = OfRobot(
+    "0.3 x the mean cable length / the mean E S",
+    lambda robot: 0.3 * mean_length(robot) / float(np.mean(robot.ea)),
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,34 +34,12 @@ from seecr.effects.sensing import TensionScale, TrackerFrame, TrackerScale, Trac
 from seecr.errors import InputError
 
 BUILT_IN: tuple[type[Effect], ...] = (
-    CableLengthOffset,
-    InitialPoseError,
-    DrumGain,
-    LengthScale,
-    DrumEccentricity,
-    Backlash,
-    ThermalExpansion,
-    PulleyRadius,
-    ExitPointError,
-    AnchorPointError,
-    Stiffness,
-    CableStiffness,
-    NonlinearElasticity,
-    WinchSideLength,
-    CableWeight,
-    Hysteresis,
-    Creep,
-    ExitFriction,
-    FrameCompliance,
-    PlatformMass,
-    CentreOfMass,
-    ExternalWrench,
-    GravityTilt,
-    TrackerFrame,
-    TrackerTarget,
-    TrackerScale,
-    TensionScale,
-)
+    CableLengthOffset, InitialPoseError, DrumGain, LengthScale, DrumEccentricity, Backlash,
+    ThermalExpansion, PulleyRadius, ExitPointError, AnchorPointError, Stiffness, CableStiffness,
+    NonlinearElasticity, WinchSideLength, CableWeight, Hysteresis, Creep, ExitFriction,
+    FrameCompliance, PlatformMass, CentreOfMass, ExternalWrench, GravityTilt, TrackerFrame,
+    TrackerTarget, TrackerScale, TensionScale,
+)  # fmt: skip
 
 
 def _load(entry: EntryPoint) -> object:

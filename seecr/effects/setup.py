@@ -304,10 +304,7 @@ def _plain_values(robot: Robot, rows: int) -> Mapping[str, Any]:
 def plain_setup(robot: Robot, commands: Commands, wrench: Array | None = None) -> Setup:
     """The setup of the paper's plain robot for commands of n rows.
 
-    Args:
-        robot: the robot.
-        commands: n rows.
-        wrench: (6,) or (n, 6) external wrench besides that of the commands' loads; none by default.
+    ``wrench`` (6,) or (n, 6) is external, besides that of the commands' loads.
     """
     n = len(commands)
     plain = _plain_values(robot, n)

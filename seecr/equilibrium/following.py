@@ -43,11 +43,7 @@ def evaluated(robot: Robot, tables: Tables, poses: Array) -> batch.Evaluation:
 
 @dataclass(frozen=True, eq=False)
 class Coordinates:
-    """Poses of a free platform, or joint values: what steps are added to.
-
-    Poses on joints need a search for their values. Where many steps are made from one another, they
-    are kept as values.
-    """
+    """Poses of a free platform, or joint values: what steps are added to."""
 
     robot: Robot
 
@@ -118,14 +114,8 @@ SetupOf = Callable[[Commands, NDArray[np.integer]], Setup]
 def follow_commands(robot: Robot, commands: Commands, setup_of: SetupOf) -> Solution:
     """Follow the equilibrium of each run from the reference pose along the commanded path.
 
-    Args:
-        robot: as described.
-        commands: n rows.
-        setup_of: returns the setup of N waypoints, given these and the row (N,) of each.
-
-    Returns:
-        a :class:`seecr.Solution` with ``jumps``. If the platform finds no equilibrium after a jump,
-        the waypoint is solved from its own command, as without following.
+    ``setup_of`` gives the setup of N waypoints, from these and the row (N,) of each. If the
+    platform finds no equilibrium after a jump, the waypoint is solved from its own command.
     """
     path = waypoints_of(robot, commands, waypoints=_WAY)
     tables = assemble(setup_of(path.commands, path.source))
@@ -137,10 +127,10 @@ def follow_commands(robot: Robot, commands: Commands, setup_of: SetupOf) -> Solu
         jumped: list[Jump] = []
         last = None if path.fresh[k] else state
         now = followed.afresh(k) if last is None else followed.on(k, last, jumped)
-        batch.put_evaluation(found, np.array([k]), now)
+        found.put(np.array([k]), now)
         state = now if _rests(now) else None
         jumps[path.source[k]] += jumped
-    solution = certify(robot, take(tables, path.rows), batch.take_evaluation(found, path.rows))
+    solution = certify(robot, take(tables, path.rows), found.only(path.rows))
     return replace(solution, jumps=tuple(tuple(some) for some in jumps))
 
 
@@ -180,10 +170,10 @@ class _Followed:
         return state
 
     def _between(self, k: int, part: float) -> Tables:
-        """The tables at a fraction of the step to waypoint k.
+        """The tables at a fraction of the step to waypoint k, on the commanded path itself.
 
-        They are on the commanded path itself: linear interpolation of the rest lengths is off by a
-        few micrometres, which may lead past the other side of a fold.
+        Interpolated rest lengths are off by micrometres, which may lead past the other side of a
+        fold.
         """
         row, last, now = np.array([k]), self._at(k - 1), self._at(k)
         if part == 1.0:
@@ -256,9 +246,9 @@ class _Followed:
 
 
 def rest_below(robot: Robot, tables: Tables, pose: Array) -> Array:
-    """Where an overdamped platform comes to rest from a pose (1, 7).
+    """Where an overdamped platform comes to rest from a pose (1, 7); NaN if nowhere.
 
-    NaN if nowhere, or if a moment turns it past half a turn: its energy is then another one.
+    Also if a moment turns it past half a turn: its energy is then another one.
     """
     there, over = _flow(robot, tables, pose, 1.0)
     if over and under_moment(tables)[0]:
@@ -273,8 +263,8 @@ def rest_below(robot: Robot, tables: Tables, pose: Array) -> Array:
 def _flow(robot: Robot, tables: Tables, pose: Array, damping: float) -> tuple[Array, bool]:
     """Follow an overdamped platform down its energy until it stands still, (1, 7).
 
-    Also returns whether a hinge turned past half a turn, where its value begins anew. The steps are
-    linearly implicit: short where the energy is steep, Newton steps in the end.
+    Also whether a hinge turned past half a turn, where its value begins anew. Steps are linearly
+    implicit: short where the energy is steep, Newton steps in the end.
     """
     weight, over = np.where(robot.hinges, damping, 1.0), False
     for _ in range(_STEPS):

@@ -1,9 +1,8 @@
 """Barriers: the height of the lowest pass between two equilibria of one command.
 
 The path of least energy is found by the string method (below). Its highest point is made exact by
-following the one falling direction (Cerjan and Miller, J. Chem. Phys. 75, 1981). That may lead to
-the saddle between two other equilibria, so what it leads to is checked: it must be the highest
-point of a path from one to the other.
+following the one falling direction (Cerjan and Miller, J. Chem. Phys. 75, 1981), and counts if it
+is the highest point of a path from one equilibrium to the other.
 """
 
 from __future__ import annotations
@@ -42,14 +41,9 @@ SOFTEST = 1e-2
 
 
 def strings(one: Solution, others: Solution, longest: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Images (b, k, 7) on the paths of least energy from one equilibrium to b others.
+    """Images (b, k, 7) on paths of least energy to b other equilibria, and (b,) who settled.
 
-    Args:
-        one, others: the equilibria.
-        longest: step of an image [of the gap between two].
-
-    Returns:
-        the images, with the equilibria at their ends, and (b,) whether they settled.
+    ``longest`` is the step of an image [of the gap between two].
     """
     by, count = Coordinates(one.robot), len(others)
     ends = by.of(np.concatenate([one.pose, others.pose, one.tables.poses[:1]]))
@@ -354,7 +348,7 @@ def _joins(one: Solution, tables: Tables, saddle: Array, path: _Path) -> bool:
     higher = np.flatnonzero(energies > height + rounding)
     # the last points from either end that are not higher
     last = (higher[0] - 1, higher[-1] + 1) if len(higher) else (path.highest, path.highest)
-    feet = [rest_below(one.robot, tables, pose) for pose in _sides(one, tables, saddle)]
+    feet = [rest_below(one.robot, tables, pose) for pose in beside(one, tables, saddle)]
     ends = [[path.poses[[0]]], [path.poses[[-1]]]]
     if _pair(one, feet, ends):
         return True
@@ -371,7 +365,7 @@ def _pair(one: Solution, feet: list[Array], ends: list[list[Array]]) -> bool:
     )
 
 
-def _sides(one: Solution, tables: Tables, saddle: Array) -> tuple[Array, Array]:
+def beside(one: Solution, tables: Tables, saddle: Array) -> tuple[Array, Array]:
     """Poses (1, 7) beside a saddle, on either side of it along its falling direction."""
     direction = np.linalg.eigh(evaluated(one.robot, tables, saddle).hessian[0])[1][:, :1].T
     step = _ASIDE * one.robot.length * direction

@@ -40,12 +40,9 @@ if TYPE_CHECKING:
 
 
 def solve_setup(
-    setup: Setup,
-    method: str = "newton",
-    start: Array | None = None,
-    max_iterations: int = 400,
+    setup: Setup, method: str = "newton", start: Array | None = None, max_iterations: int = 400,
     threads: int | None = None,
-) -> Solution:
+) -> Solution:  # fmt: skip
     """Like :func:`seecr.solve`, for a setup as effects left it; its history is ignored."""
     tables = assemble(setup)
     first, values = start_of(setup.robot, tables, start)
@@ -65,8 +62,7 @@ GAVE_UP = 100
 def first_guess(setup: Setup) -> Array:
     """How far [m] the platform falls at first, (n,): m g l_vmean / k_c (step 4).
 
-    l_vmean is the mean vertical extent of the cables. The paper prints their sum and calls it the
-    mean.
+    l_vmean is the mean vertical extent of the cables; the paper prints their sum.
     """
     up = setup.robot.up
     poses = setup.commands.pose
@@ -77,22 +73,12 @@ def first_guess(setup: Setup) -> Array:
 
 
 def solve_with_scipy(
-    setup: Setup,
-    tables: Tables,
-    method: str,
-    start: Array | None,
-    limit: int,
+    setup: Setup, tables: Tables, method: str, start: Array | None, limit: int,
     start_values: Array | None = None,
-) -> batch.Evaluation:
-    """Solve pose by pose; residuals are differenced numerically, as in the paper.
+) -> batch.Evaluation:  # fmt: skip
+    """Solve pose by pose by SciPy; residuals are differenced, as in the paper.
 
-    Args:
-        setup: what is solved.
-        tables: assembled from it.
-        method: ``"fsolve"`` or ``"least_squares"``.
-        start: (n, 7) deviations to start from instead of the paper's first guess.
-        limit: most iterations, each of which differences the Jacobian once.
-        start_values: (n, d) the same for a platform on joints.
+    ``start`` (n, 7) are deviations to start from, ``limit`` most iterations.
     """
     found = batch.Evaluation.at_commands(tables)
     fall = first_guess(setup)
@@ -240,20 +226,15 @@ def on_their_way(robot: Robot, pose: ArrayLike, effects: GivenEffects) -> list[s
     return [name for name, alone in each if alone.has_history or alone.laws]
 
 
-def other_rests(
-    found: Solution, repeated: Callable[[int, int], Setup], most: int = _MOST
-) -> tuple[Solution, ...]:
+def other_rests(found: Solution, repeated: Callable[[int, int], Setup]) -> tuple[Solution, ...]:
     """The other stable equilibria of each of n commands, lowest energy first.
 
-    Args:
-        found: the equilibrium found for each command.
-        repeated: (i, k) to a setup of k rows, all of them command i.
-        most: largest number of starts per command.
+    ``repeated`` (i, k) gives a setup of k rows, all of them command i.
     """
     out = []
     for i in range(len(found)):
         own = found.rows([i])
-        whole = _all_rests(own, partial(repeated, i), most)
+        whole = _all_rests(own, partial(repeated, i), _MOST)
         out.append(whole.rows(elsewhere(own, whole)))
     return tuple(out)
 
@@ -287,7 +268,7 @@ def _all_rests(own: Solution, repeated: Callable[[int], Setup], most: int) -> So
     poses, starts, met = own.pose[own.converged], [own.pose[own.converged]], np.zeros(0, int)
     many = repeated(_PART)
     for done in range(0, most, _PART):
-        tried = _spread(robot, command[0], sampler.random(_PART))
+        tried = starts_about(robot, command[0], sampler.random(_PART))
         found = solve_setup(many, start=tried)
         which, new = _told_apart(robot, found.pose[found.converged], poses)
         poses = np.concatenate([poses, found.pose[found.converged][new]])
@@ -322,7 +303,7 @@ def _alike(robot: Robot, poses: Array, one: Array) -> NDArray[np.bool_]:
     return np.asarray(np.linalg.norm(apart, axis=1) < _ALIKE * robot.length)
 
 
-def _spread(robot: Robot, command: Array, unit: Array) -> Array:
+def starts_about(robot: Robot, command: Array, unit: Array) -> Array:
     """Starts (n, 7) about the command in all orientations, from numbers (n, d + 1) in [0, 1).
 
     The last number is the size of the box, spread evenly in its logarithm from near to far.

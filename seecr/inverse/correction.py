@@ -27,8 +27,7 @@ from seecr.statics.solution import Solution
 from seecr.statics.starts import Commanded, commands_from
 from seecr.statics.tables import Tables, assemble, spanless, take
 from seecr.tensions.balance import bends, bridged_lengths, is_straight, least_of_heavy
-from seecr.tensions.distribution import tension_limits, wanted_tensions
-from seecr.tensions.infeasible import why_not_held, without_span
+from seecr.tensions.distribution import tension_limits, wanted_tensions, why_not_held, without_span
 from seecr.tensions.max_margin import balances, counted_balance, holds_tightly
 from seecr.tensions.rest_lengths import Held, hold, holds_stably
 from seecr.units import millimetres, without_rounding

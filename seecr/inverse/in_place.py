@@ -19,10 +19,9 @@ from seecr.description.robot import Robot
 from seecr.inverse.nearest import Best, any_that_stays
 from seecr.inverse.nearest_problem import NearestProblem, Rows
 from seecr.inverse.nearest_sqp import tightened
-from seecr.parallel import in_parts
 from seecr.pose import Array, quat_conjugate, quat_from_rotvec, quat_multiply
 from seecr.statics import batch
-from seecr.statics.tables import Tables
+from seecr.statics.tables import Tables, by_row
 
 # Nearest positions whose results are tried, and how many full searches are made at once.
 _NEAREST, _AT_ONCE = 3, 8
@@ -40,10 +39,7 @@ def poses_in_place(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Stable poses (n, 7) at the wanted positions, and (n,) whether one was found.
 
-    Args:
-        problem: one in which positions may not change. tables: of its wanted poses.
-        thorough: whether full searches are made where no straight cable and no neighbour leads to
-            an orientation.
+    Full searches, where no straight cable and no neighbour leads to one, are for ``thorough`` ones.
     """
     turned = turned_in_place(problem.robot, tables, problem.least, problem.most)
     if not np.any(tables.cables[..., [RADIUS, WEIGHT, LIFT]]):
@@ -93,13 +89,9 @@ def _from_neighbours(best: Best, rows: Rows, fresh: Rows) -> Rows:
 
 @dataclass(frozen=True, eq=False)
 class Turned:
-    """Orientations for n positions.
+    """Orientations for n positions: deviations (n, 7) from the tables, joint values (n, d).
 
-    Attributes:
-        deviation: (n, 7) from the poses of the tables. values: (n, d) joint values minus those of
-            the tables, hinges times the robot's length.
-        margins: (n,) [N] how far all tensions are inside their limits; minus infinity if no
-            orientation was found that holds.
+    ``margins`` (n,) [N] are those of all tensions; minus infinity if no orientation was found.
     """
 
     robot: Robot
@@ -123,35 +115,22 @@ class Turned:
     def search(self, rows: Rows, starts: tuple[Array, Array], *, farther: bool = False) -> None:
         """Search from deviations (k, s, 7) and joint values (k, s, d) of rows (k,).
 
-        Args:
-            farther: try all starts, and turn on to where tensions are farther inside.
+        ``farther``: try all starts, and turn on to where tensions are farther inside.
         """
         from seecr.compiled.orientation import turn_batch  # takes a while to import
 
         tables, part = self.tables, [self.deviation[rows], self.values[rows], self.margins[rows]]
-        given = (
-            tables.cables[rows], tables.load[rows], tables.poses[rows], tables.screws[rows],
-            tables.scale[rows], self.low[rows], self.high[rows],
+        by_row(
+            turn_batch, tables.cables[rows], tables.load[rows], tables.poses[rows],
+            tables.screws[rows], freedoms(self.robot)[1], tables.length, tables.scale[rows],
+            self.low[rows], self.high[rows], *(np.array(one, order="C") for one in starts), farther,
+            *part,
         )  # fmt: skip
-        first, first_values = (np.array(one, order="C") for one in starts)
-        turns = freedoms(self.robot)[1]
-
-        def run(some: slice) -> None:
-            cables, load, poses, screws, scale, low, high = (one[some] for one in given)
-            turn_batch(
-                cables, load, poses, screws, turns, tables.length, scale, low, high, first[some],
-                first_values[some], farther, *(one[some] for one in part),
-            )  # fmt: skip
-
-        in_parts(run, len(rows))
         self.deviation[rows], self.values[rows], self.margins[rows] = part
 
 
 def turned_in_place(robot: Robot, tables: Tables, low: Array, high: Array) -> Turned:
-    """Orientations that hold the positions of tables with tensions within limits (n, m) [N].
-
-    Positions are those of the tables' poses.
-    """
+    """Orientations that hold the positions of tables with tensions within limits (n, m) [N]."""
     n, home = len(tables), batch.Evaluation.empty(len(tables), robot.n_cables, robot.n_dof)
     out = Turned(robot, tables, low, high, home.deviation, home.values, np.full(n, -np.inf))
     out.search(np.arange(n), (home.deviation[:, None].copy(), home.values[:, None].copy()))
@@ -206,11 +185,7 @@ def _spread(out: Turned, near: Rows, fresh: Rows) -> None:
 
 
 def _improve(out: Turned, near: Rows) -> None:
-    """Turn rows on to where tensions are farther inside their limits.
-
-    They start from the best of their neighbours if that is better, or all from their own results
-    if no neighbours are given.
-    """
+    """Turn rows on to where tensions are farther inside, from their best neighbours if any."""
     own = np.arange(len(near))
     every = np.concatenate([own[:, None], near], axis=1)
     best = every[own, np.argmax(out.margins[every], axis=1)]

@@ -59,14 +59,8 @@ def lengths_with_history(
     """Lengths to command (n, m) [m] that hold the poses, and the prediction with them.
 
     If the rounds do not converge, those of the round that misses fewest poses are taken. Without
-    history and users' laws they are those of ``held`` at once.
-
-    Args:
-        robot: as described. commands: of the n poses; their lengths are ignored.
-        effects: of the robot.
-        held: rest lengths that hold the poses without a history.
-        limits: aim and limits of the tensions, as for
-            :func:`seecr.tensions.rest_lengths.hold_again`.
+    history and users' laws they are those of ``held`` at once. ``limits`` are aim and limits of
+    :func:`seecr.tensions.rest_lengths.hold_again`.
     """
     size = np.where(np.arange(6) < 3, 1.0 / robot.length, 1.0)
     before, part = np.zeros_like(held.rest), np.ones(len(held.rest))
@@ -128,16 +122,10 @@ def _enough(late: bool, robot: Robot) -> float:
 def commanded_lengths(
     robot: Robot, commands: Commands, effects: Sequence[Effect], paid: Array
 ) -> Array:
-    """Lengths to command so that the winches pay out given rest lengths: the winch laws, inverted.
+    """Lengths (n, m) [m] to command so that the winches pay out given rest lengths ``paid`` (n, m).
 
-    Args:
-        robot: as described.
-        commands: of n rows, for their runs, times and temperatures; their lengths are ignored.
-        effects: of the winches, among others.
-        paid: (n, m) [m] rest lengths wanted.
-
-    Returns:
-        (n, m) [m] as ``Commands.told``: at the reference pose, those of the plain robot.
+    The winch laws are inverted for the commands' runs, times and temperatures. Lengths are as
+    ``Commands.told``: at the reference pose, those of the plain robot.
     """
     told, last, before = paid.copy(), np.inf, np.zeros_like(paid)
     for number in range(1, _ITERATIONS + 1):
@@ -161,14 +149,10 @@ def commanded_lengths(
 
 
 def unplay(wanted: Array, starts: NDArray[np.bool_], half_width: Array) -> Array:
-    """Inputs (n, m) of the play operator whose outputs are the given (n, m).
+    """Inputs (n, m) of the play operator for outputs (n, m); zero before ``starts`` (n,).
 
     The inverse of play is a jump at each reversal (Krejci and Kuhnen, IEE Proceedings 148, 2001).
     While an output is constant, so is its input.
-
-    Args:
-        starts: (n,) rows before which input and output were zero.
-        half_width: (m,).
     """
     out, side = np.empty_like(wanted), np.zeros(wanted.shape[1])
     before = np.zeros(wanted.shape[1])
@@ -182,13 +166,7 @@ def unplay(wanted: Array, starts: NDArray[np.bool_], half_width: Array) -> Array
 
 
 def to_their_limit(change: Array, before: Array) -> Array:
-    """The sum of the last change and all to come, if they go on in the ratio of the last two.
-
-    This is Aitken's method (1926).
-
-    Args:
-        change: (...) the last change. before: (...) the one before.
-    """
+    """The sum of the last change and all to come, in the ratio of the last two (Aitken 1926)."""
     some = (np.abs(change) < _RATIO * np.abs(before)) | (change * before < 0.0)
     ratio = np.divide(change, before, out=np.zeros_like(change), where=some)
     return np.asarray(change / (1.0 - np.clip(ratio, _SWING, _RATIO)))
@@ -197,9 +175,8 @@ def to_their_limit(change: Array, before: Array) -> Array:
 def damped(part: Array, size: Array, before: Array) -> Array:
     """The parts (n,) of changes to make, smaller where changes do not become smaller.
 
-    Args:
-        part: (n,) the parts made last. size: (n,) of the changes now. before: (n,) of those before;
-            infinite where the changes before were of another kind.
+    ``size`` (n,) is that of the changes now, ``before`` of the last ones: infinite if these were of
+    another kind.
     """
     halved, grown = np.maximum(0.5 * part, _LEAST), np.minimum(_GROWS * part, 1.0)
     some = np.where(size > _FALLS * before, halved, grown)

@@ -1,15 +1,11 @@
 """The nearest poses that can be held: the best of many local searches.
 
 Minimised is position^2 + (length x rotation)^2 subject to balance, W(q) tau = -w(q), and limits.
-The set of poses that can be held is not convex, and tilted platforms reach where level ones do not:
-there are many local minima, a few per cent apart. So searches begin at the wanted pose itself, at
-the ends of straight lines from a sample of held poses, and at the solutions of other rows, in many
-rotations.
-
-The balance says nothing about stability, and not everything about heavy cables. Where the nearest
-end is unstable, poses are checked exactly: starts are moved as far towards the wanted pose as the
-platform stays, and the best is improved by random tries, which need no derivatives of the border of
-stability.
+The set of poses that can be held is not convex: there are many local minima, a few per cent apart.
+So searches begin at the wanted pose, at the ends of straight lines from a sample of held poses, and
+at the solutions of other rows, in many rotations. Where the nearest end is unstable, starts are
+moved as far towards the wanted pose as the platform stays, and the best is improved by random
+tries, which need no derivatives of the border of stability.
 """
 
 from __future__ import annotations
@@ -31,7 +27,7 @@ from seecr.inverse.nearest_starts import (
     toward,
 )
 from seecr.pose import Array
-from seecr.tensions.balance import ByRow
+from seecr.statics.tables import ByRow
 
 # Searches per row from the sample, and from the solutions of other rows.
 _FIRST, _SHARED = 14, 4
@@ -51,13 +47,10 @@ _ROUNDS, _TRIES, _SPREAD, _WIDER, _NARROWER, _PULL = 16, 32, 0.1, 1.5, 0.6, 0.5
 
 @dataclass(eq=False)
 class Nearest(ByRow):
-    """Results for n wanted poses.
+    """Poses (n, 7) for wanted ones, and (n,) whether they can be held and are stable.
 
-    Attributes:
-        poses: (n, 7). found: (n,) bool, the pose can be held.
-        stable: (n,) bool, the platform is stable there.
-        settled: (n,) bool, it meets the first-order conditions of a local minimum (Karush, Kuhn
-            and Tucker): to first order no small change that can be held comes nearer.
+    ``settled`` (n,): to first order no small change that can be held comes nearer (the conditions
+    of Karush, Kuhn and Tucker).
     """
 
     poses: Array
@@ -67,14 +60,7 @@ class Nearest(ByRow):
 
 
 def nearest(problem: NearestProblem) -> Nearest:
-    """The nearest poses that can be held, and whether any were found.
-
-    Stable poses are preferred to all others; if none was found, the nearest unstable one is kept.
-
-    Args:
-        problem: the wanted poses, their balance, and what may change. The balance is linearised in
-            the tensions, which is not exact for heavy cables.
-    """
+    """The nearest poses that can be held; stable ones if there are any."""
     best, rows = Best.none(problem), np.arange(len(problem.wanted))
     start = problem.start(np.zeros((len(rows), problem.robot.n_dof)), rows)
     best.keep(solve_sqp(problem, tightened(problem, start)))
@@ -104,12 +90,9 @@ def any_that_stays(problem: NearestProblem) -> Best:
 
 @dataclass(frozen=True, eq=False)
 class Best:
-    """The best results so far, updated in place.
+    """The best results so far, updated in place: displacements (n, d) [m] and tensions (n, m) [N].
 
-    Attributes:
-        away: (n, d) [m] from the wanted poses. tensions: (n, m) [N].
-        found: (n,) bool. stable: (n,) bool, the platform is stable there.
-        loose: (n, d) [m] the nearest unstable pose, infinite if there is none.
+    ``loose`` (n, d) [m] is the nearest unstable pose, infinite if there is none.
     """
 
     problem: NearestProblem
@@ -170,11 +153,7 @@ class Best:
         )
 
     def stable_ones(self, places: Array) -> None:
-        """Where a search ended nearer but unstable: the nearest stable pose.
-
-        Args:
-            places: (k, 7) or (k, d) coordinates of a sample of poses that can be held.
-        """
+        """The nearest stable pose where a search ended nearer but unstable."""
         size = np.where(self.stable, self._far(self.away), np.inf)
         end = self._far(self.loose)
         rows = np.flatnonzero(self.found & (end < (1.0 - _NEARER) * size))
@@ -208,12 +187,7 @@ class Best:
 
 
 def stable_ends(problem: NearestProblem, places: Array, ends: Array) -> Candidates:
-    """Stable poses near the wanted ones.
-
-    Args:
-        places: (k, 7) or (k, d) coordinates of a sample of poses that can be held.
-        ends: (n, d) [m] displacements from the wanted poses to unstable ends of searches.
-    """
+    """Stable poses near the wanted ones, from a sample of held ones and unstable ends (n, d)."""
     first = from_sample(problem, places).and_more(about_wanted(problem))
     stable = _stable_of(problem, first.only(np.arange(0, len(first.rows), _EVERY)))
     first = Candidates(*toward(problem, stable.away, stable.rows, problem.stable))
@@ -247,11 +221,7 @@ def nearest_of(problem: NearestProblem, some: Candidates) -> tuple[Array, Rows]:
 
 
 def at_random(problem: NearestProblem, away: Array, rows: Rows) -> Array:
-    """Nearer stable poses (k, d), found about the stable poses of rows (k,).
-
-    Each round takes the nearest of some random draws about the best; rounds that gain widen the
-    spread, others narrow it.
-    """
+    """Nearer stable poses (k, d), by rounds of random draws about those of rows (k,)."""
     random, best, motion = np.random.default_rng(5), away.copy(), problem.motion
     wide, shape = np.full((len(rows), 1, 1), _SPREAD), (len(rows), _TRIES)
     each = np.repeat(rows, _TRIES)

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 
 from seecr.description.joints import freedoms, pose_of_values, values_of_pose
 from seecr.description.robot import Robot
-from seecr.parallel import in_parts
 from seecr.pose import Array, pose_add, pose_difference
-from seecr.statics.tables import Tables, take
-from seecr.tensions.balance import ByRow, straight_balance
+from seecr.statics.tables import ByRow, Tables, by_row, take
+from seecr.tensions.balance import straight_balance
 from seecr.tensions.distribution import balanced, can_balance, distribute, nearly_balanced
 
 Rows = NDArray[np.intp]
@@ -31,7 +30,7 @@ It is linearised in the tensions (k, m), the third argument, which matters for h
 default at tensions that come near to balance. A row may occur several times.
 """
 Holds = Callable[[Array, Rows], NDArray[np.bool_]]
-"""Whether something holds of poses (k, 7) of some rows (k,)."""
+"""Whether something holds of poses (k, 7), or displacements (k, d), of some rows (k,)."""
 
 # Squared motion of a combination of joints, relative to the largest, that counts as none.
 _IDLE = 1e-12
@@ -52,8 +51,7 @@ class Directions:
     Attributes:
         basis: (k, d, d) displacements per step along each, in their columns; None for a free
             platform, whose coordinates they are.
-        squares: (k, d, d) products of their motions: one along each, but where joints can be moved
-            without the platform; None likewise.
+        squares: (k, d, d) products of their motions: one along each that moves the platform.
         slope: (k, d) [m] derivative of half the squared distance along each.
     """
 
@@ -67,11 +65,9 @@ class PlatformMotion:
     """Motions from n wanted poses; ``away`` (k, d) [m] are displacements along the coordinates.
 
     Attributes:
-        poses: (n, 7) wanted. screws: (n, d, 7) the joints there; (n, 0, 7) for a free platform.
         free: (d,) how far each direction may be followed, 0 or infinity; those that move the
             origin come first.
-        turns: independent rotations that keep the origin.
-        steady: whether any rotation can keep the origin.
+        turns, steady: independent rotations that keep the origin, and whether any can.
     """
 
     robot: Robot
@@ -139,7 +135,7 @@ class PlatformMotion:
             return away
         if not self.robot.joints:
             return np.where(self.free > 0.0, away, 0.0)
-        return self._brought(away, rows, np.zeros((len(rows), 3)))[0]
+        return self._brought(away, rows, np.zeros((len(rows), 3)))
 
     def are_allowed(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
         """(k,) whether positions are the wanted ones, if these are kept."""
@@ -155,7 +151,7 @@ class PlatformMotion:
         """
         if not self.robot.joints:
             return np.concatenate([places, away[:, 3:]], axis=1)
-        return self._brought(away, rows, places)[0] if self.steady else away
+        return self._brought(away, rows, places) if self.steady else away
 
     def turned(self, away: Array, rows: Rows) -> Array:
         """(k, 3) [m] rotation vectors times the length; displacements if nothing can turn."""
@@ -167,32 +163,24 @@ class PlatformMotion:
 
         k, d = away.shape
         apart, columns = np.empty((k, 6)), np.empty((k, d, 6))
-        moves, places = np.ascontiguousarray(away), np.ascontiguousarray(rows)
-
-        def run(part: slice) -> None:
-            apart_batch(
-                self.screws, self.poses, places[part], moves[part], self.robot.length, apart[part],
-                columns[part],
-            )  # fmt: skip
-
-        in_parts(run, k)
+        given, length = (self.screws, self.poses), self.robot.length
+        by_row(
+            lambda of, by, *out: apart_batch(*given, of, by, length, *out),
+            np.ascontiguousarray(rows), np.ascontiguousarray(away), apart, columns,
+        )  # fmt: skip
         return apart, columns
 
-    def _brought(self, away: Array, rows: Rows, places: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Displacements (k, d) with origins at places (k, 3) [m], and whether they are there."""
+    def _brought(self, away: Array, rows: Rows, places: Array) -> Array:
+        """Displacements (k, d) with origins at places (k, 3) [m]."""
         from seecr.compiled.joint_kinematics import bring_batch  # takes a while to import
 
         out, there = np.array(away, order="C"), np.empty(len(rows), dtype=np.bool_)
-        of, to = np.ascontiguousarray(rows), np.ascontiguousarray(places)
-
-        def run(part: slice) -> None:
-            bring_batch(
-                self.screws, self.poses, of[part], out[part], self.robot.length, to[part],
-                there[part],
-            )  # fmt: skip
-
-        in_parts(run, len(rows))
-        return out, there
+        given, length = (self.screws, self.poses), self.robot.length
+        by_row(
+            lambda of, away, to, there: bring_batch(*given, of, away, length, to, there),
+            np.ascontiguousarray(rows), out, np.ascontiguousarray(places), there,
+        )  # fmt: skip
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,14 +209,10 @@ class NearestProblem:
         limits: tuple[Array, Array], scale: Array, *, fix_position: bool = False,
         straight: Tables | None = None, holds: Holds | None = None,
     ) -> NearestProblem:  # fmt: skip
-        """The problem of wanted poses (n, 7).
+        """The problem of wanted poses (n, 7), with limits (m,) of tensions and loads (n,) [N].
 
-        Args:
-            limits: (m,) smallest and largest tensions [N]. scale: (n,) [N] load.
-            fix_position: keep the position and change only the orientation.
-            straight: of the wanted poses, if they are :func:`seecr.tensions.balance.is_straight`:
-                their balance then needs neither ``balance`` nor poses.
-            holds: for a balance that is not linear in the tensions.
+        ``straight`` are their tables if they are :func:`seecr.tensions.balance.is_straight`;
+        ``holds`` is for a balance that is not linear in the tensions.
         """
         low, high = limits
         inside = _INSIDE * scale[:, None]
@@ -357,14 +341,10 @@ class NearestProblem:
     def project(
         self, matrix: Array, load: Array, turn: Array, near: tuple[Array, Array], rows: Rows
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """The step and tensions nearest to ``near``, (k, d) and (k, m), in linearised balance.
+        """The step (k, d) and tensions (k, m) nearest to ``near`` in balance, and whether any.
 
-        Args:
-            matrix: (k, d, m), load: (k, d) where the step begins. turn: (k, d, d) [N/m] derivative
-                of the residual by steps along the :class:`PlatformMotion`'s directions.
-
-        Returns:
-            Steps (k, d), tensions (k, m), and (k,) whether there are any.
+        It is linearised: ``matrix`` (k, d, m), ``load`` (k, d), and ``turn`` (k, d, d) [N/m], the
+        derivative of the residual by steps along the directions.
         """
         unit, m = self.unit(rows), matrix.shape[2]
         whole = np.concatenate([matrix / unit[:, None], turn], axis=2)
@@ -397,13 +377,9 @@ class Spots(ByRow):
 class Curved:
     """The balance and the distance about k poses to second order, at the tensions of a search.
 
-    All derivatives are by steps along the directions of the :class:`PlatformMotion`.
-
-    Attributes:
-        matrix: (k, d, m). load, left: (k, d) [N]; left is the residual.
-        turn: (k, d, d) [N/m] derivative of the residual.
-        along: the directions.
-        bend: (k, d, d) second derivative of half the squared distance, less one along each.
+    All derivatives are by steps along the directions of the :class:`PlatformMotion`: ``turn`` (k,
+    d, d) [N/m] of the residual ``left`` (k, d), ``bend`` (k, d, d) the second one of half the
+    squared distance, less one along each.
     """
 
     matrix: Array

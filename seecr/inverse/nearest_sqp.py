@@ -118,11 +118,7 @@ def _back(problem: NearestProblem, at: Curved, start: Spots, times: int) -> tupl
 
 
 def restored(problem: NearestProblem, start: Spots, enough: float = 0.1 * TIGHT) -> Spots:
-    """Points brought to balance by Newton's method; this may fail for some.
-
-    Args:
-        enough: allowed residual [load].
-    """
+    """Points brought to balance by Newton's method, to a residual; this may fail for some."""
     out, still = start.copy(), np.arange(len(start.rows))
     for _ in range(_BACK):
         if len(still) == 0:
@@ -140,8 +136,7 @@ def restored(problem: NearestProblem, start: Spots, enough: float = 0.1 * TIGHT)
 def to_rounding(problem: NearestProblem, ends: Spots) -> Spots:
     """Ends of searches, balanced to rounding if there are fewer cables than degrees of freedom.
 
-    Tensions of such a robot cannot make up for an error of the pose: it is held exactly or not at
-    all.
+    Tensions of such a robot cannot make up for an error of the pose.
     """
     if ends.tensions.shape[1] >= ends.away.shape[1]:
         return ends
@@ -165,9 +160,7 @@ def goal(
 ) -> tuple[Spots, Array, NDArray[np.bool_]]:
     """The point to step to, the multipliers (k, d) [m^2/N] of the balance, whether there is one.
 
-    Args:
-        at: the balance about ``here``.
-        damping: (k,) of steps, relative to the distance to the wanted pose, which has weight one.
+    ``damping`` (k,) is relative to the distance to the wanted pose, which has weight one.
     """
     part, rows = (damping / (1.0 + damping))[:, None], here.rows
     near = (part * at.along.slope - at.along.slope, here.tensions)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,13 +10,10 @@ from numpy.typing import NDArray
 
 from seecr.description.joints import pose_of_values
 from seecr.description.robot import Robot
-from seecr.inverse.nearest_problem import NearestProblem, PlatformMotion, Rows, Spots
+from seecr.inverse.nearest_problem import Holds, NearestProblem, PlatformMotion, Rows, Spots
 from seecr.inverse.nearest_sqp import tightened
 from seecr.pose import Array, quat_from_rotvec
-from seecr.tensions.balance import ByRow
-
-Fine = Callable[[Array, Rows], NDArray[np.bool_]]
-"""Whether displacements (k, d) of rows (k,) are fine."""
+from seecr.statics.tables import ByRow
 
 # Poses sampled over the workspace; of the held ones, so many nearest and other ones per row.
 _SAMPLE, _NEAR = 24000, 128
@@ -55,8 +52,7 @@ class Candidates(ByRow):
 def sample(problem: NearestProblem) -> Array:
     """Coordinates (k, 7) or (k, d) of the reference pose, and of poses that can be held.
 
-    They can be held under the first row's load. Only the reference pose if positions are kept,
-    since the others are at other positions.
+    They are held under the first row's load. Only the reference pose if positions are kept.
     """
     if problem.motion.is_in_place:
         return problem.home
@@ -85,10 +81,7 @@ def _turned(robot: Robot, random: np.random.Generator) -> Array:
 
 
 def _on_joints(robot: Robot, random: np.random.Generator) -> Array:
-    """Values of a platform's joints: the origin over the box, hinges at all angles.
-
-    Slides are drawn as if the platform did not turn, and then follow it where it does.
-    """
+    """Values of joints: the origin over the box, hinges at all angles, slides following."""
     values, box = np.zeros((_SAMPLE, robot.n_dof)), _box(robot) - robot.reference_pose[:3]
     for i, joint in enumerate(robot.joints):
         along = box @ joint.axis
@@ -97,14 +90,9 @@ def _on_joints(robot: Robot, random: np.random.Generator) -> Array:
         values[:, i] = random.uniform(low, high, _SAMPLE)
     sliding, metre = ~robot.hinges, np.where(robot.hinges, robot.length, 1.0)
     axes = np.array([joint.axis for joint in robot.joints])
-    at_home = PlatformMotion.about(robot, *_home_of(robot), False)
+    at_home = PlatformMotion.about(robot, *pose_of_values(robot, np.zeros((1, robot.n_dof))), False)
     rows, places = np.zeros(_SAMPLE, dtype=np.intp), values[:, sliding] @ axes[sliding]
     return at_home.brought(values * metre, rows, places) / metre
-
-
-def _home_of(robot: Robot) -> tuple[Array, Array]:
-    """The reference pose (1, 7), and the joints there (1, d, 7)."""
-    return pose_of_values(robot, np.zeros((1, robot.n_dof)))
 
 
 def from_sample(problem: NearestProblem, places: Array) -> Candidates:
@@ -178,8 +166,7 @@ def _about(
 ) -> Candidates:  # fmt: skip
     """Poses (k, d) of rows, rotated by up to ``widest`` (k,), half of them moved inward.
 
-    Small rotations are more frequent than large ones. Two more keep the position, one of them with
-    the reference orientation.
+    Two more keep the position, one of them with the reference orientation.
     """
     robot, hinges, motion = problem.robot, problem.robot.hinges, problem.motion
     home = problem.to(np.tile(problem.home, (len(rows), 1)), rows)
@@ -209,7 +196,7 @@ def prune_starts(problem: NearestProblem, candidates: Candidates, most: int) -> 
     return spots.and_more(_pruned(problem, candidates, most, problem.seems_held))
 
 
-def _pruned(problem: NearestProblem, candidates: Candidates, most: int, fine: Fine) -> Spots:
+def _pruned(problem: NearestProblem, candidates: Candidates, most: int, fine: Holds) -> Spots:
     """The same, with one meaning of held."""
     held = fine(candidates.away, candidates.rows)
     back = _brought_back(problem, candidates, held, most)
@@ -225,8 +212,7 @@ def _brought_back(
 ) -> Spots:
     """Poses brought to balance near candidates, for rows of which few candidates are held.
 
-    This occurs with fewer cables than degrees of freedom. Tried are those with small residuals that
-    differ in rotation, and an even selection of all.
+    Tried are those with small residuals that differ in rotation, and an even selection of all.
     """
     rows, place = np.unique(candidates.rows, return_inverse=True)
     many = np.bincount(place[held], minlength=len(rows))
@@ -242,7 +228,7 @@ def _brought_back(
     return tightened(problem, start)
 
 
-def toward(problem: NearestProblem, away: Array, rows: Rows, fine: Fine) -> tuple[Array, Rows]:
+def toward(problem: NearestProblem, away: Array, rows: Rows, fine: Holds) -> tuple[Array, Rows]:
     """As far on straight lines to the wanted poses as is fine; half of them keep their rotation."""
     inner, outer = np.zeros(len(rows)), np.ones(len(rows))
     turned = np.random.default_rng(4).random(len(rows)) < 0.5

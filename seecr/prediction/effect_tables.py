@@ -70,14 +70,9 @@ def _is_key(bare: str, key: str) -> bool:
 
 @dataclass(frozen=True)
 class Cell:
-    """One parameter.
+    """One parameter; its error is inf if the data do not see it, NaN if none is stated.
 
-    Attributes:
-        value, stderr: the standard error is inf if the data do not see the parameter, NaN if the
-            file states none.
-        fixed: whether it is never fitted.
-        known: the value measured independently, else NaN; known_stderr: its standard error, else
-            inf.
+    ``known`` is the value measured independently, else NaN, ``known_stderr`` its error, else inf.
     """
 
     value: float
@@ -87,19 +82,9 @@ class Cell:
     known_stderr: float = math.inf
 
 
-def cell_of(where: Where, k: int, layout: Layout, i: int, content: Any, fixed: bool) -> Cell:
-    """Read parameter i of effect k; ``fixed`` is what the effect states for all its parameters.
-
-    Raises:
-        InputFileError: not a number, out of bounds, another unit, an unknown key, or ``known``
-            without its standard error.
-    """
-    return _Reader(where, k, layout, i).read(content, fixed)
-
-
 @dataclass(frozen=True)
-class _Reader:
-    """Reads one parameter; every error names effect, parameter and line."""
+class Reader:
+    """Reads parameter i of effect k; every error names effect, parameter and line."""
 
     where: Where
     k: int
@@ -107,6 +92,12 @@ class _Reader:
     i: int
 
     def read(self, content: Any, fixed: bool) -> Cell:
+        """The parameter; ``fixed`` is what the effect states for all its parameters.
+
+        Raises:
+            InputFileError: not a number, out of bounds, another unit, an unknown key, or ``known``
+                without its standard error.
+        """
         table = content if isinstance(content, Mapping) else {"value": content}
         self._check_words(table, _WORDS, "")
         unit = table.get("unit", self.layout.units[self.i])
@@ -267,7 +258,7 @@ def _values(where: Where, k: int, layout: Layout, given: Mapping[str, Any], fixe
     given = _spread(layout, given)
     _check_names(where, k, layout, given)
     names = enumerate(layout.names)
-    cells = [cell_of(where, k, layout, i, given[key], fixed) for i, key in names]
+    cells = [Reader(where, k, layout, i).read(given[key], fixed) for i, key in names]
     knowledge = Knowledge(
         np.array([cell.fixed for cell in cells]),
         np.array([cell.known for cell in cells]),

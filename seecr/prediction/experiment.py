@@ -149,13 +149,10 @@ def mixed(rows: NDArray[np.bool_], one: Array, other: Array) -> Array:
 
 @dataclass(eq=False)
 class Experiment:
-    """A robot and its commands; predicts the readings under any effects.
+    """A robot and its commands (n rows); predicts the readings under any effects.
 
-    Attributes:
-        robot: as described.
-        commands: n rows.
-        length_errors: (n, m) [m] by which each row's rest lengths differ from the commanded ones:
-            noise of the winches, not an effect.
+    ``length_errors`` (n, m) [m], by which rest lengths differ from the commanded ones, are noise of
+    the winches, not an effect.
     """
 
     robot: Robot
@@ -201,11 +198,9 @@ class Experiment:
         return self._edits[id(commands)]
 
     def predict(
-        self,
-        effects: Sequence[Effect] = (),
-        near: Prediction | None = None,
+        self, effects: Sequence[Effect] = (), near: Prediction | None = None,
         needed: NDArray[np.bool_] | None = None,
-    ) -> Prediction:
+    ) -> Prediction:  # fmt: skip
         """Solve all rows and compute what the sensors would report.
 
         Args:
@@ -235,16 +230,14 @@ class Experiment:
     def from_other_starts(
         self, effects: Sequence[Effect], at: Prediction, rows: NDArray[np.intp], poses: Array
     ) -> Prediction:
-        """The same prediction with some rows solved again from given poses (k, 7).
-
-        If a robot has several stable equilibria, the start decides which one is found.
-        """
+        """The same with some rows solved again from poses (k, 7), for other equilibria."""
         tables = take(at.tables, rows)
         start, values = start_of(self.robot, tables, poses)
         again = batch.descend(tables, start, _LIMIT, start_values=values, staged=False)
-        found = batch.take_evaluation(at.found, np.arange(len(at.found.outcome)))
-        batch.put_evaluation(found, rows, again)
-        readings = self._read(effects, at.setup, at.tables, found)
+        found = at.found.copy()
+        found.put(rows, again)
+        pose = batch.platform_poses(at.tables, found.deviation)
+        readings = read(effects, at.setup, pose, found.states[..., TENSION])
         return Prediction(at.setup, at.tables, found, readings, at.has_history, at.sensors)
 
     def _solve(self, setup: Setup, near: Prediction | None) -> tuple[Tables, batch.Evaluation]:
@@ -274,7 +267,7 @@ class Experiment:
             elif len(tables) <= _AT_ONCE:
                 found = warm(slice(None))
             else:
-                found = batch.take_evaluation(start, np.arange(len(tables)))
+                found = start.copy()
                 found.outcome[:] = ITERATIONS
                 found = _among(found, warm)
             for search in (*([] if self._first is None else [on_the_way]), afresh):
@@ -298,10 +291,7 @@ class Experiment:
     def walk(
         self, effects: Sequence[Effect], needed: NDArray[np.bool_] | None = None
     ) -> tuple[Tables, batch.Evaluation]:
-        """Solve all waypoints of the path in order, each from the one before.
-
-        Args: as for :meth:`predict`.
-        """
+        """Solve all waypoints of the path in order, each from the one before."""
         path = self.path
         setup = self.setup(effects, path.commands)
 
@@ -316,29 +306,16 @@ class Experiment:
         path = self.path
         tables, whole = self.walk(effects, needed)
         rows = take(tables, path.rows)
-        found = batch.take_evaluation(whole, path.rows)
+        found = whole.only(path.rows)
         lost = _after_lost_waypoints(path, whole)
         found.outcome[lost & (found.outcome == CONVERGED)] = STALLED
         own = self.setup(effects)
-        readings = self._read(effects, own, rows, found)
+        pose = batch.platform_poses(rows, found.deviation)
+        readings = read(effects, own, pose, found.states[..., TENSION])
         return Prediction(own, rows, found, readings, True, sensors_among(effects), whole)
 
-    @staticmethod
-    def _read(
-        effects: Sequence[Effect],
-        setup: Setup,
-        tables: Tables,
-        found: batch.Evaluation,
-    ) -> Readings:
-        pose = batch.platform_poses(tables, found.deviation)
-        return read(effects, setup, pose, found.states[..., TENSION])
 
-
-def predict(
-    robot: GivenRobot,
-    commands: Commanded,
-    model: GivenEffects = (),
-) -> Prediction:
+def predict(robot: GivenRobot, commands: Commanded, model: GivenEffects = ()) -> Prediction:
     """Predict where a robot with effects comes to rest, and what its sensors would report.
 
     Args:
@@ -413,10 +390,10 @@ def _after_lost_waypoints(path: Path, whole: batch.Evaluation) -> NDArray[np.boo
 def _among(
     found: batch.Evaluation, solve: Callable[[NDArray[np.intp]], batch.Evaluation]
 ) -> batch.Evaluation:
-    """Solve the rows that are not solved yet.
+    """Solve the rows that are not solved yet; a few of them first, if these are most.
 
-    If these are most rows, a few are tried first: with values under which no pose can be held (a
-    step of a fit that went too far), the solver would try every row up to its limit.
+    With values under which no pose can be held (a step of a fit that went too far), the solver
+    would try every row up to its limit.
     """
     lost = found.outcome != CONVERGED
     if not lost.any():
@@ -428,9 +405,9 @@ def _among(
         some[np.linspace(0, len(rows) - 1, _SAMPLE).astype(int)] = True
         first, rest = rows[some], rows[~some]
     if len(first):
-        batch.put_evaluation(found, first, solve(first))
+        found.put(first, solve(first))
     if len(rest) and np.any(found.outcome[first] == CONVERGED):
-        batch.put_evaluation(found, rest, solve(rest))
+        found.put(rest, solve(rest))
     return found
 
 

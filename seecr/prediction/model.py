@@ -127,12 +127,7 @@ class DataReach:
         return table
 
     def outside(self, positions: ArrayLike, length: float) -> NDArray[np.float64]:
-        """Distance (n,) [m] of positions (n, 3) from the box; 0 inside the box and near it.
-
-        Args:
-            positions: [m], base frame; NaN counts as inside.
-            length: of the robot [m].
-        """
+        """Distance (n,) [m] of positions (n, 3) from the box; 0 inside, near it, and of NaN."""
         positions = np.asarray(positions, float)
         over = np.maximum(np.maximum(self.low - positions, positions - self.high), 0.0)
         away = np.nan_to_num(np.linalg.norm(over, axis=1))
@@ -140,13 +135,7 @@ class DataReach:
         return np.where(away > near, away, 0.0)
 
     def beyond(self, positions: Array, tensions: Array, length: float) -> tuple[str, ...]:
-        """A sentence about the rows beyond the data; an empty tuple if there are none.
-
-        Args:
-            positions: (n, 3) [m] where the platform is at rest.
-            tensions: (n, m) [N] there.
-            length: of the robot [m].
-        """
+        """A sentence on rows with positions (n, 3) or tensions (n, m) beyond the data, if any."""
         away = self.outside(positions, length)
         pulls = np.nan_to_num(tensions).max(axis=1, initial=0.0)
         tense = pulls > _TENSE * self.largest
@@ -227,11 +216,7 @@ class Model(Result):
         return np.asarray(self.stderr.get(name, np.full(len(self.terms[name].layout), np.nan)))
 
     def beyond(self, solution: Solution) -> tuple[str, ...]:
-        """A sentence about the equilibria beyond the data; an empty tuple if there are none.
-
-        Args:
-            solution: as :func:`seecr.solve` returns it with this model.
-        """
+        """A sentence about equilibria of a solution beyond the data, if there are any."""
         if self.reach is None:
             return ()
         rests = solution.converged
@@ -407,10 +392,6 @@ def load_model(path: str | Path, robot: GivenRobot) -> Model:
 
 def read_document(path: Path, expected: str = _EXPECTED) -> tuple[Toml, TOMLDocument]:
     """Read a model's file, whatever robot it is for: its text, and a tree that keeps the layout.
-
-    Args:
-        path: the file.
-        expected: what it should be, for the error.
 
     Raises:
         InputFileError: there is no such file, it is not TOML, or it is not a model.

@@ -107,11 +107,9 @@ class Parted(Experiment):
         return [(dict(zip(kinds, n, strict=True)), np.array(r)) for n, r in rows.items()]
 
     def predict(
-        self,
-        effects: Sequence[Effect] = (),
-        near: Prediction | None = None,
+        self, effects: Sequence[Effect] = (), near: Prediction | None = None,
         needed: NDArray[np.bool_] | None = None,
-    ) -> Prediction:
+    ) -> Prediction:  # fmt: skip
         parts = self.parts(effects)
         if not parts:
             return super().predict(effects, near, needed)
@@ -158,7 +156,7 @@ class Parted(Experiment):
         tables = _tables([one.tables for one in found], order)
         whole = batch.Evaluation.at_commands(tables)
         for part, one in zip(parts, found, strict=True):
-            batch.put_evaluation(whole, part.rows, one.found)
+            whole.put(part.rows, one.found)
         readings = _readings([one.readings for one in found], order)
         history = any(one.has_history for one in found)
         return PartedPrediction(
@@ -216,12 +214,9 @@ def rates_by_length(at: Prediction) -> Array:
 
 
 def rates(
-    experiment: Experiment,
-    terms: Terms,
-    at: Prediction,
-    columns: Sequence[int] = (),
+    experiment: Experiment, terms: Terms, at: Prediction, columns: Sequence[int] = (),
     frozen: bool = False,
-) -> Array:
+) -> Array:  # fmt: skip
     """Like :func:`.sensitivity.sensitivities`, but part by part if effects differ between rows."""
     parts = experiment.parts(terms.effects) if isinstance(experiment, Parted) else []
     if not parts:

@@ -50,24 +50,14 @@ def are_by_point(tables: Tables) -> bool:
     return not bool(np.any(heavy & over))
 
 
-def wrench_by_rest(rates: Array, poses: Array) -> tuple[Array, Array]:
-    """Derivatives of the wrench (n, 6, m) [N, N m] and tension (n, m) by each rest length."""
-    n, m = rates.shape[:2]
-    still = np.zeros((m, 3))
-    return wrench_by_ends(rates, poses, still, still, np.ones((n, m)))
-
-
 def wrench_by_ends(
     rates: Array, poses: Array, exit_moves: Array, anchor_moves: Array, longer: Array
 ) -> tuple[Array, Array]:
     """Change of the wrench (n, 6, m) by each cable, and of its own tension (n, m).
 
-    Args:
-        rates: (n, m, N_RATES) of the cables at the poses (n, 7), see
-            :func:`seecr.statics.batch.rates_of_cables`.
-        exit_moves: (m, 3) how the exit points move, base axes. anchor_moves: (m, 3) the anchor
-            points, platform axes.
-        longer: (n, m) how much longer the cables become.
+    Rates are those of the cables at the poses, :func:`seecr.statics.batch.rates_of_cables`; exit
+    points (m, 3) move in base axes, anchor points (m, 3) in the platform's, and cables get longer
+    (n, m).
     """
     n, m = longer.shape
     wrench, tension = np.empty((n, 6, m)), np.empty((n, m))
@@ -195,8 +185,7 @@ def blocks_of_cables(
 ) -> list[tuple[Term, NDArray[np.intp]]]:
     """Groups of parameters with one per cable, which can be shifted together.
 
-    The effect of each is told apart by the cable that it acts on. This holds for built-in effects
-    only: a user's effect may change other cables too.
+    That holds for built-in effects only: a user's effect may change other cables too.
     """
     return [
         (term, group)
@@ -215,12 +204,9 @@ _READ = 1e-5
 
 
 def sensitivities(
-    experiment: Experiment,
-    terms: Terms,
-    at: Prediction,
-    columns: Sequence[int] = (),
+    experiment: Experiment, terms: Terms, at: Prediction, columns: Sequence[int] = (),
     frozen: bool = False,
-) -> Array:
+) -> Array:  # fmt: skip
     """Derivatives of the readings with respect to the terms' parameters.
 
     Args:
@@ -265,11 +251,14 @@ def _together(places: list[int]) -> slice | list[int]:
 
 def length_sensitivities(at: Prediction) -> Array:
     """Derivatives of pose and tensions with respect to each cable's rest length, (n, 6 + m, m)."""
-    return _kept(at, "by_length", _by_length)
 
+    def change(at: Prediction) -> Array:
+        still = np.zeros((at.tensions.shape[1], 3))
+        longer = np.ones_like(at.tensions)
+        by_cable = wrench_by_ends(cable_rates(at), at.pose, still, still, longer)
+        return _response_to_wrench(at, *by_cable)
 
-def _by_length(at: Prediction) -> Array:
-    return _response_to_wrench(at, *wrench_by_rest(cable_rates(at), at.pose))
+    return _kept(at, "by_length", change)
 
 
 def cable_rates(at: Prediction) -> Array:
@@ -280,8 +269,7 @@ def cable_rates(at: Prediction) -> Array:
 def read_by_length(at: Prediction) -> Array:
     """Derivatives of the readings with respect to errors of the rest lengths, (n, 6 + m, m).
 
-    They are for errors that exceed what hysteresis and friction hold. Within that, where the cables
-    stick at the end of a row's motion, a micrometre more moves nothing, and a millimetre all.
+    They are for errors that exceed what hysteresis and friction hold.
     """
     change = length_sensitivities(_sliding(at) if at.has_history else at)
     return rates_of_reading(at, at.sensors) @ change if _alters(at) else change
@@ -353,10 +341,6 @@ class _ByWrench:
         return _kept(self.at, f"read_rates {own}", lambda at: rates_of_reading(at, self.sensing))
 
     @property
-    def inverse(self) -> Array:
-        return _kept(self.at, "inverse", _inverse_stiffness)
-
-    @property
     def by_length(self) -> Array:
         return length_sensitivities(self.at)
 
@@ -418,7 +402,7 @@ class _ByWrench:
     def _physical(self, sides: Sides, apart: float) -> Array:
         if sides.of_lengths:
             return (self.by_length @ sides.longer(apart)[..., None])[..., 0]
-        return _response(self.at, *self._tables(sides), apart, self.inverse)
+        return _response(self.at, *self._tables(sides), apart)
 
     def _read(self, shift: Shift, change: Array, apart: float) -> Array:
         at = self.at
@@ -440,10 +424,10 @@ def _kept(at: Prediction, name: str, make: Callable[[Prediction], Array]) -> Arr
     return at.kept[name]
 
 
-def _response(at: Prediction, plus: Tables, minus: Tables, apart: float, inverse: Array) -> Array:
+def _response(at: Prediction, plus: Tables, minus: Tables, apart: float) -> Array:
     """Change of pose and tensions (n, 6 + m) between two tables, per unit of ``apart``."""
     force, tension = batch.change(plus, minus, at.found)
-    step = -inverse @ (force / apart)[..., None]
+    step = -_inverse_stiffness(at) @ (force / apart)[..., None]
     move = _moved(at, step)[..., 0]
     return np.concatenate([move, tension / apart + (at.found.slopes @ step)[..., 0]], axis=1)
 
@@ -451,7 +435,7 @@ def _response(at: Prediction, plus: Tables, minus: Tables, apart: float, inverse
 def _response_by_cable(at: Prediction, plus: Tables, minus: Tables, apart: Array) -> Array:
     """The same (n, 6 + m, m) for tables in which every cable was changed, by ``apart`` (m,)."""
     force, own = batch.change_by_cable(plus, minus, at.found)
-    step = -_kept(at, "inverse", _inverse_stiffness) @ (force / apart)
+    step = -_inverse_stiffness(at) @ (force / apart)
     out = np.concatenate([_moved(at, step), at.found.slopes @ step], axis=1)
     cable = np.arange(own.shape[1])
     out[:, 6 + cable, cable] += own / apart
@@ -459,16 +443,11 @@ def _response_by_cable(at: Prediction, plus: Tables, minus: Tables, apart: Array
 
 
 def _response_to_wrench(at: Prediction, wrench: Array, own: Array) -> Array:
-    """Change of pose and tensions (n, 6 + m, m) with cables that pull otherwise.
-
-    Args:
-        wrench: (n, 6, m) change of the wrench [N, N m] by each cable.
-        own: (n, m) change of its own tension while the platform is held.
-    """
+    """Change (n, 6 + m, m) of pose and tensions with cables' wrench (n, 6, m) and own (n, m)."""
     motion = motion_of(at)
     free = at.tables.screws.shape[1] == 0
     along = np.diagonal(motion[0])[:, None] * wrench if free else motion.swapaxes(1, 2) @ wrench
-    step = _kept(at, "inverse", _inverse_stiffness) @ along
+    step = _inverse_stiffness(at) @ along
     out = np.concatenate([_moved(at, step), at.found.slopes @ step], axis=1)
     cable = np.arange(own.shape[1])
     out[:, 6 + cable, cable] += own
@@ -499,7 +478,7 @@ def _motion_at(tables: Tables, found: batch.Evaluation) -> Array:
 
 
 def _inverse_stiffness(at: Prediction) -> Array:
-    return _inverse_of(at.tables, at.found)
+    return _kept(at, "inverse", lambda at: _inverse_of(at.tables, at.found))
 
 
 def _inverse_of(tables: Tables, found: batch.Evaluation) -> Array:
@@ -518,13 +497,10 @@ def _inverse_of(tables: Tables, found: batch.Evaluation) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Waypoints:
-    """The N waypoints of a prediction's path, solved once and not again.
+    """The N waypoints of a prediction's path, solved once; columns of the history are not filled.
 
-    Attributes:
-        experiment: robot and commands.
-        tables, found: of the waypoints; the columns of the history are not filled.
-        inverse: (N, d, d) of the stiffness there. motion: (N, 6, d), see motion_of, or (1, 6, d) if
-            it is the same everywhere.
+    ``inverse`` (N, d, d) is of the stiffness there, ``motion`` (N or 1, 6, d) see
+    :func:`motion_of`.
     """
 
     experiment: Experiment

@@ -175,13 +175,7 @@ def _in_full(
 
 
 def moving_covariance(model: Model) -> tuple[Terms, Array] | None:
-    """The terms that move the platform (all but the sensors'), and their covariance (p, p).
-
-    None if the model keeps no covariance.
-
-    Raises:
-        InputFileError: the table holds no valid correlations.
-    """
+    """The terms that move the platform (not sensors), and their covariance (p, p), if kept."""
     whole = covariance_of(model)
     if whole is None:
         return None

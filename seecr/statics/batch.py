@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import pairwise
 from threading import Event
 
@@ -35,13 +35,13 @@ from seecr.compiled.joint_kinematics import N_CURRENT, place_batch
 from seecr.compiled.newton import FINE, STIFF, solve_batch
 from seecr.compiled.platform import add_skew, evaluate_batch
 from seecr.compiled.rates import change_at_rest, change_of_each_cable
-from seecr.parallel import in_parts, run_parts
+from seecr.parallel import run_parts
 from seecr.pose import Array, deviated, products, quat_conjugate
-from seecr.statics.tables import Tables, take
+from seecr.statics.tables import ByRow, Tables, by_row, take
 
 
 @dataclass(eq=False)
-class Evaluation:
+class Evaluation(ByRow):
     """The results of the compiled loop, one row per pose."""
 
     outcome: NDArray[np.int64]
@@ -70,25 +70,23 @@ class Evaluation:
     def empty(cls, n: int, m: int, d: int) -> Evaluation:
         deviation = np.zeros((n, 7))
         deviation[:, 3] = 1.0
+        outcome, count, zeros = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64), np.zeros
         return cls(
-            outcome=np.zeros(n, dtype=np.int64),
-            count=np.zeros(n, dtype=np.int64),
-            residual=np.zeros(n),
-            gradient=np.zeros((n, d)),
-            hessian=np.zeros((n, d, d)),
-            states=np.zeros((n, m, N_STATE)),
-            slopes=np.zeros((n, m, d)),
-            deviation=deviation,
-            values=np.zeros((n, d)),
-            guess=np.zeros((n, m, 3)),
-            energy=np.zeros(n),
-        )
+            outcome, count, zeros(n), zeros((n, d)), zeros((n, d, d)), zeros((n, m, N_STATE)),
+            zeros((n, m, d)), deviation, zeros((n, d)), zeros((n, m, 3)), zeros(n),
+        )  # fmt: skip
 
     @classmethod
     def at_commands(cls, tables: Tables) -> Evaluation:
         """Nothing evaluated yet, with the platform at the poses of tables."""
         n, m = tables.cables.shape[:2]
         return cls.empty(n, m, tables.n_dof)
+
+    def there(self) -> Evaluation:
+        """Nothing evaluated yet, with the platform and its catenaries where they are here."""
+        out = Evaluation.empty(*self.slopes.shape)
+        out.deviation[:], out.values[:], out.guess[:] = self.deviation, self.values, self.guess
+        return out
 
 
 def _are_at_rest(outcome: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -97,21 +95,14 @@ def _are_at_rest(outcome: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def descend(
-    tables: Tables,
-    start: Array | None = None,
-    limit: int = 400,
-    threads: int | None = None,
-    start_values: Array | None = None,
-    staged: bool | None = None,
-    guess: Array | None = None,
-) -> Evaluation:
+    tables: Tables, start: Array | None = None, limit: int = 400, threads: int | None = None,
+    start_values: Array | None = None, staged: bool | None = None, guess: Array | None = None,
+) -> Evaluation:  # fmt: skip
     """Newton descent of all poses to equilibria; ``start`` (n, 7) are deviations, none by default.
 
-    ``guess`` (n, m, 3) are the catenaries at the start, if known.
-
     Stiff robots whose descent does not converge are solved again with a stiffness that is raised in
-    stages. ``staged=True`` does so from the start, ``False`` never. A soft robot may change to
-    another equilibrium, so stages are used only where they are needed.
+    stages. ``staged=True`` does so from the start, ``False`` never: a soft robot may change to
+    another equilibrium by it. ``guess`` (n, m, 3) are the catenaries at the start, if known.
     """
     if staged is None:
         out = descend(tables, start, limit, threads, start_values, False, guess)
@@ -122,7 +113,7 @@ def descend(
             first, values = (None if s is None else s[again] for s in (start, start_values))
             better = descend(take(tables, again), first, limit, threads, values, staged=True)
             better.count += out.count[again]
-            put_evaluation(out, again, better)
+            out.put(again, better)
         return out
     n, out = len(tables), Evaluation.at_commands(tables)
     starts = np.array(out.deviation if start is None else start, order="C")
@@ -131,16 +122,12 @@ def descend(
         out.guess[:] = guess
     out.energy[:] = np.nan
 
-    def run(part: slice) -> None:
-        solve_batch(
-            tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
-            starts[part], first[part], tables.length, tables.scale[part], 0.5 * tables.length,
-            tables.reach[part], limit, out.outcome[part], out.count[part], out.residual[part],
-            out.gradient[part], out.hessian[part], out.states[part], out.slopes[part],
-            out.deviation[part], out.values[part], out.guess[part], staged,
-        )  # fmt: skip
-
-    in_parts(run, n, threads)
+    by_row(
+        solve_batch, tables.cables, tables.load, tables.poses, tables.screws, starts, first,
+        tables.length, tables.scale, 0.5 * tables.length, tables.reach, limit, out.outcome,
+        out.count, out.residual, out.gradient, out.hessian, out.states, out.slopes, out.deviation,
+        out.values, out.guess, staged, threads=threads,
+    )  # fmt: skip
     _refuse_no_length(tables, out)
     return out
 
@@ -162,32 +149,26 @@ def motions(tables: Tables, at: Evaluation) -> Array:
         return np.broadcast_to(np.eye(6), (n, 6, 6))
     from seecr.compiled.joint_kinematics import apart_batch  # takes a while to import
 
-    apart, out, rows = np.empty((n, 6)), np.empty((n, tables.n_dof, 6)), np.arange(n)
-
-    def run(part: slice) -> None:
-        apart_batch(
-            tables.screws, tables.poses, rows[part], at.values[part], tables.length, apart[part],
-            out[part],
-        )  # fmt: skip
-
-    in_parts(run, n)
+    out, given, length = (
+        np.empty((n, tables.n_dof, 6)),
+        (tables.screws, tables.poses),
+        tables.length,
+    )
+    by_row(
+        lambda rows, values, apart, to: apart_batch(*given, rows, values, length, apart, to),
+        np.arange(n), at.values, np.empty((n, 6)), out,
+    )  # fmt: skip
     return out
 
 
 def evaluate(tables: Tables, at: Evaluation, threads: int | None = 1) -> Evaluation:
     """Wrench, stiffness and energy at the deviations of ``at``; nothing is solved."""
-    out = Evaluation.at_commands(tables)
-    out.deviation[:], out.values[:], out.guess[:] = at.deviation, at.values, at.guess
-
-    def run(part: slice) -> None:
-        evaluate_batch(
-            tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
-            out.deviation[part], out.values[part], tables.length, out.gradient[part],
-            out.hessian[part], out.states[part], out.slopes[part], out.energy[part],
-            out.guess[part],
-        )  # fmt: skip
-
-    in_parts(run, len(tables), threads)
+    out = at.there()
+    by_row(
+        evaluate_batch, tables.cables, tables.load, tables.poses, tables.screws, out.deviation,
+        out.values, tables.length, out.gradient, out.hessian, out.states, out.slopes, out.energy,
+        out.guess, threads=threads,
+    )  # fmt: skip
     out.outcome = np.where(np.isinf(out.energy), CABLE_LAW, CONVERGED)
     out.residual = residual_size(out.gradient) / tables.scale
     return out
@@ -196,16 +177,10 @@ def evaluate(tables: Tables, at: Evaluation, threads: int | None = 1) -> Evaluat
 def walk(
     tables: Tables, path: Path, limit: int, needed: NDArray[np.bool_] | None = None
 ) -> Evaluation:
-    """Solve the waypoints of a path in order, each from the one before.
+    """Solve the waypoints of a path in order, each from the one before; fills the history columns.
 
-    Fills the history columns in ``tables``. Runs are independent, except with creep, which
-    continues through all runs that share a clock.
-
-    Args:
-        tables: of the N waypoints.
-        path: the path.
-        limit: most steps to a waypoint.
-        needed: (n,) rows without which all is useless: where one is lost, no other run is begun.
+    Runs are independent, except with creep, which continues through all runs that share a clock.
+    ``needed`` (n,) are rows without which all is useless: where one is lost, no other run is begun.
     """
     vital = np.zeros(len(tables), dtype=bool) if needed is None else path.on_the_way_to(needed)
     given_up = Event()
@@ -246,11 +221,7 @@ def change_of_walk(
 ) -> tuple[Array, Array]:
     """Steps (N, d) [m] and tensions (N, m) of a path under ``plus`` minus those under ``minus``.
 
-    Args:
-        plus, minus: tables of the N waypoints.
-        path: the path.
-        at: equilibria on the path between the two; nothing is solved.
-        inverse: (N, d, d) [m/N] of the stiffness there.
+    ``at`` are equilibria between the two, ``inverse`` (N, d, d) [m/N] that of the stiffness there.
     """
     n, m = plus.cables.shape[:2]
     step, tension = np.empty((n, plus.n_dof)), np.empty((n, m))
@@ -266,43 +237,27 @@ def change_of_walk(
 
 
 def change(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Array]:
-    """Gradient (n, d) [N] and tensions (n, m) [N] of ``plus`` minus those of ``minus``.
-
-    Args:
-        plus, minus: tables of the same poses.
-        at: where the platform is; nothing is solved.
-    """
+    """Gradient (n, d) and tensions (n, m) [N] of ``plus`` minus those of ``minus``."""
     n, m = plus.cables.shape[:2]
     gradient, tension = np.empty((n, plus.n_dof)), np.empty((n, m))
-
-    def run(part: slice) -> None:
-        change_at_rest(
-            plus.cables[part], minus.cables[part], plus.load[part], minus.load[part],
-            plus.poses[part], plus.screws[part], at.deviation[part], at.values[part],
-            plus.length, at.guess[part], gradient[part], tension[part],
-        )  # fmt: skip
-
-    in_parts(run, n)
+    by_row(
+        change_at_rest, plus.cables, minus.cables, plus.load, minus.load, plus.poses, plus.screws,
+        at.deviation, at.values, plus.length, at.guess, gradient, tension,
+    )  # fmt: skip
     return _solved(gradient, tension, gradient)
 
 
 def change_by_cable(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Array]:
     """The same cable by cable: gradient (n, d, m) [N] and each cable's own tension (n, m).
 
-    It is for tables in which every cable was changed, to get the derivatives by a per-cable
-    parameter in one call. The load is taken to be the same in both.
+    It is for tables in which every cable was changed, under the same load.
     """
     n, m = plus.cables.shape[:2]
     gradient, tension = np.empty((n, m, plus.n_dof)), np.empty((n, m))
-
-    def run(part: slice) -> None:
-        change_of_each_cable(
-            plus.cables[part], minus.cables[part], plus.load[part], plus.poses[part],
-            plus.screws[part], at.deviation[part], at.values[part], plus.length, at.guess[part],
-            gradient[part], tension[part],
-        )  # fmt: skip
-
-    in_parts(run, n)
+    by_row(
+        change_of_each_cable, plus.cables, minus.cables, plus.load, plus.poses, plus.screws,
+        at.deviation, at.values, plus.length, at.guess, gradient, tension,
+    )  # fmt: skip
     return _solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, m * plus.n_dof))
 
 
@@ -313,42 +268,29 @@ def rates_of_cables(tables: Tables, at: Evaluation) -> Array:
     """
     from seecr.compiled.rates import rates_of_each_cable  # takes a while to import
 
-    n, m = tables.cables.shape[:2]
-    out = np.empty((n, m, N_RATES))
-
-    def run(part: slice) -> None:
-        rates_of_each_cable(
-            tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
-            at.deviation[part], at.values[part], tables.length, at.guess[part], out[part],
-        )  # fmt: skip
-
-    in_parts(run, n)
+    out = np.empty((*tables.cables.shape[:2], N_RATES))
+    by_row(
+        rates_of_each_cable, tables.cables, tables.load, tables.poses, tables.screws, at.deviation,
+        at.values, tables.length, at.guess, out,
+    )  # fmt: skip
     out[np.isnan(out).any(axis=(1, 2))] = 0.0
     return out
 
 
 def pull_and_change(tables: Tables, at: Evaluation) -> tuple[Evaluation, Array, Array]:
-    """Wrench and tensions at the deviations of ``at``, and derivatives by each cable's rest length.
+    """Wrench and tensions where ``at`` is, without stiffness, and derivatives by rest length.
 
-    Returns:
-        gradient, residual, tensions and catenaries, without a stiffness; and the derivatives [N/m]
-        of the gradient, (n, d, m), and of each cable's own tension, (n, m).
+    These are (n, d, m) of the gradient and (n, m) of each cable's own tension [N/m].
     """
     from seecr.compiled import rates  # takes a while to import
 
     (n, m), d = tables.cables.shape[:2], tables.n_dof
-    out, pulls = Evaluation.at_commands(tables), np.empty((n, m))
-    out.deviation[:], out.values[:], out.guess[:] = at.deviation, at.values, at.guess
+    out, pulls = at.there(), np.empty((n, m))
     gradient, tension = np.empty((n, m, d)), np.empty((n, m))
-
-    def run(part: slice) -> None:
-        rates.pull_and_change(
-            tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
-            out.deviation[part], out.values[part], tables.length, out.guess[part],
-            out.gradient[part], pulls[part], gradient[part], tension[part],
-        )  # fmt: skip
-
-    in_parts(run, n)
+    by_row(
+        rates.pull_and_change, tables.cables, tables.load, tables.poses, tables.screws,
+        out.deviation, out.values, tables.length, out.guess, out.gradient, pulls, gradient, tension,
+    )  # fmt: skip
     out.states[..., TENSION] = pulls
     lost = np.isnan(out.gradient).any(axis=1)
     out.residual = np.where(lost, np.inf, residual_size(out.gradient) / tables.scale)
@@ -375,11 +317,7 @@ def without_idle(tables: Tables, at: Evaluation) -> Evaluation:
 
 
 def is_slack(tables: Tables, at: Evaluation) -> NDArray[np.bool_]:
-    """Slack cables, (n, m): those longer than their span, and those without tension.
-
-    A heavy cable that is longer than its span sags and pulls by its weight alone. A tension below
-    the rounding of the load counts as zero.
-    """
+    """Slack cables, (n, m): those longer than their span, which may sag, or without tension."""
     nothing = at.states[..., TENSION] < IDLE * tables.scale[:, None]
     return np.asarray((at.states[..., SLACK] > 0.5) | nothing)
 
@@ -396,8 +334,8 @@ def joints_at_rest(tables: Tables, at: Evaluation) -> Array:
 def stiffness(tables: Tables, at: Evaluation) -> Array:
     """Minus the derivative of the wrench, (n, d, d) [N/m] in scaled coordinates.
 
-    A constant moment whose work depends on the way makes it asymmetric; ``at.hessian`` is its
-    symmetric part.
+    A moment whose work depends on the way makes it asymmetric; ``at.hessian`` is its symmetric
+    part.
     """
     rows = np.flatnonzero(under_moment(tables))
     if len(rows) == 0:
@@ -414,25 +352,11 @@ def under_moment(tables: Tables) -> NDArray[np.bool_]:
 
 
 def residual_size(gradient: Array) -> Array:
-    """The larger of force and torque over length, (n,) [N], of gradients (n, d).
-
-    For platforms on joints it is the norm of the gradient.
-    """
+    """The larger of force and torque over length, (n,) [N]; on joints the norm of the gradient."""
     if gradient.shape[1] == 6:
         halves = np.linalg.norm(gradient.reshape(-1, 2, 3), axis=2)
         return np.asarray(halves.max(axis=1))
     return np.asarray(np.linalg.norm(gradient, axis=1))
-
-
-def take_evaluation(whole: Evaluation, rows: NDArray[np.integer]) -> Evaluation:
-    """Some rows of an evaluation."""
-    return Evaluation(**{f.name: getattr(whole, f.name)[rows] for f in fields(Evaluation)})
-
-
-def put_evaluation(whole: Evaluation, rows: NDArray[np.integer], part: Evaluation) -> None:
-    """Overwrite rows of an evaluation."""
-    for f in fields(Evaluation):
-        getattr(whole, f.name)[rows] = getattr(part, f.name)
 
 
 def platform_poses(tables: Tables, deviation: Array) -> Array:

@@ -30,12 +30,11 @@ from seecr.counted import between, counted, rows_words
 from seecr.description.joints import motion_columns, values_of_pose
 from seecr.description.robot import Robot
 from seecr.errors import InputError
-from seecr.parallel import in_parts
 from seecr.pose import Array, pose_difference, quat_rotate, quat_to_matrix, rotation_vectors
 from seecr.result import COORDINATES, Record, Result, named, rows_of
 from seecr.statics import batch
 from seecr.statics.starts import start_of
-from seecr.statics.tables import Tables, spanless, take
+from seecr.statics.tables import Tables, by_row, spanless, take
 from seecr.units import joules, millimetres
 
 # The platform's mass matrix in the coordinates of its stiffness.
@@ -282,7 +281,7 @@ class Solution(Result):
         at = np.arange(len(self))[np.asarray(index)]
         values: dict[str, Any] = {name: getattr(self, name)[at] for name in _PER_ROW}
         values["tables"] = take(self.tables, at)
-        values["evaluation"] = batch.take_evaluation(self.evaluation, at)
+        values["evaluation"] = self.evaluation.only(at)
         for name in ("others", "jumps"):
             whole = getattr(self, name)
             values[name] = None if whole is None else tuple(whole[k] for k in at)
@@ -296,7 +295,7 @@ class Solution(Result):
         if len(rows) == 0:
             return self.evaluation
         # a cable that is exactly as long as its rest length has stiffness on one side only
-        there = batch.take_evaluation(self.evaluation, rows)
+        there = self.evaluation.only(rows)
         hessian = self.evaluation.hessian.copy()
         hessian[rows] = batch.without_idle(take(self.tables, rows), there).hessian
         return replace(self.evaluation, hessian=hessian)
@@ -308,15 +307,11 @@ class Solution(Result):
 
         hessian = self._softer_side.hessian
         values, directions = np.empty(len(hessian)), np.empty((len(hessian), 6))
-        columns = batch.motions(self.tables, self.evaluation) if self.robot.joints else None
-
-        def run(part: slice) -> None:
-            if columns is None:
-                softest_batch(hessian[part], values[part], directions[part])
-            else:
-                softest_motions(hessian[part], columns[part], values[part], directions[part])
-
-        in_parts(run, len(hessian))
+        if self.robot.joints:
+            columns = batch.motions(self.tables, self.evaluation)
+            by_row(softest_motions, hessian, columns, values, directions)
+        else:
+            by_row(softest_batch, hessian, values, directions)
         return values, directions
 
     @property
@@ -343,7 +338,7 @@ class Solution(Result):
         Translation of its origin, then rotation vector, base axes.
         """
         rows = np.array([i])
-        at = batch.take_evaluation(self.evaluation, rows)
+        at = self.evaluation.only(rows)
         columns = batch.motions(take(self.tables, rows), at)[0]
         whole = (coordinates * self._units()) @ columns
         return np.asarray(whole / np.repeat([1.0, self.robot.length], 3))
@@ -463,32 +458,25 @@ def certify(robot: Robot, tables: Tables, found: batch.Evaluation) -> Solution:
     turn = np.where(moved[:, 3:4] < 0, -1.0, 1.0) * moved[:, 3:]
     lost = no_length | np.isin(found.outcome, (FALLING, CABLE_LAW, SPINNING))
     return Solution(
-        robot=robot,
-        tables=tables,
-        evaluation=check,
-        command=tables.poses,
+        robot=robot, tables=tables, evaluation=check, command=tables.poses,
         pose=_blank(batch.platform_poses(tables, moved), lost),
         deviation=_blank(np.concatenate([moved[:, :3], rotation_vectors(turn)], axis=1), lost),
-        tensions=_blank(check.states[..., TENSION], lost),
-        slack=batch.is_slack(tables, check),
-        rest_lengths=tables.cables[..., REST],
-        iterations=found.count,
+        tensions=_blank(check.states[..., TENSION], lost), slack=batch.is_slack(tables, check),
+        rest_lengths=tables.cables[..., REST], iterations=found.count,
         residual=np.where(lost, np.inf, check.residual),
-        energy=_energies(robot, tables, check, status),
-        status=status,
-    )
+        energy=_energies(robot, tables, check, status), status=status,
+    )  # fmt: skip
 
 
 def _energies(
     robot: Robot, tables: Tables, check: batch.Evaluation, status: NDArray[np.object_]
 ) -> Array:
     """Energies (n,) [J] of poses, whatever full turns a search made under a moment."""
-    ends = (Status.CONVERGED, Status.UNSTABLE, Status.SINGULAR)
-    balanced = np.array([one in ends for one in status], dtype=bool)
+    balanced = np.array([one in _BALANCED for one in status], dtype=bool)
     rows = np.flatnonzero(batch.under_moment(tables) & balanced)
     if len(rows) == 0 or not robot.joints:
         return check.energy
-    some, at = take(tables, rows), batch.take_evaluation(check, rows)
+    some, at = take(tables, rows), check.only(rows)
     poses = batch.platform_poses(some, at.deviation)
     start, values = start_of(robot, some, poses)
     assert start is not None and values is not None

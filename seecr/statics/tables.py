@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,43 @@ from seecr.compiled.columns import (
 from seecr.description.joints import values_of_pose
 from seecr.description.robot import Robot
 from seecr.effects.setup import QUANTITIES, Setup
+from seecr.parallel import in_parts
 from seecr.pose import Array, quat_to_matrix
+
+
+def by_row(compiled: Callable[..., None], *given: Any, threads: int | None = None) -> None:
+    """Call a compiled function with arrays (n, ...), in as many parts as there are threads.
+
+    The first is an array; what is none is the same for all rows.
+    """
+
+    def run(part: slice) -> None:
+        compiled(*(each[part] if isinstance(each, np.ndarray) else each for each in given))
+
+    in_parts(run, len(given[0]), threads)
+
+
+@dataclass(eq=False)
+class ByRow:
+    """Arrays with a row for each of n poses or searches: all fields of a dataclass."""
+
+    def only(self, rows: NDArray[np.integer] | NDArray[np.bool_]) -> Self:
+        """Some rows."""
+        return replace(self, **{name: each[rows] for name, each in vars(self).items()})
+
+    def and_more(self, other: Self) -> Self:
+        """The rows of both."""
+        its = vars(other)
+        return replace(self, **{k: np.concatenate([v, its[k]]) for k, v in vars(self).items()})
+
+    def put(self, rows: NDArray[np.integer] | NDArray[np.bool_], other: Self) -> None:
+        """Overwrite rows with those of another."""
+        for mine, its in zip(vars(self).values(), vars(other).values(), strict=True):
+            mine[rows] = its
+
+    def copy(self) -> Self:
+        """The same with arrays of its own."""
+        return replace(self, **{name: each.copy() for name, each in vars(self).items()})
 
 
 @dataclass(eq=False)
@@ -70,12 +107,7 @@ def _screws_of(robot: Robot, poses_bytes: bytes, n: int) -> Array:
 
 
 def assemble(setup: Setup, strains: Array | None = None) -> Tables:
-    """The tables of a setup; history columns are at their null values.
-
-    Args:
-        setup: n rows.
-        strains: (n, m) at which users' cable laws are linearised; zero by default.
-    """
+    """The tables of a setup; history columns are null, users' laws linearised at strains (n, m)."""
     robot = setup.robot
     poses = np.array(setup.commands.pose, order="C")  # a copy: see seecr.compiled.jit
     n, m = len(poses), robot.n_cables
@@ -84,15 +116,9 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
     if setup.laws:
         _linearise(setup, np.zeros((n, m)) if strains is None else strains, cables)
     return Tables(
-        cables=cables,
-        load=load,
-        poses=poses,
-        screws=_screws_of(robot, poses.tobytes(), n),
-        length=robot.length,
-        scale=_load_scale(setup),
-        reach=_reach(cables),
-        n_dof=robot.n_dof,
-    )
+        cables=cables, load=load, poses=poses, screws=_screws_of(robot, poses.tobytes(), n),
+        length=robot.length, scale=_load_scale(setup), reach=_reach(cables), n_dof=robot.n_dof,
+    )  # fmt: skip
 
 
 def relengthened(tables: Tables, setup: Setup) -> Tables:
@@ -105,8 +131,8 @@ def relengthened(tables: Tables, setup: Setup) -> Tables:
 def reassembled(tables: Tables, setup: Setup, names: Collection[str]) -> Tables:
     """Tables with some quantities taken from a setup of the same rows; users' laws are left out.
 
-    The history columns are kept, and so are the scales of a search (``scale``, ``reach``): the
-    result is for differences at an equilibrium.
+    History columns and the scales of a search stay: the result is for differences at an
+    equilibrium.
     """
     cables, load = tables.cables, tables.load.copy()
     if not _OF_CABLES.isdisjoint(names):
@@ -161,11 +187,7 @@ def _linearise(setup: Setup, strains: Array, cables: Array) -> None:
 
 
 def _hanging(setup: Setup) -> Array:
-    """The vertical of the planes in which cables hang.
-
-    It is opposite to gravity, or the frame's vertical if there are pulleys or exit points that
-    lift.
-    """
+    """The vertical of the planes in which cables hang: of the frame with pulleys or lifts."""
     g = np.linalg.norm(setup.gravity)
     if g == 0.0 or np.any(setup.pulley_radius) or np.any(setup.lift):
         return setup.robot.up

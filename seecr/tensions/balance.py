@@ -7,7 +7,6 @@ it is not, if the direction of a pull depends on its size (sag, yielding exit po
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,11 +24,9 @@ from seecr.compiled.columns import (
     UP,
     WEIGHT,
 )
-from seecr.parallel import in_parts
 from seecr.pose import Array
 from seecr.statics import batch
-from seecr.statics.tables import Tables, take, ways
-from seecr.tensions.distribution import by_row
+from seecr.statics.tables import ByRow, Tables, by_row, take, ways
 
 # Newton steps to the tightness of a cable.
 _TIGHTNESS = 60
@@ -38,37 +35,12 @@ _TO_TENSIONS, _SAME = 8, 1e-8
 
 
 @dataclass(eq=False)
-class ByRow:
-    """Arrays with a row for each of n poses or searches: the fields of a dataclass."""
-
-    def only(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Self:
-        """Some rows."""
-        return replace(self, **{name: each[rows] for name, each in vars(self).items()})
-
-    def and_more(self, other: Self) -> Self:
-        """The rows of both."""
-        its = vars(other)
-        return replace(self, **{k: np.concatenate([v, its[k]]) for k, v in vars(self).items()})
-
-    def put(self, rows: NDArray[np.intp] | NDArray[np.bool_], other: Self) -> None:
-        """Overwrite rows with those of another."""
-        for mine, its in zip(vars(self).values(), vars(other).values(), strict=True):
-            mine[rows] = its
-
-    def copy(self) -> Self:
-        """The same with arrays of its own."""
-        return replace(self, **{name: each.copy() for name, each in vars(self).items()})
-
-
-@dataclass(eq=False)
 class Rates(ByRow):
     """Derivatives of the cables' forces at n poses.
 
     Attributes:
-        by_tension: (n, d, m) gradient by each cable's tension, torques over the robot's length;
-            zero for cables without tension.
-        by_length: (n, m) [N/m] tension by rest length.
-        pull: (n, d, m) [N/m] gradient by rest length.
+        by_tension: (n, d, m) gradient by each cable's tension; zero for cables without tension.
+        by_length, pull: (n, m) tension and (n, d, m) gradient by rest length [N/m].
     """
 
     by_tension: Array
@@ -92,10 +64,8 @@ def linearised(tables: Tables, start: batch.Evaluation) -> tuple[batch.Evaluatio
 def linearised_at(tables: Tables, tensions: Array) -> tuple[batch.Evaluation, Rates]:
     """The balance where cables have tensions (n, m) [N], and its derivatives there.
 
-    Rest lengths for them are at first only approximate where cables bend. They are mended until the
-    tensions are those asked for: of a balance linearised beside them an error of second order would
-    stay, which too few cables cannot make up for by pulling differently. Where no lengths lead to
-    such tensions, those that come nearest are kept.
+    Rest lengths are mended until the tensions are those asked for: too few cables cannot make up
+    for an error of second order. Where none lead there, those that come nearest are kept.
     """
     now = with_rest(tables, rest_for(tables, tensions))
     at, rates = linearised(now, here(now))
@@ -108,12 +78,12 @@ def linearised_at(tables: Tables, tensions: Array) -> tuple[batch.Evaluation, Ra
         some, own = take(now, rows), at.states[rows, :, TENSION]
         rest, by_length = some.cables[..., REST], rates.by_length[rows]
         longer = with_rest(some, next_rest(some, rest, by_length, own, tensions[rows]))
-        there, slopes = linearised(longer, batch.take_evaluation(at, rows))
+        there, slopes = linearised(longer, at.only(rows))
         missed = _off(there, tensions[rows])
         nearer = missed < off[rows]
         rows = rows[nearer]
         now.cables[rows], off[rows] = longer.cables[nearer], missed[nearer]
-        batch.put_evaluation(at, rows, batch.take_evaluation(there, np.flatnonzero(nearer)))
+        at.put(rows, there.only(np.flatnonzero(nearer)))
         rates.put(rows, slopes.only(nearer))
     return at, rates
 
@@ -143,10 +113,9 @@ def first_tensions(tables: Tables, low: Array) -> Array:
 
 
 def next_rest(tables: Tables, rest: Array, by_length: Array, now: Array, wanted: Array) -> Array:
-    """Rest lengths (n, m) [m] that bring tensions ``now`` near to ``wanted``, (n, m) [N].
+    """Rest lengths (n, m) [m], at most doubled or halved, that bring tensions near to ``wanted``.
 
-    They are not finite if a tension does not depend on the length. A length changes by a factor of
-    2 at most.
+    They are not finite if a tension does not depend on the length.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         # the tension of a plain cable is linear in 1/l0
@@ -158,7 +127,7 @@ def next_rest(tables: Tables, rest: Array, by_length: Array, now: Array, wanted:
 def _hanging(tables: Tables, now: Array, wanted: Array) -> Array:
     """Factors (n, m) on Newton's steps for cables with weight; one for cables without.
 
-    The strain of a parabola is T/EA - (w l)^2/(24 T^2) (Irvine 1981, section 1.2). The factor is
+    The strain of a parabola is T/EA - (w l)^2/(24 T^2) (Irvine 1981, section 1.2): the factor is
     its difference between two tensions over that of its tangent at the first.
     """
     law, heavy = tables.cables, weights(tables) ** 2
@@ -170,13 +139,10 @@ def _hanging(tables: Tables, now: Array, wanted: Array) -> Array:
 
 
 def loose_rest(tables: Tables, size: Array) -> tuple[Array, Array]:
-    """Rest lengths (n, m) [m] of cables with weight, by their tightness ``size`` (n, m) [N].
+    """Rest lengths (n, m) [m] of cables with weight by tightness (n, m) [N], and the slope [m/N].
 
     Tightness is the tension at which a shallow parabola would have that length. Unlike the tension,
     which increases again when a cable hangs far down, it always falls as the cable gets longer.
-
-    Returns:
-        the lengths and their derivatives [m/N].
     """
     law, way = tables.cables, bridged_lengths(tables)
     sag = weights(tables) ** 2 / (24.0 * size**2)
@@ -188,11 +154,7 @@ def loose_rest(tables: Tables, size: Array) -> tuple[Array, Array]:
 
 
 def tightness(tables: Tables, rest: Array) -> Array:
-    """The tightness (n, m) [N], see :func:`loose_rest`, of cables with rest lengths (n, m) [m].
-
-    Newton's method starts at the cable's weight, and is for cables about as tight as that or
-    tighter.
-    """
+    """The tightness (n, m) [N], see :func:`loose_rest`, if that is about the weight or more."""
     weight = weights(tables)
     size = np.where(weight > 0.0, weight, 1.0)
     for _ in range(_TIGHTNESS):
@@ -212,7 +174,6 @@ def balance_of(tables: Tables, low: Array, about: Array | None = None) -> tuple[
     """Balance A tau = load at the poses of tables: (n, d, m) and (n, d) [N], torques over length.
 
     It is linearised at the tensions ``about``, (n, m) [N], by default near :func:`first_tensions`.
-    That only matters if the direction of a pull depends on its size.
     """
     if about is None:  # somewhere near will do
         now = with_rest(tables, rest_for(tables, first_tensions(tables, low)))
@@ -223,11 +184,7 @@ def balance_of(tables: Tables, low: Array, about: Array | None = None) -> tuple[
 
 
 def is_straight(tables: Tables, others: Tables) -> bool:
-    """Whether platforms hang on straight cables whose ends and loads do not move along.
-
-    Args:
-        tables, others: of the same rows at different poses.
-    """
+    """Whether cables are straight, and ends and loads the same, in tables of two poses."""
     ends = [*range(EXIT, EXIT + 3), *range(ANCHOR, ANCHOR + 3)]
     same = np.array_equal(tables.cables[..., ends], others.cables[..., ends])
     same &= np.array_equal(tables.load, others.load)
@@ -235,11 +192,9 @@ def is_straight(tables: Tables, others: Tables) -> bool:
 
 
 def straight_balance(tables: Tables, rows: NDArray[np.intp], away: Array) -> tuple[Array, Array]:
-    """The same balance as :func:`balance_of` at displacements (k, d) [m] of rows (k,) of tables.
+    """:func:`balance_of` at displacements (k, d) [m] of rows (k,) of tables that are straight.
 
-    Displacements are along the tables' coordinates, rotations times the robot's length. It is for
-    tables that are :func:`is_straight`: the pulls' directions follow from the poses alone, without
-    rest lengths and tensions, ten times as fast.
+    Rotations are times the robot's length. It needs no rest lengths, and takes a tenth of the time.
     """
     from seecr.compiled.orientation import straight_balance_batch  # takes a while to import
 
@@ -247,14 +202,11 @@ def straight_balance(tables: Tables, rows: NDArray[np.intp], away: Array) -> tup
     matrices, loads = np.empty((k, d, m)), np.empty((k, d))
     # Numba would compile everything once more for views
     rows, moves = np.ascontiguousarray(rows), np.ascontiguousarray(away)
-
-    def run(part: slice) -> None:
-        straight_balance_batch(
-            tables.cables, tables.load, tables.poses, tables.screws, rows[part], moves[part],
-            tables.length, matrices[part], loads[part],
-        )  # fmt: skip
-
-    in_parts(run, k)
+    given = tables.cables, tables.load, tables.poses, tables.screws
+    by_row(
+        lambda of, by, *out: straight_balance_batch(*given, of, by, tables.length, *out),
+        rows, moves, matrices, loads,
+    )  # fmt: skip
     return matrices, loads
 
 
@@ -272,10 +224,8 @@ def bridged_lengths(tables: Tables) -> Array:
 def least_of_heavy(tables: Tables) -> Array:
     """(n, m) [N] tensions that cables with weight are not asked to go below; zero for others.
 
-    The tension in the middle is then the cable's weight, as of a catenary that sags by about a
-    seventh of its span. At the exit point it is larger by half the weight if that is straight above
-    the anchor point, and smaller by half if it is straight below. No catenary has less than about
-    three quarters of that in the middle.
+    In the middle that is the cable's weight, as of a catenary that sags by a seventh of its span;
+    at the exit point up to half the weight more or less. No catenary has less than three quarters.
     """
     weight = weights(tables)
     if not weight.any():
@@ -289,10 +239,7 @@ def weights(tables: Tables) -> Array:
 
 
 def rest_for(tables: Tables, tensions: Array) -> Array:
-    """(n, m) [m] rest lengths with which cables have these tensions (n, m) [N].
-
-    They are exact for cables without weight, and approximate for others.
-    """
+    """Rest lengths (n, m) [m] for tensions (n, m) [N]: exact without weight, approximate with."""
     bridged, weight = bridged_lengths(tables), weights(tables)
     if not weight.any():
         return _straight_rest(tables, bridged, tensions)
@@ -307,13 +254,8 @@ def rest_after(tables: Tables, rest: Array, tensions: Array) -> Array:
     """(n, m) [m] rest lengths with tensions (n, m) [N] where cables stick at their exit points.
 
     What is paid out to a cable that sticks stays behind the exit point, and lowers the tension
-    there until the cable slips.
-
-    Args:
-        tables: with the cables' history at the rest lengths there.
-        rest: (n, m) [m] rest lengths with which cables would have these tensions if those behind
-            exit points stayed as they are.
-        tensions: (n, m) [N].
+    there until the cable slips. ``rest`` (n, m) are the lengths if the tensions behind stayed as
+    they are.
     """
     if not tables.cables[..., FRICTION].any():
         return rest
@@ -330,7 +272,7 @@ def _straight_rest(tables: Tables, spans: Array, tensions: Array, follows: bool 
     from seecr.compiled.rates import rest_lengths_for  # takes a while to import
 
     cables, pulls, out = tables.cables, np.array(tensions, order="C"), np.empty_like(spans)
-    by_row(lambda a, b, c, to: rest_lengths_for(a, b, c, follows, to), cables, spans, pulls, out)
+    by_row(rest_lengths_for, cables, spans, pulls, follows, out)
     return out
 
 
@@ -339,10 +281,7 @@ def _arcs(light: Array, rise: Array) -> Array:
 
     With the bend g = w x/(2 H), for spans x and rises z, l^2 = z^2 + (x sinh(g)/g)^2, and the mean
     of the tensions at both ends is w l coth(g)/2 (Irvine 1981, section 1.2): one equation for g.
-
-    Args:
-        light: half of the weight over the mean tension.
-        rise: over the straight distance.
+    ``light`` is half of the weight over the mean tension, ``rise`` is over the straight distance.
     """
     flat = 1.0 - rise**2
     bend = np.clip(light, 1e-6, _MOST_BENT)

@@ -2,10 +2,8 @@
 
 If the balance is linear in the tensions, one linear program finds them. If not, each round
 linearises it at the tensions of the last round and solves again (sequential linear programming).
-
-A cable with weight always has some tension. The less it is to pull, the longer it hangs, and below
-about its own weight the tension does not determine the length any more. There its tightness takes
-the place of the tension: it falls whenever the length grows. Such cables are called loose.
+Below about its own weight a cable's tension does not determine its length any more: there its
+tightness, which falls whenever the length grows, takes its place. Such cables are called loose.
 """
 
 from __future__ import annotations
@@ -18,7 +16,6 @@ from numpy.typing import NDArray
 
 from seecr.compiled.columns import TENSION
 from seecr.pose import Array
-from seecr.statics import batch
 from seecr.statics.tables import Tables, take
 from seecr.tensions.balance import (
     balance_of,
@@ -86,10 +83,7 @@ class MaxMargin:
 
 
 def limits_of(tables: Tables, low: Array, high: Array) -> tuple[Array, Array]:
-    """Limits (n, m) [N] of tensions from the given (m,) or (n, m), raised to what a cable weighs.
-
-    They contradict each other if a cable may not pull as much as it weighs.
-    """
+    """Limits (n, m) [N] raised to what a cable weighs: contradictory if it may not pull that."""
     shape = tables.cables.shape[:2]
     least = np.maximum(np.broadcast_to(low, shape), least_of_heavy(tables))
     return least, np.array(np.broadcast_to(high, shape), float)
@@ -98,14 +92,11 @@ def limits_of(tables: Tables, low: Array, high: Array) -> tuple[Array, Array]:
 def max_margin_tensions(
     tables: Tables, low: Array, high: Array, hopeless: float = np.inf
 ) -> MaxMargin:
-    """The tensions with the largest margin from limits; exact even if the balance is nonlinear.
+    """The tensions with the largest margin from limits (m,) or (n, m) [N], also of heavy cables.
 
-    Args:
-        tables: of n poses, whose own rest lengths do not matter; at least as many cables as degrees
-            of freedom.
-        low, high: (m,) or (n, m) [N].
-        hopeless: give up on rows whose margin is below minus this part of the load, if loose
-            cables could not help, from the second round on.
+    Tables are of n poses, with at least as many cables as degrees of freedom. From the second round
+    on, rows are given up whose margin is below minus ``hopeless`` loads, if loose cables could not
+    help.
     """
     out = _tightened(tables, *limits_of(tables, low, high), hopeless)
     weighs = least_of_heavy(tables)
@@ -127,9 +118,8 @@ def margins_inside(tables: Tables, low: Array, high: Array) -> Array:
     """Margins (n,) [N] of tensions from limits (m,) asked for, which what cables weigh may exceed.
 
     The largest t with low + t <= tensions <= high - t that leaves no cable below its own least
-    tension. :func:`max_margin_tensions` counts t from that where it is the larger one, a lower
-    bound that is exact at zero. It is counted from lower limits the farther inside tensions turn
-    out to be, in rounds that only increase t.
+    tension. :func:`max_margin_tensions` counts t from that where it is the larger one: a lower
+    bound, exact at zero, that rounds increase by counting from lower limits.
     """
     found, weighs = max_margin_tensions(tables, low, high), least_of_heavy(tables)
     margins = found.margins
@@ -155,15 +145,7 @@ def holds_tightly(tables: Tables, low: Array, high: Array) -> NDArray[np.bool_]:
 def balances(
     tables: Tables, low: Array, high: Array
 ) -> Iterator[tuple[Array, Array, Array, Array]]:
-    """For each pose, the balance that its tensions come nearest to, to explain why it is not held.
-
-    Args:
-        tables: of n poses.
-        low, high: (m,) limits asked for [N].
-
-    Yields:
-        matrix (d, m), load (d,) [N], and limits (m,) [N] of cables that are not loose.
-    """
+    """For each pose the balance (d, m), (d,) that tensions come nearest to, and its limits (m,)."""
     if tables.cables.shape[1] >= tables.n_dof and bends(tables):
         found = max_margin_tensions(tables, low, high)
         yield from zip(found.matrices, found.loads, found.low, found.high, strict=True)
@@ -175,9 +157,8 @@ def balances(
 def _tightened(tables: Tables, least: Array, most: Array, hopeless: float) -> MaxMargin:
     """Sequential linear programming, with limits (n, m), and without loose cables.
 
-    A linear program may be unbounded where tensions are not, and rounds may take turns between two
-    of its vertices. So tensions are limited to some loads then, and where rounds do not end, the
-    tensions in balance near the last ones count: their margin is a lower bound.
+    Where a linear program is unbounded, tensions are limited to some loads; where rounds take turns
+    between two vertices, tensions in balance near the last ones count: a lower bound.
     """
     n, m = tables.cables.shape[:2]
     pulls = np.maximum(least, _PULLS * tables.scale[:, None] / m)
@@ -193,8 +174,8 @@ def _tightened(tables: Tables, least: Array, most: Array, hopeless: float) -> Ma
     beyond = hopeless * tables.scale + _GAINED * least_of_heavy(tables).max(axis=1)
     for k in range(_ROUNDS if bent else 1):
         now = with_rest(take(tables, rows), out.rest[rows])
-        at, rates = linearised(now, batch.take_evaluation(start, rows))
-        batch.put_evaluation(start, rows, at)
+        at, rates = linearised(now, start.only(rows))
+        start.put(rows, at)
         own, matrix, load = at.states[..., TENSION], rates.by_tension, rates.load(at)
         out.matrices[rows], out.loads[rows] = matrix, load
         if k == _LATE:
@@ -242,14 +223,10 @@ def _loosen(
     out: MaxMargin, rows: NDArray[np.intp], tables: Tables, loose: NDArray[np.bool_], low: Array,
     high: Array, first: Array,
 ) -> None:  # fmt: skip
-    """Hold rows with loose cables, if that is possible.
+    """Hold rows (k,) of ``out`` with cables (k, m) that may be loose, if possible.
 
-    Args:
-        out: the results to be filled in.
-        rows: (k,) of it; tables: of these.
-        loose: (k, m) cables that may be loose.
-        low, high: (m,) or (n, m) [N] limits asked for, of all rows of ``out``.
-        first: (k, m) [m] rest lengths to start from.
+    Limits are those asked for, of all rows of ``out``. Searches start from rest lengths ``first``
+    (k, m) [m].
     """
     low, high = (np.array(np.broadcast_to(one, out.low.shape)[rows]) for one in (low, high))
     least = np.where(loose, _LOOSEST * weights(tables), out.low[rows])
@@ -278,19 +255,15 @@ def _newton(
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Balance by Newton's method with the least change of all tensions, of loose cables tightness.
 
-    Args:
-        loose: (n, m). least: (n, m) [N] limits of tension or tightness. high: (n, m) [N] limits of
-            tension. first: (n, m) [m] rest lengths to start from.
-
-    Returns:
-        rest lengths, tensions (n, m) [N], and (n,) whether they are in balance.
+    ``least`` (n, m) [N] limits tension or tightness, ``high`` tension. Returns rest lengths and
+    tensions (n, m), and (n,) whether they are in balance.
     """
     size, rest = np.where(loose, tightness(tables, first), np.inf), first.copy()
     left, start = np.arange(len(rest)), here(tables)
     for _ in range(_NEWTON):
         now, slack, before = with_rest(take(tables, left), rest[left]), loose[left], rest[left]
-        at, rates = linearised(now, batch.take_evaluation(start, left))
-        batch.put_evaluation(start, left, at)
+        at, rates = linearised(now, start.only(left))
+        start.put(left, at)
         tension = at.states[..., TENSION]
         value = np.where(slack, size[left], tension)
         slope = loose_rest(now, np.where(slack, value, 1.0))[1]
@@ -313,15 +286,10 @@ def _newton(
 def counted_balance(
     tables: Tables, low: Array, high: Array, about: Array | None = None
 ) -> tuple[Array, Array]:
-    """Like :func:`balance_of`, for tensions scaled so that limits are the same at all poses.
+    """Like :func:`balance_of`, for tensions scaled so that limits (m,) are the same at all poses.
 
-    The scaled tension goes from ``low`` to ``high`` as the tension of a cable with weight goes from
-    its least value, which changes with the pose, to ``high``. Other tensions are not scaled.
-
-    Args:
-        tables: of n poses.
-        low, high: (m,) limits [N].
-        about: (n, m) scaled, or None for tensions that come nearest to balance.
+    The scaled tension goes from ``low`` to ``high`` as that of a cable with weight goes from its
+    least value, which changes with the pose, to ``high``; ``about`` (n, m) is scaled too.
     """
     floor = least_of_heavy(tables)
     least = np.where(floor < high, np.maximum(low, floor), low)

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from seecr.compiled.columns import TENSION, TOLERANCE
 from seecr.pose import Array
 from seecr.statics import batch
-from seecr.statics.tables import Tables, take
+from seecr.statics.tables import ByRow, Tables, take
 from seecr.tensions.balance import (
-    ByRow,
     Rates,
     bends,
     bridged_lengths,
@@ -52,13 +51,7 @@ _PARTS = (0.0, 0.5, 0.75, 0.9, 1.0)
 
 @dataclass(eq=False)
 class Held(ByRow):
-    """Rest lengths that hold n poses.
-
-    Attributes:
-        rest: (n, m) [m].
-        tensions: (n, m) [N].
-        fine: (n,) bool, the pose can be held within the limits.
-    """
+    """Rest lengths [m] and tensions [N], (n, m), and (n,) whether they hold within limits."""
 
     rest: Array
     tensions: Array
@@ -68,12 +61,8 @@ class Held(ByRow):
 def hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int = _ROUNDS) -> Held:
     """Find rest lengths with which the poses of ``tables`` are in balance.
 
-    Args:
-        tables: of n poses, whose own rest lengths do not matter.
-        aim: (n, m) wanted tensions [N].
-        low, high: (m,) limits [N]. Cables with weight pull at least about what they weigh, unless
-            the pose can only be held with less.
-        rounds: most rounds of Newton's method.
+    Tensions are near ``aim`` (n, m) within limits (m,) [N]. Cables with weight pull at least about
+    what they weigh, unless the pose can only be held with less.
     """
     limits = limits_of(tables, low, high)
     out = _hold(tables, aim, *limits, rounds, rest_for(tables, first_tensions(tables, limits[0])))
@@ -89,13 +78,8 @@ def hold_again(
 ) -> Held:
     """Rest lengths that hold poses again, after nothing but the cables' history has changed.
 
-    On straight cables the tensions stay as they are: only the lengths for them are others.
-
-    Args:
-        tables: of n poses.
-        held: as held before. aim, low, high: as for :func:`hold`; limits may be (n, m).
-        follows: whether the tension behind a cable that sticks at its exit point changes with what
-            is paid out, :func:`seecr.tensions.balance.rest_after`.
+    On straight cables the tensions stay as they are. ``follows``: the tension behind a cable that
+    sticks changes with what is paid out, :func:`seecr.tensions.balance.rest_after`.
     """
     if bends(tables):
         out = _hold(tables, aim, *limits_of(tables, low, high), _ROUNDS, held.rest)
@@ -146,15 +130,15 @@ def _hold(tables: Tables, aim: Array, least: Array, most: Array, rounds: int, re
     start, short = here(tables), np.full(n, 0.0 if straight else np.inf)
     for k in range(rounds):
         now = with_rest(take(tables, rows), out.rest[rows])
-        at, rates = linearised(now, batch.take_evaluation(start, rows))
-        batch.put_evaluation(start, rows, at)
+        at, rates = linearised(now, start.only(rows))
+        start.put(rows, at)
         missed = np.abs(at.states[..., TENSION] - wanted).max(axis=1)
         fine = (at.residual <= _BALANCED) & (missed <= _NONE * now.scale)
         out.fine[rows] = fine
         if fine.all():
             break
         if fine.any():
-            rows, now, at = rows[~fine], take(now, ~fine), batch.take_evaluation(at, ~fine)
+            rows, now, at = rows[~fine], take(now, ~fine), at.only(~fine)
             rates = rates.only(~fine)
         # a cable that has just gone slack has no derivatives: those of when it pulled are near
         idle = rates.by_length >= 0.0

@@ -397,8 +397,8 @@ FAULTS = {
         ("setup.commands.pose) - rest", "setup.commands.pose) - rest - 1e-6", rests),
     ),
     "seecr.prediction.sensitivity": (
-        ("step = -inverse @ (force / apart)",
-         "step = inverse @ (force / apart)", slopes, "platform_mass"),
+        ("step = -_inverse_stiffness(at) @ (force / apart)[",
+         "step = _inverse_stiffness(at) @ (force / apart)[", slopes, "platform_mass"),
         ("tension / apart + (at.found.slopes @ step)[..., 0]",
          "tension / apart", slopes, "platform_mass"),
         ("out[:, 6 + cable, cable] += own\n", "pass\n", slopes, "cable_length_offset"),
@@ -470,8 +470,8 @@ FAULTS = {
     "crosscheck.inference.verdict": (
         ("len(wanted & k) >= least), 1.0)", "len(wanted & k) > least), 1.0)", named),
         ("none = share[search.stood] * (1.0 - loud[search.stood])", "none = 0.0", named),
-        ("if 1 <= len(sure) <= FEW and", "if 1 < len(sure) <= FEW and", named),
-        ("posterior.none > 1.0 - SURE", "posterior.none > 1.0", named),
+        ("if 1 <= len(sure) <= priors.FEW", "if 1 < len(sure) <= priors.FEW", named),
+        ("posterior.none > 1.0 - priors.SURE", "posterior.none > 1.0", named),
     ),
 }  # fmt: skip
 

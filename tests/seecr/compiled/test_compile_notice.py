@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from threading import Event
@@ -36,13 +35,6 @@ def test_long_compiling_is_told_once_and_short_is_not() -> None:
     slow.ends()
     slow.begins()
     assert slow._timer is None and told == [1]
-
-
-def test_another_process_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    watch = Watch(lambda: None)
-    monkeypatch.setattr(os, "getpid", lambda: -1)
-    watch.begins()
-    assert watch._timer is None
 
 
 def test_numba_tells_of_what_it_compiles_and_not_of_what_it_has(

@@ -6,20 +6,9 @@ import numpy as np
 import pytest
 from effect_cases import lengthened
 
-from seecr.commands import Commands
-from seecr.compiled.columns import (
-    EA,
-    FRICTION,
-    HYSTERESIS,
-    LIFT,
-    REST,
-    STUCK,
-    TENSION,
-    WINCH_SIDE,
-)
-from seecr.description.mjcf import load_robot, model_path
-from seecr.effects import Term, catalogue, layout_of
-from seecr.prediction.experiment import Experiment, Prediction, effects_of
+import seecr
+from seecr.compiled.columns import EA, FRICTION, HYSTERESIS, LIFT, REST, STUCK, TENSION, WINCH_SIDE
+from seecr.prediction.experiment import effects_of
 from seecr.statics import batch
 from seecr.tensions.balance import here, rest_after, rest_for, with_rest
 
@@ -27,18 +16,18 @@ LAWS = ("nonlinear_elasticity", "hysteresis", "creep", "exit_friction", "frame_c
 ALL = ("pulley_radius", "cable_weight", *LAWS)
 
 
-def predicted(kind: str, names: tuple[str, ...]) -> Prediction:
+def predicted(kind: str, names: tuple[str, ...]) -> seecr.Prediction:
     """A short way with effects of plausible sizes, each row with its history."""
-    robot = load_robot(model_path(kind))
+    robot = seecr.load_robot(kind)
     poses = np.tile(robot.reference_pose, (5, 1))
     poses[:, 0] += np.linspace(0.0, 0.05 * robot.length, 5)
     terms = []
     for name in names:
-        layout = layout_of(catalogue()[name], robot)
+        layout = seecr.layout_of(seecr.catalogue()[name], robot)
         size = np.where(layout.shape, layout.null, layout.null + 0.7 * layout.scale)
-        terms.append(Term(layout, np.clip(size, layout.lower, layout.upper)))
-    commands = Commands(poses, time=5.0 * np.arange(5))
-    return Experiment(robot, commands).predict(effects_of(terms, robot))
+        terms.append(seecr.Term(layout, np.clip(size, layout.lower, layout.upper)))
+    commands = seecr.Commands(poses, time=5.0 * np.arange(5))
+    return seecr.Experiment(robot, commands).predict(effects_of(terms, robot))
 
 
 @pytest.mark.parametrize("lifted", [False, True])
@@ -100,12 +89,6 @@ def test_what_is_paid_out_changes_the_tension_behind_a_cable_that_sticks(
     grip = np.exp(now.cables[..., FRICTION])
     stuck = (now.cables[..., STUCK] > wanted / grip) & (now.cables[..., STUCK] < wanted * grip)
     assert stuck.all() if sticks else not stuck.any()
-
-
-def test_without_friction_lengths_stay_as_they_are() -> None:
-    tables = predicted("demobot_cogiro", ("hysteresis",)).tables
-    rest = rest_for(tables, np.full((5, 8), 0.7))
-    assert rest_after(tables, rest, np.full((5, 8), 0.7)) is rest
 
 
 def test_lengths_are_exact_where_a_cable_with_hysteresis_sticks() -> None:

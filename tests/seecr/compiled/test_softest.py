@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 from scipy.linalg import eigh
@@ -11,27 +13,12 @@ from seecr.pose import Array
 
 # Parts of the largest entry: a few roundings of six unknowns. LAPACK leaves a quarter of that.
 _VALUE, _RESIDUAL = 1e-14, 4e-14
-SIZES = (1, 2, 3, 6, 9)
 
 
 def softest(matrices: Array) -> tuple[Array, Array]:
     values, directions = np.empty(len(matrices)), np.empty(matrices.shape[:2])
     softest_batch(matrices, values, directions)
     return values, directions
-
-
-def holds(matrices: Array) -> None:
-    """Eigenvalues as LAPACK has them, directions that have them: of repeated ones any will do."""
-    matrices = np.array(matrices, order="C")
-    values, directions = softest(matrices)
-    top = np.abs(matrices).max(axis=(1, 2))
-    expected = np.linalg.eigvalsh(matrices)[:, 0]
-    assert np.all(np.abs(values - expected) <= _VALUE * top)
-    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0, rtol=1e-14)
-    left = np.einsum("nij,nj->ni", matrices, directions) - values[:, None] * directions
-    assert np.all(np.abs(left).max(axis=1) <= _RESIDUAL * top)
-    largest = np.abs(directions).max(axis=1)
-    assert np.all(directions.max(axis=1) >= (1.0 - 2e-6) * largest)
 
 
 def turned(spectrum: Array, n: int = 500) -> Array:
@@ -42,49 +29,39 @@ def turned(spectrum: Array, n: int = 500) -> Array:
     return 0.5 * (out + out.swapaxes(1, 2))
 
 
-@pytest.mark.parametrize("d", SIZES)
-def test_random_matrices_definite_and_not(d: int) -> None:
-    half = np.random.default_rng(d).normal(size=(3000, d, d))
-    holds(half @ half.swapaxes(1, 2))
-    holds(half + half.swapaxes(1, 2))
-
-
-@pytest.mark.parametrize("d", SIZES)
-@pytest.mark.parametrize("apart", [0.0, 1e-15, 1e-12, 1e-8, 1e-4])
-def test_eigenvalues_that_are_repeated_or_nearly(d: int, apart: float) -> None:
-    steps = np.arange(d, dtype=float)
-    holds(turned(1.0 + apart * steps))
-    holds(turned(-1.0 + apart * steps))
-    holds(turned(np.where(steps < d // 2, apart * steps, 1.0)))
-    holds(turned(np.where(steps < d // 2, 1.0 + apart * steps, -1.0)))
-
-
-@pytest.mark.parametrize("d", SIZES)
-def test_eigenvalues_of_all_sizes(d: int) -> None:
-    sizes = 10.0 ** -np.arange(0.0, 3.0 * d, 3.0)
-    for spectrum in (sizes, -sizes, np.where(np.arange(d) % 2, sizes, -sizes)):
-        holds(turned(spectrum))
-        holds(1e150 * turned(spectrum))
-        holds(1e-150 * turned(spectrum))
-
-
-@pytest.mark.parametrize("d", SIZES)
-def test_badly_scaled_matrices(d: int) -> None:
+def families(d: int) -> Iterator[Array]:
+    """Definite and not, badly scaled, of whole numbers, with zeros, repeated and of all sizes."""
     random = np.random.default_rng(d)
-    half = random.normal(size=(2000, d, d))
-    scale = 10.0 ** random.uniform(-12.0, 12.0, (2000, d))
-    holds(half @ half.swapaxes(1, 2) * scale[:, :, None] * scale[:, None])
-    holds((half + half.swapaxes(1, 2)) * scale[:, :, None] * scale[:, None])
-
-
-@pytest.mark.parametrize("d", SIZES)
-def test_matrices_with_zeros_and_whole_numbers(d: int) -> None:
-    random = np.random.default_rng(d)
+    half, scale = random.normal(size=(3000, d, d)), 10.0 ** random.uniform(-12.0, 12.0, (3000, d))
+    for dense in (half @ half.swapaxes(1, 2), half + half.swapaxes(1, 2)):
+        yield from (dense, dense * scale[:, :, None] * scale[:, None])
     whole = random.integers(-1, 2, (3000, d, d)).astype(float)
-    holds(whole + whole.swapaxes(1, 2))
-    sparse = np.where(random.random((3000, d, d)) < 0.2, whole, 0.0)
-    holds(sparse + sparse.swapaxes(1, 2))
-    holds(np.stack([np.eye(d), -np.eye(d), np.ones((d, d)), -np.ones((d, d)), np.zeros((d, d))]))
+    for one in (whole, np.where(random.random((3000, d, d)) < 0.2, whole, 0.0)):
+        yield one + one.swapaxes(1, 2)
+    yield np.stack([np.eye(d), -np.eye(d), np.ones((d, d)), -np.ones((d, d)), np.zeros((d, d))])
+    steps, sizes = np.arange(d, dtype=float), 10.0 ** -np.arange(0.0, 3.0 * d, 3.0)
+    for near in (near * steps for near in (0.0, 1e-15, 1e-12, 1e-8, 1e-4)):
+        yield from (turned(1.0 + near), turned(-1.0 + near))
+        yield turned(np.where(steps < d // 2, near, 1.0))
+        yield turned(np.where(steps < d // 2, 1.0 + near, -1.0))
+    for spectrum in (sizes, -sizes, np.where(steps % 2, sizes, -sizes)):
+        yield from (times * turned(spectrum) for times in (1.0, 1e150, 1e-150))
+
+
+@pytest.mark.parametrize("d", [1, 2, 3, 6, 9])
+def test_eigenvalues_are_lapacks_and_directions_have_them(d: int) -> None:
+    """Of repeated eigenvalues any direction will do."""
+    for matrices in families(d):
+        matrices = np.array(matrices, order="C")
+        values, directions = softest(matrices)
+        top = np.abs(matrices).max(axis=(1, 2))
+        expected = np.linalg.eigvalsh(matrices)[:, 0]
+        assert np.all(np.abs(values - expected) <= _VALUE * top)
+        np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0, rtol=1e-14)
+        left = np.einsum("nij,nj->ni", matrices, directions) - values[:, None] * directions
+        assert np.all(np.abs(left).max(axis=1) <= _RESIDUAL * top)
+        largest = np.abs(directions).max(axis=1)
+        assert np.all(directions.max(axis=1) >= (1.0 - 2e-6) * largest)
 
 
 def test_only_the_lower_triangle_is_read() -> None:

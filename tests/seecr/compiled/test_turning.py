@@ -6,28 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from from_python import from_python
 from random_robots import random_poses, random_robot
 from rejointed import WAYS, rejointed
 
-from seecr.commands import Commands
-from seecr.compiled.orientation import (
-    balance_straight,
-    left_of,
-    make_turning_space,
-    rates_of_rotations,
-    straight_balance_batch,
-)
+from seecr import Commands, Experiment, Joint, Robot, bar_tilt, load_robot
+from seecr.compiled.orientation import straight_balance_batch
 from seecr.description.joints import pose_of_values
-from seecr.description.mjcf import load_robot
-from seecr.description.robot import Joint, Robot
 from seecr.effects.load import ExternalWrench
 from seecr.inverse.in_place import Turned, turned_in_place
 from seecr.pose import Array, pose_difference, quat_rotate, rxyz_from_quat
-from seecr.prediction.experiment import Experiment
 from seecr.statics.tables import Tables, assemble
 from seecr.tensions.balance import balance_of, straight_balance
-from seecr.workspace.planar import bar_tilt
 
 # Less than twice the mean of the tensions: this limit is the nearer one.
 HIGH = 3.0
@@ -74,30 +63,6 @@ def test_the_balance_at_any_pose_is_equation_3(seed: int) -> None:
         matrix, load = balance(robot, pose, wrench)
         np.testing.assert_allclose(-matrices[k], unit[:, None] * matrix, atol=1e-12)
         np.testing.assert_allclose(loads[k], unit * load, atol=1e-12 * robot.weight)
-
-
-def test_rates_of_rotations_are_those_of_the_residual() -> None:
-    """Central differences of equation 3 about each base axis."""
-    rng = np.random.default_rng(4)
-    robot = random_robot(rng)
-    m, wrench = robot.n_cables, robot.weight * WRENCH
-    tables = tables_of(robot, random_poses(rng, robot, 1), wrench)
-    tension, place = robot.weight * rng.random(m), np.array([0, 0, 0, 1.0, 0, 0, 0])
-    space = make_turning_space(m, 6, 0, 3)
-    row = (tables.cables[0], tables.load[0], tables.poses[0])
-    length, scale = robot.length, robot.weight
-    from_python(balance_straight)(*row, place, length, space)
-    from_python(rates_of_rotations)(row[1], length, scale, tension, space)
-    step = 1e-5
-    for axis in range(3):
-        sides = np.empty((2, 6))
-        for side, by in zip(sides, (step, -step), strict=True):
-            turn = np.zeros(4)
-            turn[0], turn[1 + axis] = np.cos(0.5 * by), np.sin(0.5 * by)
-            from_python(balance_straight)(*row, np.append(place[:3], turn), length, space)
-            from_python(left_of)(space, tension, side)
-        rate = (sides[0] - sides[1]) / (2.0 * step * scale)
-        np.testing.assert_allclose(space[13][axis], rate, atol=1e-8)
 
 
 @pytest.mark.parametrize("name", ["planar_vertical", "planar_two_cable"])

@@ -20,21 +20,8 @@ from effect_cases import (
 )
 from random_robots import random_robot
 
-from seecr.description.mjcf import load_robot, model_path
-from seecr.description.robot import Robot
-from seecr.effects import (
-    BUILT_IN,
-    PLACES,
-    Effect,
-    Layout,
-    Term,
-    Terms,
-    catalogue,
-    effect_named,
-    layout_of,
-)
-from seecr.errors import InputError
-from seecr.prediction.sensitivity import sensitivities
+import seecr
+from seecr.effects import BUILT_IN, PLACES, Layout
 
 # what users' model files and other people's scripts name
 PROMISED = {
@@ -52,8 +39,8 @@ NAMES = [name for names in PROMISED.values() for name in names.split()]
 UNITS = {"", "m", "rad", "N", "Nm", "s", "C", "kg", "1_per_K", "N_per_m", "m_per_N"}
 
 
-def layouts(robot: Robot) -> list[Layout]:
-    return [layout_of(effect, robot) for effect in BUILT_IN]
+def layouts(robot: seecr.Robot) -> list[Layout]:
+    return [seecr.layout_of(effect, robot) for effect in BUILT_IN]
 
 
 # --- what there is, and how it is described ------------------------------------------------------
@@ -65,18 +52,18 @@ def test_the_promised_effects_are_there_in_their_places() -> None:
     for effect in BUILT_IN:
         found[effect.place].append(effect.name)
     assert {place: sorted(names) for place, names in found.items()} == places
-    assert set(NAMES) <= set(catalogue())
+    assert set(NAMES) <= set(seecr.catalogue())
 
 
 @pytest.mark.parametrize("effect", BUILT_IN, ids=lambda e: e.name)
-def test_an_effect_says_what_it_is_and_how_to_check_it(effect: type[Effect]) -> None:
+def test_an_effect_says_what_it_is_and_how_to_check_it(effect: type[seecr.Effect]) -> None:
     words = inspect.getdoc(effect)
-    assert words and words != inspect.getdoc(Effect)
+    assert words and words != inspect.getdoc(seecr.Effect)
     assert any(sign in words for sign in ("=", "->", "<-", "T length", "exp("))  # a formula
     assert effect.title and effect.title[0].islower() and not effect.title.endswith(".")
     assert len(effect.advice.split()) > 4
     assert set(effect.needs) <= {"time", "temperature", "poses", "tensions"}
-    assert effect.parent == "" or effect.parent in catalogue()
+    assert effect.parent == "" or effect.parent in seecr.catalogue()
 
 
 # --- parameters ----------------------------------------------------------------------------------
@@ -85,7 +72,7 @@ def test_an_effect_says_what_it_is_and_how_to_check_it(effect: type[Effect]) -> 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_layout_gives_back_the_vector_it_was_given(name: str) -> None:
     robot = robot_of("demobot_cogiro")
-    layout = layout_of(effect_named(name), robot)
+    layout = seecr.layout_of(seecr.effect_named(name), robot)
     vector = np.random.default_rng(1).normal(size=len(layout))
     effect = layout.build(vector)
     again = np.concatenate([np.atleast_1d(getattr(effect, f)) for f in vars(effect)])
@@ -103,9 +90,9 @@ def test_parameter_names_are_unique_and_end_in_their_unit(cables: int) -> None:
         for name, unit in zip(layout.names, layout.units, strict=True):
             assert unit in UNITS
             assert name.endswith(f"_{unit}") if unit else not name.endswith("_")
-    assert layout_of(effect_named("drum_gain"), robot).names[-1] == f"gain_{cables}"
-    assert layout_of(effect_named("exit_point_error"), robot).names[4] == "error_2_y_m"
-    assert layout_of(effect_named("pulley_radius"), robot).names == ("radius_m",)
+    assert seecr.layout_of(seecr.effect_named("drum_gain"), robot).names[-1] == f"gain_{cables}"
+    assert seecr.layout_of(seecr.effect_named("exit_point_error"), robot).names[4] == "error_2_y_m"
+    assert seecr.layout_of(seecr.effect_named("pulley_radius"), robot).names == ("radius_m",)
 
 
 @pytest.mark.parametrize("size", [0.01, 1.0, 40.0])
@@ -120,7 +107,7 @@ def test_bounds_hold_the_null_and_sizes_are_positive_on_robots_of_any_size(size:
         assert np.all((up | down)[free]), layout.name
 
 
-def scaled(robot: Robot, by: float) -> Robot:
+def scaled(robot: seecr.Robot, by: float) -> seecr.Robot:
     """The robot with all lengths so many times as large, and the same strains."""
     pose = robot.reference_pose.copy()
     pose[:3] *= by
@@ -140,7 +127,7 @@ def test_plausible_sizes_grow_with_the_robot_as_their_units_say() -> None:
 
 
 def test_start_sets_the_shape_parameters_only() -> None:
-    layout = layout_of(effect_named("hysteresis"), robot_of("demobot_cogiro"))
+    layout = seecr.layout_of(seecr.effect_named("hysteresis"), robot_of("demobot_cogiro"))
     assert layout.start({"stretch": 0.004}).tolist() == [0.0, 0.004]
     assert layout.shape.tolist() == [False, True]
 
@@ -153,7 +140,7 @@ def test_start_sets_the_shape_parameters_only() -> None:
 def test_at_null_an_effect_changes_no_bit_of_any_reading(name: str, kind: str) -> None:
     experiment = experiment_of(kind)
     plain = experiment.predict()
-    layout = layout_of(effect_named(name), experiment.robot)
+    layout = seecr.layout_of(seecr.effect_named(name), experiment.robot)
     shapes = layout.effect.shapes(experiment.setup([])) or [{}]
     for shape in (shapes[0], shapes[-1], {}):
         vector = np.where(layout.shape, layout.start(shape), layout.null)
@@ -188,10 +175,10 @@ def test_a_small_effect_makes_a_small_change(name: str, kind: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_sensitivities_are_what_solving_again_gives(name: str, kind: str) -> None:
     experiment = experiment_of(kind, seed=5)
-    terms = Terms([random_term(np.random.default_rng(7), experiment, name)])
+    terms = seecr.Terms([random_term(np.random.default_rng(7), experiment, name)])
     at = experiment.predict(terms.effects)
     assert np.all(at.solved)
-    worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
+    worst, whose = worst_mismatch(experiment, terms, seecr.sensitivities(experiment, terms, at))
     assert worst < 1e-4, whose
 
 
@@ -208,23 +195,23 @@ def test_effects_together_are_solved_and_differentiated(seed: int) -> None:
     for poses in range(seed, seed + 10):
         experiment = experiment_of((*SHAPES, *KINDS)[seed % 7], seed=poses)
         rng = np.random.default_rng(seed)
-        terms = Terms(random_term(rng, experiment, name) for name in COMBINATIONS[seed])
+        terms = seecr.Terms(random_term(rng, experiment, name) for name in COMBINATIONS[seed])
         at = experiment.predict(terms.effects)
         assert np.all(at.solved), COMBINATIONS[seed]
         nearly_slack = (at.tensions > 0.0) & (at.tensions < 1e-3 * experiment.robot.weight)
         if not nearly_slack.any():
             break
-    worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
+    worst, whose = worst_mismatch(experiment, terms, seecr.sensitivities(experiment, terms, at))
     assert worst < 1e-3, (COMBINATIONS[seed], whose)
 
 
 def test_a_cable_that_turns_round_within_a_step_of_the_difference_has_its_derivative() -> None:
     """At a fixed pose the step stretches a stiff cable further than its motion does."""
     experiment = experiment_of("free", seed=1)
-    radius = Term.of(experiment.robot, "pulley_radius", radius_m=0.0184)
-    sticking = Term.of(experiment.robot, "hysteresis", amplitude_N=1.34, stretch_m=2.36e-4)
-    terms = Terms([radius, sticking])
-    found = sensitivities(experiment, terms, experiment.predict(terms.effects))[..., 6:, 0]
+    radius = seecr.Term.of(experiment.robot, "pulley_radius", radius_m=0.0184)
+    sticking = seecr.Term.of(experiment.robot, "hysteresis", amplitude_N=1.34, stretch_m=2.36e-4)
+    terms = seecr.Terms([radius, sticking])
+    found = seecr.sensitivities(experiment, terms, experiment.predict(terms.effects))[..., 6:, 0]
     full = full_difference(experiment, terms, radius, 0, 1e-4 * radius.layout.scale[0])[:, 6:]
     assert found == pytest.approx(full, abs=1e-3 * np.abs(full).max())
 
@@ -248,17 +235,17 @@ def test_the_order_of_effects_on_the_robot_does_not_matter(seed: int) -> None:
 
 
 def test_an_unknown_effect_is_answered_with_the_known_ones_nearest_first() -> None:
-    with pytest.raises(InputError) as caught:
-        effect_named("pully_radius")
+    with pytest.raises(seecr.InputError) as caught:
+        seecr.effect_named("pully_radius")
     text = str(caught.value)
     assert "'pully_radius'" in text and "\n" not in text
     listed = text.split("nearest first: ")[1].split(", ")
-    assert listed[0] == "pulley_radius" and sorted(listed) == sorted(catalogue())
+    assert listed[0] == "pulley_radius" and sorted(listed) == sorted(seecr.catalogue())
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_plausible_sizes_are_some_without_gravity_too(name: str) -> None:
     """A robot under pretension alone: sizes of 0 had been divided by."""
-    robot = load_robot(model_path("ipanema"))
-    floating = layout_of(catalogue()[name], replace(robot, gravity=np.zeros(3)))
+    robot = seecr.load_robot("ipanema")
+    floating = seecr.layout_of(seecr.catalogue()[name], replace(robot, gravity=np.zeros(3)))
     assert np.all(np.isfinite(floating.scale)) and np.all(floating.scale > 0.0)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from rectangle import RECTANGLE
 
-from seecr.commands import Commands
-from seecr.effects import layout_of
-from seecr.effects.load import CentreOfMass, ExternalWrench, GravityTilt, PlatformMass
-from seecr.effects.setup import Setup, plain_setup
+from seecr import Commands, Effect, Readings, Setup, layout_of
+from seecr.effects.base import Total
+from seecr.effects.geometry import FrameCompliance
+from seecr.effects.load import CentreOfMass, PlatformMass
+from seecr.effects.sensing import TensionScale, TrackerFrame, TrackerScale, TrackerTarget
+from seecr.effects.setup import plain_setup
+from seecr.pose import Array
 
 
 def setup_of(rows: int = 2) -> Setup:
@@ -23,13 +28,8 @@ def test_a_platform_keeps_a_thousandth_of_its_two_kilograms(added: float, mass: 
     setup = setup_of()
     PlatformMass(added).edit_setup(setup)
     assert setup.mass == pytest.approx(mass, rel=1e-12)
-
-
-def test_masses_add_up() -> None:
-    setup = setup_of()
-    for added in (0.5, 0.25):
-        PlatformMass(added).edit_setup(setup)
-    assert setup.mass == 2.75
+    PlatformMass(0.25).edit_setup(setup)
+    assert setup.mass == pytest.approx(mass + 0.25, rel=1e-12)
 
 
 def test_a_scale_shows_the_whole_mass_of_which_a_twentieth_is_the_least() -> None:
@@ -37,16 +37,6 @@ def test_a_scale_shows_the_whole_mass_of_which_a_twentieth_is_the_least() -> Non
     assert (total.value, total.nominal, total.unit) == (2.5, 2.0, "kg")
     assert PlatformMass(-1.89).totals(RECTANGLE)["mass"].possible
     assert not PlatformMass(-1.91).totals(RECTANGLE)["mass"].possible
-
-
-def test_the_centre_of_mass_is_told_in_the_platforms_frame() -> None:
-    effect = CentreOfMass(np.array([0.01, -0.02, 0.03]))
-    setup = setup_of()
-    setup.centre_of_mass = np.array([0.1, 0.1, 0.1])
-    effect.edit_setup(setup)
-    assert setup.centre_of_mass == pytest.approx([0.11, 0.08, 0.13], rel=1e-15)
-    assert [total.value for total in effect.totals(RECTANGLE).values()] == [0.01, -0.02, 0.03]
-    assert [total.unit for total in effect.totals(RECTANGLE).values()] == ["m"] * 3
 
 
 @pytest.mark.parametrize(("axis", "least", "most"), [
@@ -68,38 +58,73 @@ def test_a_centre_is_at_most_two_lengths_outside_of_the_anchor_points(
         }  # fmt: skip
 
 
-def test_a_constant_wrench_is_added_to_that_of_every_row() -> None:
-    setup = setup_of(2)
-    setup.wrench = np.array([[1.0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 2.0]])
-    effect = ExternalWrench(force=np.array([0.5, 1.0, -1.0]), moment=np.array([0.0, 0.25, 1.0]))
-    effect.edit_setup(setup)
-    assert setup.wrench.tolist() == [[1.5, 1, -1, 0, 0.25, 1], [0.5, 1, -1, 0, 0.25, 3]]
-
-
-@pytest.mark.parametrize(("tilt_x", "tilt_y", "down"), [
-    (np.pi / 6, 0.0, [0.0, 5.0, -5.0 * np.sqrt(3.0)]),
-    (0.0, np.pi / 6, [-5.0, 0.0, -5.0 * np.sqrt(3.0)]),
-    # about the diagonal of x and y by 60 deg
-    (np.pi / 3 / np.sqrt(2), np.pi / 3 / np.sqrt(2), [-2.5 * np.sqrt(6), 2.5 * np.sqrt(6), -5.0]),
-])  # fmt: skip
-def test_gravity_is_turned_about_the_axis_that_both_tilts_make(
-    tilt_x: float, tilt_y: float, down: list[float]
-) -> None:
-    setup = setup_of()
-    GravityTilt(tilt_x, tilt_y).edit_setup(setup)
-    assert setup.gravity == pytest.approx(down, abs=1e-14)
-
-
-def test_plausible_sizes_are_tenths_of_the_platform_and_hundredths_of_its_weight() -> None:
-    """2 kg, 20 N and 0.5 m."""
-    sizes = {
-        effect: layout_of(effect, RECTANGLE).scale.tolist()
-        for effect in (PlatformMass, CentreOfMass, ExternalWrench)
-    }
-    assert sizes[PlatformMass] == pytest.approx([0.2])
-    assert sizes[CentreOfMass] == pytest.approx([0.05] * 3)
-    assert sizes[ExternalWrench] == pytest.approx([0.6] * 3 + [0.3] * 3)
-
-
 def test_a_search_never_takes_the_whole_platform_away() -> None:
     assert layout_of(PlatformMass, RECTANGLE).lower == pytest.approx([-1.98])
+
+
+# --- What a person who measures would find
+
+
+def test_a_number_is_possible_between_its_limits_and_not_at_them() -> None:
+    def possible(value: float) -> bool:
+        return Total(value, 1.0, "kg", lower=0.5, upper=2.0).possible
+
+    assert [possible(value) for value in (0.5, 0.51, 1.99, 2.0)] == [False, True, True, False]
+
+
+def test_without_limits_every_number_is_possible_but_none_that_is_not() -> None:
+    assert Total(-1e30, 1.0, "kg").possible and not Total(float("nan"), 1.0, "kg").possible
+
+
+# --- A frame that yields: sideways and upwards are two compliances, kept as one and a differenc
+
+
+def test_a_compliance_of_old_files_is_that_of_both_directions() -> None:
+    layout = layout_of(FrameCompliance, RECTANGLE)
+    assert FrameCompliance.renamed["compliance_m_per_N"] == layout.names
+
+
+# --- What sensors report, by quarter turns: nothing has to be computed
+
+
+ABOUT_X, ABOUT_Z = np.array([np.pi / 2, 0.0, 0.0]), np.array([0.0, 0.0, np.pi / 2])
+LEVEL = [1.0, 0, 0, 0]
+NOTHING = np.zeros(3)
+# not needed by what sensors report
+SETUP: Any = None
+
+
+def read(effect: Effect, position: list[float], quat: list[float]) -> tuple[Array, Array]:
+    """What is reported of a platform at a position with an orientation."""
+    readings = Readings(np.array([position]), np.array([quat]), np.array([[3.0, 5.0]]))
+    effect.edit_readings(readings, SETUP)
+    return readings.position[0], readings.quat_wxyz[0]
+
+
+def test_a_turned_frame_sees_the_target_where_it_was_carried_to() -> None:
+    """Target first: (1, 0, 0) ahead of (1, 0, 0) is (2, 0, 0), which is seen at (0, 2, 0)."""
+    readings = Readings(np.array([[1.0, 0, 0]]), np.array([LEVEL]), np.zeros((1, 2)))
+    for effect in (TrackerTarget(np.array([1.0, 0, 0]), NOTHING), TrackerFrame(NOTHING, ABOUT_Z)):
+        effect.edit_readings(readings, SETUP)
+    assert readings.position[0] == pytest.approx([0.0, 2.0, 0.0])
+
+
+@pytest.mark.parametrize("effect", [
+    TrackerFrame(NOTHING, NOTHING), TrackerFrame(np.array([1.0, 0, 0]), NOTHING),
+    TrackerTarget(NOTHING, NOTHING), TrackerTarget(np.array([1.0, 0, 0]), NOTHING),
+])  # fmt: skip
+def test_without_a_turn_orientations_keep_every_bit(effect: Effect) -> None:
+    quat = [0.1, 0.2, 0.3, 0.4]  # of no norm in particular: a multiplication would change bits
+    assert read(effect, [1, 2, 3], quat)[1].tolist() == quat
+
+
+def test_what_was_read_is_not_written_over() -> None:
+    """The arrays of the readings may be those of the solved poses."""
+    position, tensions = np.array([[1.0, 2.0, 3.0]]), np.array([[4.0]])
+    readings = Readings(position, np.array([LEVEL]), tensions)
+    for effect in (
+        TrackerFrame(np.ones(3), ABOUT_Z), TrackerTarget(np.ones(3), ABOUT_X),
+        TrackerScale(2.0), TensionScale(2.0),
+    ):  # fmt: skip
+        effect.edit_readings(readings, SETUP)
+    assert position.tolist() == [[1.0, 2.0, 3.0]] and tensions.tolist() == [[4.0]]

@@ -2,45 +2,47 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from seecr.description.mjcf import load_robot, model_path
-from seecr.effects import Effect, Term, Terms, catalogue, effect_named, layout_of
-from seecr.errors import InputError
+import seecr
+from seecr.effects import Apart, Own, apart
 
-ROBOT = load_robot(model_path("demobot_cogiro"))
+ROBOT = seecr.load_robot("demobot_cogiro")
 NAMES = ("drum_gain", "pulley_radius", "tracker_target")  # 8, 1 and 6 parameters
 
 
-def term(name: str, part: float = 0.5) -> Term:
-    layout = layout_of(effect_named(name), ROBOT)
-    return Term(layout, layout.null + part * layout.scale)
+def term(name: str, part: float = 0.5) -> seecr.Term:
+    layout = seecr.layout_of(seecr.effect_named(name), ROBOT)
+    return seecr.Term(layout, layout.null + part * layout.scale)
 
 
-def some(*names: str) -> Terms:
-    return Terms(term(name) for name in names or NAMES)
+def some(*names: str) -> seecr.Terms:
+    return seecr.Terms(term(name) for name in names or NAMES)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_order_is_the_catalogues_whatever_it_is_made_from(seed: int) -> None:
-    every = list(catalogue())
+    every = list(seecr.catalogue())
     mixed = np.random.default_rng(seed).permutation(every).tolist()
     assert some(*mixed).names == tuple(every)
-    assert Terms(some(*mixed)).names == tuple(every)
+    assert seecr.Terms(some(*mixed)).names == tuple(every)
 
 
 def test_effects_of_ones_own_that_are_not_in_the_catalogue_come_last() -> None:
-    own = Term(layout_of(Own, ROBOT), np.zeros(0))
-    assert Terms([own, term("tension_scale")]).names == ("tension_scale", "own")
+    own = seecr.Term(seecr.layout_of(Unlisted, ROBOT), np.zeros(0))
+    assert seecr.Terms([own, term("tension_scale")]).names == ("tension_scale", "unlisted")
+    assert seecr.Terms([own])  # of no parameter, and still a term
 
 
-class Own(Effect):
-    name = "own"
+class Unlisted(seecr.Effect):
+    name = "unlisted"
 
 
 def test_an_effect_is_there_once() -> None:
-    with pytest.raises(InputError, match="pulley_radius is among the terms twice"):
+    with pytest.raises(seecr.InputError, match="pulley_radius is among the terms twice"):
         some("pulley_radius", "drum_gain", "pulley_radius")
 
 
@@ -72,7 +74,7 @@ def test_other_values_are_another_collection() -> None:
     assert np.array_equal(other["tracker_target"].vector, values[9:])
     values[:] = 0.0
     assert other.vector[3] == 3.0 and terms.sizes == pytest.approx(np.full(15, 0.5))
-    with pytest.raises(InputError, match=r"values must be \(15,\), got \(14,\)"):
+    with pytest.raises(seecr.InputError, match=r"values must be \(15,\), got \(14,\)"):
         terms.with_vector(np.zeros(14))
     with pytest.raises(ValueError, match="read-only"):
         terms.vector[0] = 1.0
@@ -90,39 +92,23 @@ def test_terms_come_and_go_by_name() -> None:
         terms.part("creep")
 
 
-def test_no_terms_are_nothing() -> None:
-    none = Terms()
-    assert not none and len(none) == 0 and list(none) == [] and none.effects == []
-    for name in ("vector", "null", "scale", "lower", "upper", "sizes", "with_vector"):
-        value = getattr(none, name)
-        assert len(value(np.zeros(0)) if name == "with_vector" else value) == 0
-
-
-def test_an_effect_without_parameters_is_there_all_the_same() -> None:
-    assert Terms([Term(layout_of(Own, ROBOT), np.zeros(0))])
-
-
-def test_the_effects_have_the_values() -> None:
-    gain, pulley, _target = some().effects
-    assert gain.gain == pytest.approx(np.full(8, 2.5e-3))  # type: ignore[attr-defined]
-    assert type(pulley) is effect_named("pulley_radius")
-
-
 def test_a_term_without_a_layout_is_refused() -> None:
-    with pytest.raises(InputError, match="expected an effect's layout and its values, got 'creep'"):
-        Term("creep", np.zeros(2))  # type: ignore[arg-type]
+    with pytest.raises(
+        seecr.InputError, match="expected an effect's layout and its values, got 'creep'"
+    ):
+        seecr.Term("creep", np.zeros(2))  # type: ignore[arg-type]
 
 
 def test_values_that_no_robot_has_are_refused() -> None:
-    with pytest.raises(InputError, match=r"platform_mass: added_kg: -10 is out of bounds"):
-        Term.of(ROBOT, "platform_mass", added_kg=-10.0)
-    mass = Term.of(ROBOT, "platform_mass", added_kg=0.01)
-    with pytest.raises(InputError, match=r"added_kg: 1e\+09 is out of bounds"):
+    with pytest.raises(seecr.InputError, match=r"platform_mass: added_kg: -10 is out of bounds"):
+        seecr.Term.of(ROBOT, "platform_mass", added_kg=-10.0)
+    mass = seecr.Term.of(ROBOT, "platform_mass", added_kg=0.01)
+    with pytest.raises(seecr.InputError, match=r"added_kg: 1e\+09 is out of bounds"):
         mass.measured(added_kg=(1e9, 1.0))
 
 
 def test_what_is_fixed_is_all_of_an_effect_or_what_is_named() -> None:
-    gains = Term.of(ROBOT, "drum_gain", gain_3=0.002)
+    gains = seecr.Term.of(ROBOT, "drum_gain", gain_3=0.002)
     assert gains.fixed().knowledge.fixed.all() and not gains.knowledge.fixed.any()
     some = gains.fixed("gain_2").fixed("gain_5")
     assert np.flatnonzero(some.knowledge.fixed).tolist() == [1, 4]
@@ -131,7 +117,7 @@ def test_what_is_fixed_is_all_of_an_effect_or_what_is_named() -> None:
 
 
 def test_what_is_measured_begins_at_what_was_found() -> None:
-    gains = Term.of(ROBOT, "drum_gain", gain_3=0.002)
+    gains = seecr.Term.of(ROBOT, "drum_gain", gain_3=0.002)
     known = gains.measured(gain_2=(0.001, 1e-4)).measured(gain_4=(-0.001, 2e-4))
     assert known.vector.tolist() == [0.0, 0.001, 0.002, -0.001, *[0.0] * 4]
     assert np.flatnonzero(known.knowledge.measured).tolist() == [1, 3]
@@ -141,28 +127,88 @@ def test_what_is_measured_begins_at_what_was_found() -> None:
 
 @pytest.mark.parametrize("error", [0.0, -1.0, np.inf, np.nan])
 def test_a_measurement_has_an_error(error: float) -> None:
-    with pytest.raises(InputError, match="drum_gain: gain_2: expected a standard error above 0"):
-        Term.of(ROBOT, "drum_gain").measured(gain_2=(0.001, error))
+    with pytest.raises(
+        seecr.InputError, match="drum_gain: gain_2: expected a standard error above 0"
+    ):
+        seecr.Term.of(ROBOT, "drum_gain").measured(gain_2=(0.001, error))
 
 
 def test_the_only_parameter_that_there_is_is_the_nearest() -> None:
-    with pytest.raises(InputError, match=r"no parameter radius; the nearest is radius_m$"):
-        Term.of(ROBOT, "pulley_radius", radius=0.01)
+    with pytest.raises(seecr.InputError, match=r"no parameter radius; the nearest is radius_m$"):
+        seecr.Term.of(ROBOT, "pulley_radius", radius=0.01)
 
 
 def test_a_parameter_that_there_is_not_is_answered_with_the_nearest() -> None:
     words = "^effect tracker_frame: no parameter shift_w_m; the nearest are shift_[xyz]_m, "
-    frame = Term.of(ROBOT, "tracker_frame")
+    frame = seecr.Term.of(ROBOT, "tracker_frame")
     for ask in (
-        lambda: Term.of(ROBOT, "tracker_frame", shift_w_m=0.0),
+        lambda: seecr.Term.of(ROBOT, "tracker_frame", shift_w_m=0.0),
         lambda: frame.fixed("shift_w_m"),
         lambda: frame.measured(shift_w_m=(0.0, 1.0)),
     ):
-        with pytest.raises(InputError, match=words):
+        with pytest.raises(seecr.InputError, match=words):
             ask()
 
 
 def test_a_robot_cannot_have_less_than_a_twentieth_of_its_mass() -> None:
     added = np.array([-0.949, -0.951]) * ROBOT.mass
-    possible = [Term.of(ROBOT, "platform_mass", added_kg=one).is_possible(ROBOT) for one in added]
+    possible = [
+        seecr.Term.of(ROBOT, "platform_mass", added_kg=one).is_possible(ROBOT) for one in added
+    ]
     assert possible == [True, False]
+
+
+# --- Effects with values of their own for each file or run, laid out one after the other
+
+
+BASE = seecr.layout_of("cable_length_offset", "demobot_cogiro")
+DAYS = apart(BASE, "file", ("monday", "tuesday"), BASE.null + 0.001)
+
+
+def test_parameters_of_a_part_stand_together_under_its_name() -> None:
+    assert len(DAYS) == 16 and DAYS.part("tuesday") == slice(8, 16)
+    assert DAYS.names[8] == f"tuesday: {BASE.names[0]}"
+    assert [group.tolist() for group in DAYS.cable_by_cable] == [list(range(8)), list(range(8, 16))]
+    assert list(DAYS.groups) == ["monday: offset_m", "tuesday: offset_m"]
+
+
+def test_each_part_is_the_effect_with_its_values_and_others_are_the_rest() -> None:
+    found = DAYS.build(np.arange(16.0))
+    assert isinstance(found, Apart)
+    assert found.at("tuesday").offset == pytest.approx(np.arange(8.0, 16.0))  # type: ignore[attr-defined]
+    assert found.at("friday").offset == pytest.approx(np.full(8, 0.001))  # type: ignore[attr-defined]
+    robot = seecr.load_robot("demobot_cogiro")
+    totals = found.totals(robot)
+    assert totals["monday: offset_2_m"].value == pytest.approx(robot.rest_lengths[1] + 1.0)
+
+
+def test_values_are_per_file_or_per_run() -> None:
+    with pytest.raises(seecr.InputError, match="are per 'file' or 'run', got 'day'"):
+        Own("day", {})
+
+
+# --- Effects by name
+
+
+def test_a_layout_is_found_by_name_and_by_class() -> None:
+    by_name = seecr.layout_of("backlash", "demobot_cogiro")
+    assert by_name.effect is seecr.effect_named("backlash")
+    assert by_name.names == seecr.layout_of(by_name.effect, "demobot_cogiro").names
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("backlsh", "no effect 'backlsh'; known, nearest first: backlash, "),
+        (
+            "lab/robot.xml",
+            "expected the name of an effect, such as pulley_radius, got 'lab/robot.xml', which "
+            "looks like a file's name$",
+        ),
+        (["backlash"], "expected the name of an effect, got \\['backlash'\\]"),
+        (float, "expected the name of an effect, or its class, got <class 'float'>"),
+    ],
+)
+def test_what_is_no_effect_is_refused(given: Any, said: str) -> None:
+    with pytest.raises(seecr.InputError, match=said):
+        seecr.layout_of(given, "demobot_cogiro")

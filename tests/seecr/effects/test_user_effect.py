@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from effect_cases import experiment_of, moved, worst_mismatch
 
+import seecr
 from seecr.cli import main
-from seecr.effects import Effect, Term, Terms, catalogue, effect_named, layout_of, parameter
-from seecr.errors import InputError
-from seecr.prediction.sensitivity import sensitivities
+from seecr.effects.edits import edit_readings, edit_setup
+from seecr.effects.setup import plain_setup
 
 PAGE = (Path(__file__).resolve().parents[3] / "docs" / "effects.md").read_text(encoding="utf-8")
 PYTHON = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
@@ -39,12 +41,12 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[object]
         (info / "entry_points.txt").write_text(f"[seecr.effects]\n{entries}\n", encoding="utf-8")
         names.append(module)
         monkeypatch.syspath_prepend(tmp_path)
-        catalogue.cache_clear()
+        seecr.catalogue.cache_clear()
 
     yield put
     for name in names:
         sys.modules.pop(name, None)
-    catalogue.cache_clear()
+    seecr.catalogue.cache_clear()
 
 
 @pytest.fixture
@@ -59,10 +61,10 @@ def documented(install) -> None:  # type: ignore[no-untyped-def]
 
 
 def test_the_catalogue_finds_what_the_page_installs(documented: None) -> None:
-    assert list(catalogue())[-2:] == ["lens_distortion", "braid"]
-    lens = effect_named("lens_distortion")
+    assert list(seecr.catalogue())[-2:] == ["lens_distortion", "braid"]
+    lens = seecr.effect_named("lens_distortion")
     assert lens.__module__ == "my_effects" and lens.place == "sensing"
-    layout = layout_of(lens, experiment_of("demobot_cogiro").robot)
+    layout = seecr.layout_of(lens, experiment_of("demobot_cogiro").robot)
     assert layout.names == ("bend_1_per_m2",)
 
 
@@ -80,15 +82,15 @@ def test_the_pages_effects_are_absent_at_null_and_differentiated_without_derivat
     documented: None, name: str, vector: list[float], kind: str
 ) -> None:
     experiment = experiment_of(kind, seed=5)
-    layout = layout_of(effect_named(name), experiment.robot)
+    layout = seecr.layout_of(seecr.effect_named(name), experiment.robot)
     plain = experiment.predict().readings
     absent = experiment.predict([layout.build(layout.null)]).readings
     assert np.array_equal(absent.position, plain.position)
     assert np.array_equal(absent.tensions, plain.tensions)
-    terms = Terms([Term(layout, np.array(vector))])
+    terms = seecr.Terms([seecr.Term(layout, np.array(vector))])
     at = experiment.predict(terms.effects)
     assert np.all(at.solved)
-    worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
+    worst, whose = worst_mismatch(experiment, terms, seecr.sensitivities(experiment, terms, at))
     assert worst < 1e-4, whose
 
 
@@ -103,20 +105,20 @@ def test_the_pages_effects_work_beside_built_in_ones(
 ) -> None:
     experiment = experiment_of("demobot_parallel")
     robot = experiment.robot
-    own, built_in = (layout_of(effect_named(n), robot) for n in (name, others[0]))
+    own, built_in = (seecr.layout_of(seecr.effect_named(n), robot) for n in (name, others[0]))
     vector = own.null.copy()
     vector[0] += 0.3
-    terms = Terms([Term(own, vector), Term(built_in, np.array([others[1]]))])
+    terms = seecr.Terms([seecr.Term(own, vector), seecr.Term(built_in, np.array([others[1]]))])
     at = experiment.predict(terms.effects)
     assert np.all(at.solved)
-    worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
+    worst, whose = worst_mismatch(experiment, terms, seecr.sensitivities(experiment, terms, at))
     assert worst < 1e-4, whose
 
 
 def test_a_law_of_the_users_is_the_built_in_one_it_imitates() -> None:
     """T += quadratic E S eps^2, as a law and as nonlinear_elasticity."""
 
-    class Squared(Effect):
+    class Squared(seecr.Effect):
         name = "squared"
         place = "cable"
 
@@ -124,7 +126,7 @@ def test_a_law_of_the_users_is_the_built_in_one_it_imitates() -> None:
             setup.laws.append(lambda strain: 300.0 * setup.ea * strain * np.abs(strain))
 
     experiment = experiment_of("demobot_parallel")
-    built_in = effect_named("nonlinear_elasticity")(quadratic=300.0)
+    built_in = seecr.effect_named("nonlinear_elasticity")(quadratic=300.0)
     assert moved(experiment, [Squared()]) == pytest.approx(
         moved(experiment, [built_in]), rel=1e-6, abs=1e-9
     )
@@ -132,8 +134,8 @@ def test_a_law_of_the_users_is_the_built_in_one_it_imitates() -> None:
 
 def test_a_law_is_followed_along_a_walk_too(documented: None) -> None:
     experiment = experiment_of("demobot_cogiro")
-    braid = effect_named("braid")(share=0.4, knee=5e-4)
-    slack_gear = effect_named("backlash")(gap=1e-12)
+    braid = seecr.effect_named("braid")(share=0.4, knee=5e-4)
+    slack_gear = seecr.effect_named("backlash")(gap=1e-12)
     walked = moved(experiment, [braid, slack_gear])
     assert walked == pytest.approx(moved(experiment, [braid]), rel=1e-5, abs=1e-8)
 
@@ -190,8 +192,8 @@ def source(edit: str = "pass", read: str = "pass") -> str:
 ])  # fmt: skip
 def test_a_bad_entry_point_is_answered_in_one_line(install, text: str, complaint: str) -> None:  # type: ignore[no-untyped-def]
     install("own_effects", text, "mine = own_effects:mine")
-    with pytest.raises(InputError, match=complaint) as caught:
-        catalogue()
+    with pytest.raises(seecr.InputError, match=complaint) as caught:
+        seecr.catalogue()
     assert "\n" not in str(caught.value)
 
 
@@ -214,8 +216,8 @@ def test_an_effect_that_leaves_nonsense_is_named(  # type: ignore[no-untyped-def
     install, edit: str, read: str, complaint: str
 ) -> None:
     install("own_effects", source(edit, read), "mine = own_effects:Mine")
-    with pytest.raises(InputError, match=complaint) as caught:
-        experiment_of("demobot_cogiro").predict([effect_named("mine")(amount=1.0)])
+    with pytest.raises(seecr.InputError, match=complaint) as caught:
+        experiment_of("demobot_cogiro").predict([seecr.effect_named("mine")(amount=1.0)])
     assert "\n" not in str(caught.value)
 
 
@@ -229,5 +231,71 @@ def test_an_effect_that_leaves_nonsense_is_named(  # type: ignore[no-untyped-def
     ({"bounds": (0.0,)}, r"bounds must be \(lowest, highest\), got \(0.0,\)"),
 ])  # fmt: skip
 def test_parameter_says_what_it_expected(arguments: dict, complaint: str) -> None:
-    with pytest.raises(InputError, match=complaint):
-        parameter(**{"unit": "m", "scale": 1.0, **arguments})
+    with pytest.raises(seecr.InputError, match=complaint):
+        seecr.parameter(**{"unit": "m", "scale": 1.0, **arguments})
+
+
+# --- What effects of other people leave is checked, and ours are trusted
+
+
+def nothing(_: Any) -> None: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Theirs(seecr.Effect):
+    """An effect of somebody's own, that does as it is told."""
+
+    name: ClassVar[str] = "theirs"
+    place: ClassVar[str] = "load"
+
+    setup: Callable[[seecr.Setup], None] = field(default=nothing)
+    read: Callable[[seecr.Readings], None] = field(default=nothing)
+
+    def edit_setup(self, setup: seecr.Setup) -> None:
+        self.setup(setup)
+
+    def edit_readings(self, readings: seecr.Readings, setup: seecr.Setup) -> None:
+        self.read(readings)
+
+
+def plain() -> seecr.Setup:
+    experiment = experiment_of("demobot_cogiro")
+    return plain_setup(experiment.robot, experiment.commands)
+
+
+def readings(lost: int) -> seecr.Readings:
+    """Of three rows; one had no equilibrium."""
+    position = np.zeros((3, 3))
+    position[lost] = np.nan
+    return seecr.Readings(position, np.tile([1.0, 0, 0, 0], (3, 1)), np.ones((3, 8)))
+
+
+def test_laws_that_were_there_before_are_not_theirs() -> None:
+    setup = plain()
+    setup.laws.append(lambda strain: strain[:, :2])  # of another shape
+    edit_setup(Theirs(lambda s: s.laws.append(lambda strain: 2.0 * strain)), setup)
+    first, second = (law(np.ones((3, 8))) for law in setup.laws)
+    assert first.shape == (3, 2) and np.all(second == 2.0)
+
+
+def test_rows_without_rest_may_stay_without_readings_and_others_may_not() -> None:
+    def spoil(row: int) -> Theirs:
+        return Theirs(read=lambda r: r.tensions.__setitem__(row, np.nan))
+
+    setup = plain()
+    edit_readings(spoil(1), readings(lost=1), setup)
+    with pytest.raises(
+        seecr.InputError, match=r"^effect theirs leaves readings\.tensions that is not"
+    ):
+        edit_readings(spoil(0), readings(lost=1), setup)
+
+
+def test_a_long_text_in_place_of_numbers_is_cut() -> None:
+    def spoil(setup: seecr.Setup) -> None:
+        setup.ea = "much " * 99  # type: ignore[assignment]
+
+    with pytest.raises(
+        seecr.InputError, match=r"leaves setup\.ea that is no number: 'much"
+    ) as error:
+        edit_setup(Theirs(spoil), plain())
+    assert len(str(error.value)) < 150

@@ -13,17 +13,15 @@ import numpy as np
 import pytest
 from plain_steps import Plain, plain_fsolve
 
-from seecr.description.mjcf import CABLES, load_robot, model_path
-from seecr.description.robot import Robot
-from seecr.equilibrium.solving import solve
-from seecr.statics.solution import Status
+from seecr import Robot, Status, load_robot, solve
+from seecr.description.mjcf import CABLES
 
 HEIGHTS = (0.1, 0.2)
 ENDS = {0.1: (26.4, 26.6, 34.0, 34.5, -11.0, -7.5), 0.2: (21.7, 22.1, 22.6, 22.9, -9.0, -5.8)}
 
 
 def demobot(name: str, ea: float) -> Robot:
-    return replace(load_robot(model_path(f"demobot_{name}")), ea=np.full(8, float(ea)))
+    return replace(load_robot(f"demobot_{name}"), ea=np.full(8, float(ea)))
 
 
 def sweep(z: float) -> np.ndarray:

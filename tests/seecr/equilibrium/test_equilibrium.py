@@ -7,24 +7,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from effect_cases import robot_of
 from plain_steps import exact_residual
 from random_robots import KINDS, random_poses, random_robot
 
-from seecr.description.mjcf import load_robot, model_path
-from seecr.description.robot import Joint, Robot
-from seecr.effects import Term
-from seecr.equilibrium.solving import METHODS, solve
-from seecr.errors import InputError
-from seecr.pose import (
-    pose_add,
-    pose_difference,
-    quat_from_rotvec,
-    quat_multiply,
-    quat_rotate,
-)
-from seecr.prediction.experiment import predict
+import seecr
+from seecr.effects.setup import plain_setup
+from seecr.equilibrium.search import first_guess
+from seecr.equilibrium.solving import METHODS
+from seecr.pose import pose_add, pose_difference, quat_from_rotvec, quat_multiply, quat_rotate
 from seecr.statics import batch
-from seecr.statics.solution import Solution, Status, certify
+from seecr.statics.solution import certify
 
 UP = np.array([0.0, 0.0, 1.0])
 HERE = [0.0, 0, 0, 1, 0, 0, 0]
@@ -32,27 +25,27 @@ SEEDS = range(8)
 
 
 @pytest.fixture(scope="module")
-def cogiro() -> Robot:
-    return load_robot(model_path("demobot_cogiro"))
+def cogiro() -> seecr.Robot:
+    return seecr.load_robot("demobot_cogiro")
 
 
 @pytest.fixture(scope="module")
-def parallel() -> Robot:
-    return load_robot(model_path("demobot_parallel"))
+def parallel() -> seecr.Robot:
+    return seecr.load_robot("demobot_parallel")
 
 
-def hung(**changes: Any) -> Robot:
+def hung(**changes: Any) -> seecr.Robot:
     """2 kg on one cable of 1 m and E S = 100 N, straight above its origin."""
     points = np.array([[0.0, 0, 1]]), np.zeros((1, 3))
-    return replace(Robot("bob", *points, np.array([100.0]), np.ones(1), 2.0), **changes)
+    return replace(seecr.Robot("bob", *points, np.array([100.0]), np.ones(1), 2.0), **changes)
 
 
-def slide(axis: np.ndarray = UP) -> tuple[Joint, ...]:
-    return (Joint("slide", "lift", axis, np.zeros(3)),)
+def slide(axis: np.ndarray = UP) -> tuple[seecr.Joint, ...]:
+    return (seecr.Joint("slide", "lift", axis, np.zeros(3)),)
 
 
-def hinge(axis: list[float]) -> tuple[Joint, ...]:
-    return (Joint("hinge", "turn", np.array(axis), np.zeros(3)),)
+def hinge(axis: list[float]) -> tuple[seecr.Joint, ...]:
+    return (seecr.Joint("hinge", "turn", np.array(axis), np.zeros(3)),)
 
 
 # --- certificates ------------------------------------------------------------------------------
@@ -60,36 +53,38 @@ def hinge(axis: list[float]) -> tuple[Joint, ...]:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", SEEDS)
-def test_residual_recomputed_from_the_answer_in_other_words(kind: str, seed: int) -> None:
+def test_residual_and_fall_of_energy_recomputed_from_the_answer(kind: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, kind)
-    answer = solve(robot, random_poses(rng, robot, 8))
+    answer = seecr.solve(robot, random_poses(rng, robot, 8))
     assert np.all(answer.converged)
+    start = batch.Evaluation.at_commands(answer.tables)
+    assert np.all(answer.energy < batch.evaluate(answer.tables, start).energy)
     for i in range(8):
         assert exact_residual(answer, i) < 1e-9 and answer.residual[i] < 1e-9
 
 
-def test_a_claim_of_rest_is_checked_and_not_believed(cogiro: Robot) -> None:
+def test_a_claim_of_rest_is_checked_and_not_believed(cogiro: seecr.Robot) -> None:
     """A descent that says it converged where it did not gets no certificate."""
-    answer = solve(cogiro, [0.3, 0.25, 0.1, 1, 0, 0, 0])
+    answer = seecr.solve(cogiro, [0.3, 0.25, 0.1, 1, 0, 0, 0])
     claim = batch.descend(answer.tables)
     assert certify(cogiro, answer.tables, claim).converged[0]
     claim.deviation[0, 2] -= 1e-6
     refused = certify(cogiro, answer.tables, claim)
-    assert refused.status[0] is Status.STALLED and refused.residual[0] > 1e-3
+    assert refused.status[0] is seecr.Status.STALLED and refused.residual[0] > 1e-3
 
 
 @pytest.mark.parametrize("exponent", range(2, 8))
 @pytest.mark.parametrize("name", ["demobot_cogiro", "demobot_parallel"])
 def test_stiffness_from_1e2_to_1e7_newton(name: str, exponent: int) -> None:
     """At rest, or truly free to turn about the line of the only two cables that are left."""
-    robot = replace(load_robot(model_path(name)), ea=np.full(8, 10.0**exponent))
+    robot = replace(seecr.load_robot(name), ea=np.full(8, 10.0**exponent))
     rng = np.random.default_rng(exponent)
     places = rng.uniform([0.12, 0.1, 0.05], [0.68, 0.4, 0.35], (60, 3))
     poses = np.column_stack([places, np.tile([1.0, 0, 0, 0], (60, 1))])
-    answer = solve(robot, poses)
-    allowed = {Status.CONVERGED, Status.SINGULAR} if "parallel" in name else {Status.CONVERGED}
-    assert set(answer.status) <= allowed, {s.name for s in answer.status}
+    answer = seecr.solve(robot, poses)
+    allowed = {seecr.Status.CONVERGED, *([seecr.Status.SINGULAR] if "parallel" in name else [])}
+    assert set(answer.status) <= allowed
     taut = np.sum(~answer.slack, axis=1)
     assert np.all(taut[~answer.converged] == 2)
     for i in range(0, 60, 5):
@@ -103,21 +98,10 @@ def test_any_robot_at_any_stiffness_rests_or_says_so(kind: str, exponent: int) -
     for _ in range(5):
         robot = random_robot(rng, kind)
         stiff = np.full(robot.n_cables, robot.weight * 10.0 ** (exponent - 0.6))  # as on 0.4 kg
-        answer = solve(replace(robot, ea=stiff), random_poses(rng, robot, 10))
+        answer = seecr.solve(replace(robot, ea=stiff), random_poses(rng, robot, 10))
         assert answer.converged.all(), [answer.sentence(i) for i in range(10)]
         for i in range(0, 10, 3):
             assert exact_residual(answer, i) < 1e-9
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", SEEDS)
-def test_energy_falls_from_the_command_to_the_answer(kind: str, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    robot = random_robot(rng, kind)
-    answer = solve(robot, random_poses(rng, robot, 10))
-    start = batch.Evaluation.empty(10, robot.n_cables, robot.n_dof)
-    before = batch.evaluate(answer.tables, start).energy
-    assert np.all(answer.energy < before)
 
 
 def test_energy_never_rises_from_step_to_step() -> None:
@@ -128,7 +112,9 @@ def test_energy_never_rises_from_step_to_step() -> None:
         robot = random_robot(rng)
         robot = replace(robot, ea=np.full(robot.n_cables, 1000.0 * robot.weight))
         poses = random_poses(rng, robot, 10)
-        energy = np.array([solve(robot, poses, max_iterations=k).energy for k in range(1, 30)])
+        energy = np.array(
+            [seecr.solve(robot, poses, max_iterations=k).energy for k in range(1, 30)]
+        )
         size = np.abs(energy).max(axis=0)
         assert np.all(np.diff(energy, axis=0) <= 1e-14 * size)
         falls += int(np.sum(np.diff(energy, axis=0) < -1e-6 * size))
@@ -139,7 +125,7 @@ def test_energy_never_rises_from_step_to_step() -> None:
 def test_no_neighbour_has_less_energy(kind: str) -> None:
     rng = np.random.default_rng(11)
     robot = random_robot(rng, kind)
-    answer = solve(robot, random_poses(rng, robot, 5))
+    answer = seecr.solve(robot, random_poses(rng, robot, 5))
     energies = []
     for _ in range(50):
         point = batch.Evaluation.empty(5, robot.n_cables, robot.n_dof)
@@ -159,11 +145,11 @@ def test_stiffness_predicts_where_a_small_force_moves_the_platform(kind: str) ->
     rng = np.random.default_rng(12)
     robot = random_robot(rng, kind)
     pose = random_poses(rng, robot, 1)
-    rest = solve(robot, pose)
+    rest = seecr.solve(robot, pose)
     size = 1e-7 * robot.weight
     for k in range(3):
         push = size * np.eye(6)[k]
-        there, back = solve(robot, pose, wrench=push), solve(robot, pose, wrench=-push)
+        there, back = seecr.solve(robot, pose, wrench=push), seecr.solve(robot, pose, wrench=-push)
         if robot.joints:
             unit = rest._units()
             moved = (there.evaluation.values - back.evaluation.values)[0] / unit
@@ -173,20 +159,20 @@ def test_stiffness_predicts_where_a_small_force_moves_the_platform(kind: str) ->
         assert rest.stiffness[0] @ moved / 2 == pytest.approx(load, rel=1e-5, abs=1e-5 * size)
 
 
-def test_stiffness_under_a_constant_moment(cogiro: Robot) -> None:
+def test_stiffness_under_a_constant_moment(cogiro: seecr.Robot) -> None:
     """A moment that does not turn with the platform leaves a stiffness without symmetry."""
     pose, moment = [0.4, 0.25, 0.1, 1, 0, 0, 0], np.array([0.0, 0, 0, 0.01, 0.02, 0.05])
     soft = replace(cogiro, ea=np.full(8, 300.0))
-    rest = solve(soft, pose, wrench=moment)
+    rest = seecr.solve(soft, pose, wrench=moment)
     assert rest.converged[0]
     for k, size in enumerate([1e-6] * 3 + [1e-8] * 3):
         push = size * np.eye(6)[k]
-        there, back = (solve(soft, pose, wrench=moment + s * push) for s in (1, -1))
+        there, back = (seecr.solve(soft, pose, wrench=moment + s * push) for s in (1, -1))
         moved = pose_difference(there.pose[0], back.pose[0]) / 2
         assert rest.stiffness[0] @ moved == pytest.approx(push, rel=1e-4, abs=1e-4 * size)
 
 
-def _generalised(answer: Solution, push: np.ndarray) -> np.ndarray:
+def _generalised(answer: seecr.Solution, push: np.ndarray) -> np.ndarray:
     """Work of a force at the platform's origin on the joints."""
     from seecr.description.joints import motion_columns, values_of_pose
 
@@ -201,7 +187,7 @@ def test_the_papers_methods_find_the_same_rest(method: str, kind: str) -> None:
     robot = random_robot(rng, kind)
     robot = replace(robot, ea=np.full(robot.n_cables, 50.0 * robot.weight))
     poses = random_poses(rng, robot, 6)
-    newton, other = solve(robot, poses), solve(robot, poses, method=method)
+    newton, other = seecr.solve(robot, poses), seecr.solve(robot, poses, method=method)
     both = other.converged
     assert np.mean(both) > 0.5
     close = np.abs(newton.deviation - other.deviation)[both]
@@ -214,7 +200,7 @@ def test_the_papers_methods_find_the_same_rest(method: str, kind: str) -> None:
 def test_one_mass_on_one_cable_stretches_it_by_m_g_l0_over_ea() -> None:
     robot = hung(joints=slide())
     for load in (0.0, -5.0, 10.0):
-        answer = solve(robot, HERE, wrench=[0, 0, load, 0, 0, 0])
+        answer = seecr.solve(robot, HERE, wrench=[0, 0, load, 0, 0, 0])
         weight = 2.0 * 9.81 - load
         assert answer.tensions[0, 0] == pytest.approx(weight, rel=1e-12)
         assert answer.deviation[0, 2] == pytest.approx(-weight * 1.0 / 100.0, rel=1e-12)
@@ -225,35 +211,29 @@ def test_one_mass_on_one_cable_stretches_it_by_m_g_l0_over_ea() -> None:
         assert answer.energy[0] == pytest.approx(energy, rel=1e-12)
 
 
-def test_gravity_upside_down_hangs_the_mass_above() -> None:
-    answer = solve(hung(joints=slide()), HERE, gravity=[0.0, 0, 9.81])
-    assert answer.pose[0, 2] == pytest.approx(2.0 + 0.1962, rel=1e-12)
-    assert answer.converged[0]
-
-
 def test_a_rest_length_is_taken_as_such() -> None:
     robot = hung(joints=slide())
-    answer = solve(robot, rest_lengths=[[1.5], [0.4]])
+    answer = seecr.solve(robot, rest_lengths=[[1.5], [0.4]])
     stretch = 2.0 * 9.81 / 100.0
     assert answer.pose[:, 2] == pytest.approx(1.0 - np.array([1.5, 0.4]) * (1 + stretch), rel=1e-12)
     assert np.array_equal(answer.rest_lengths, [[1.5], [0.4]])
 
 
-def test_an_external_force_is_a_weight(cogiro: Robot) -> None:
+def test_an_external_force_is_a_weight(cogiro: seecr.Robot) -> None:
     heavier = replace(cogiro, mass=cogiro.mass + 0.1)
     pose = [0.3, 0.2, 0.1, 1, 0, 0, 0]
-    by_mass = solve(heavier, pose)
-    by_force = solve(cogiro, pose, wrench=[0, 0, -0.981, 0, 0, 0])
+    by_mass = seecr.solve(heavier, pose)
+    by_force = seecr.solve(cogiro, pose, wrench=[0, 0, -0.981, 0, 0, 0])
     assert by_force.deviation == pytest.approx(by_mass.deviation, abs=1e-12)
 
 
-def test_an_external_moment_is_an_offset_centre_of_mass(parallel: Robot) -> None:
+def test_an_external_moment_is_an_offset_centre_of_mass(parallel: seecr.Robot) -> None:
     offset = np.array([0.01, -0.005, 0.002])
     pose = [0.3, 0.2, 0.1, 1, 0, 0, 0]
-    by_centre = solve(replace(parallel, centre_of_mass=offset), pose)
+    by_centre = seecr.solve(replace(parallel, centre_of_mass=offset), pose)
     arm = quat_rotate(by_centre.pose[0, 3:], offset)
     moment = np.cross(arm, parallel.mass * parallel.gravity)
-    by_moment = solve(parallel, pose, wrench=[0, 0, 0, *moment])
+    by_moment = seecr.solve(parallel, pose, wrench=[0, 0, 0, *moment])
     assert by_centre.converged[0] and by_moment.converged[0]
     assert np.linalg.norm(by_centre.deviation[0, 3:]) > np.deg2rad(1)
     assert by_moment.deviation == pytest.approx(by_centre.deviation, abs=1e-10)
@@ -262,7 +242,9 @@ def test_an_external_moment_is_an_offset_centre_of_mass(parallel: Robot) -> None
 # --- invariances -------------------------------------------------------------------------------
 
 
-def same(ours: Solution, theirs: Solution, deviation: np.ndarray, robot: Robot) -> None:
+def same(
+    ours: seecr.Solution, theirs: seecr.Solution, deviation: np.ndarray, robot: seecr.Robot
+) -> None:
     assert np.all(ours.converged) and np.all(theirs.converged)
     away = np.abs(theirs.deviation - deviation)
     assert away[:, :3].max() < 1e-8 * robot.length
@@ -293,7 +275,7 @@ def test_mirror(kind: str, seed: int) -> None:
             for j in robot.joints
         ),
     )
-    ours, theirs = solve(robot, poses), solve(image, pose(poses))
+    ours, theirs = seecr.solve(robot, poses), seecr.solve(image, pose(poses))
     same(ours, theirs, ours.deviation * np.concatenate([flip, turn]), robot)
     assert theirs.tensions == pytest.approx(ours.tensions, rel=1e-6, abs=1e-6 * robot.weight)
 
@@ -311,7 +293,7 @@ def test_order_of_cables(kind: str, seed: int) -> None:
         **{name: getattr(robot, name)[order] for name in columns},
         cable_names=tuple(robot.cable_names[i] for i in order),
     )
-    ours, theirs = solve(robot, poses), solve(other, poses)
+    ours, theirs = seecr.solve(robot, poses), seecr.solve(other, poses)
     assert theirs.deviation == pytest.approx(ours.deviation, abs=1e-8 * robot.length)
     assert theirs.tensions == pytest.approx(ours.tensions[:, order], abs=1e-6 * robot.weight)
 
@@ -341,7 +323,10 @@ def test_moved_and_turned_base_frame(kind: str, seed: int) -> None:
     )
     wrench = 0.2 * robot.weight * rng.normal(size=6) * np.repeat([1, 0], 3)
     turned = np.concatenate([quat_rotate(turn, wrench[:3]), wrench[3:]])
-    ours, theirs = solve(robot, poses, wrench=wrench), solve(other, pose(poses), wrench=turned)
+    ours, theirs = (
+        seecr.solve(robot, poses, wrench=wrench),
+        seecr.solve(other, pose(poses), wrench=turned),
+    )
     expected = [quat_rotate(turn, ours.deviation[:, k : k + 3]) for k in (0, 3)]
     same(ours, theirs, np.concatenate(expected, axis=1), robot)
     if robot.joints:  # joint values know nothing of the frame
@@ -362,7 +347,7 @@ def test_turned_platform_frame(seed: int) -> None:
         centre_of_mass=quat_rotate(back, robot.centre_of_mass),
         reference_pose=_turned(robot.reference_pose, turn),
     )
-    ours, theirs = solve(robot, poses), solve(other, _turned(poses, turn))
+    ours, theirs = seecr.solve(robot, poses), seecr.solve(other, _turned(poses, turn))
     same(ours, theirs, ours.deviation, robot)
 
 
@@ -379,43 +364,43 @@ def test_scale(kind: str, length: float, force: float) -> None:
         poses = random_poses(rng, robot, 4)
         size = np.concatenate([np.full(3, length), np.ones(4)])
         other = replace(
-            robot,
-            exit_points=robot.exit_points * length,
+            robot, exit_points=robot.exit_points * length,
             anchor_points=robot.anchor_points * length,
-            centre_of_mass=robot.centre_of_mass * length,
-            rest_lengths=robot.rest_lengths * length,
-            reference_pose=robot.reference_pose * size,
-            mass=robot.mass * force,
+            centre_of_mass=robot.centre_of_mass * length, rest_lengths=robot.rest_lengths * length,
+            reference_pose=robot.reference_pose * size, mass=robot.mass * force,
             ea=robot.ea * force,
             joints=tuple(replace(j, point=j.point * length) for j in robot.joints),
-        )
-        ours, theirs = solve(robot, poses), solve(other, poses * size)
+        )  # fmt: skip
+        ours, theirs = seecr.solve(robot, poses), seecr.solve(other, poses * size)
         same(ours, theirs, ours.deviation * np.repeat([length, 1.0], 3), other)
         scaled = ours.tensions * force
         assert theirs.tensions == pytest.approx(scaled, rel=1e-6, abs=1e-6 * other.weight)
 
 
-def test_gravity_given_is_gravity_of_the_robot(cogiro: Robot) -> None:
+def test_gravity_given_is_gravity_of_the_robot(cogiro: seecr.Robot) -> None:
     tilted = np.array([0.5, -0.3, -9.7])
     pose = [0.4, 0.2, 0.15, 1, 0, 0, 0]
-    given, own = solve(cogiro, pose, gravity=tilted), solve(replace(cogiro, gravity=tilted), pose)
+    given, own = (
+        seecr.solve(cogiro, pose, gravity=tilted),
+        seecr.solve(replace(cogiro, gravity=tilted), pose),
+    )
     assert np.array_equal(given.deviation, own.deviation)
-    assert not np.array_equal(given.deviation, solve(cogiro, pose).deviation)
+    assert not np.array_equal(given.deviation, seecr.solve(cogiro, pose).deviation)
 
 
-def test_a_batch_is_its_rows(parallel: Robot) -> None:
+def test_a_batch_is_its_rows(parallel: seecr.Robot) -> None:
     poses = np.array([[x, 0.25, 0.1, 1, 0, 0, 0] for x in np.linspace(0.17, 0.63, 120)])
-    whole = solve(parallel, poses)
+    whole = seecr.solve(parallel, poses)
     for i in (0, 50, 119):
-        one = solve(parallel, poses[i])
+        one = seecr.solve(parallel, poses[i])
         assert np.array_equal(one.deviation[0], whole.deviation[i])
     assert len(whole) == 120 and whole.pose.shape == (120, 7)
 
 
-def test_starting_at_the_answer_stays_there(parallel: Robot) -> None:
+def test_starting_at_the_answer_stays_there(parallel: seecr.Robot) -> None:
     pose = [0.2, 0.2, 0.1, 1, 0, 0, 0]
-    first = solve(parallel, pose)
-    again = solve(parallel, pose, start=first.pose)
+    first = seecr.solve(parallel, pose)
+    again = seecr.solve(parallel, pose, start=first.pose)
     assert again.iterations[0] < first.iterations[0]
     assert again.deviation == pytest.approx(first.deviation, abs=1e-12)
 
@@ -426,28 +411,23 @@ def test_start_is_honoured_on_joints(method: str) -> None:
     robot = hung(joints=hinge([0.0, 1, 0]), anchor_points=[[0.0, 0, -1]],
                  centre_of_mass=[0.0, 0, -1], rest_lengths=[2.0])  # fmt: skip
     above = [0.0, 0, 0, 0, 0, 1, 0]
-    below = solve(robot, HERE, method=method)
-    turned = solve(robot, HERE, start=[above], method=method)
+    below = seecr.solve(robot, HERE, method=method)
+    turned = seecr.solve(robot, HERE, start=[above], method=method)
     assert below.deviation[0, 4] == pytest.approx(0.0, abs=1e-9) and below.converged[0]
     if method == "newton":
         assert turned.iterations[0] > below.iterations[0] and turned.converged[0]
     else:
-        assert turned.status[0] is Status.UNSTABLE
+        assert turned.status[0] is seecr.Status.UNSTABLE
         assert abs(turned.deviation[0, 4]) == pytest.approx(np.pi, abs=1e-9)
 
 
 # --- statuses ----------------------------------------------------------------------------------
 
 
-def test_every_status_is_a_sentence() -> None:
-    for status in Status:
-        assert len(status.value.split()) > 5 and "\n" not in status.value
-
-
 def test_a_pendulum_is_free_to_turn_about_the_vertical() -> None:
-    answer = solve(hung(centre_of_mass=np.array([0.1, 0, -0.2])), HERE)
-    assert answer.status[0] is Status.SINGULAR and not answer.converged[0]
-    assert answer.sentence(0).startswith(Status.SINGULAR.value)
+    answer = seecr.solve(hung(centre_of_mass=np.array([0.1, 0, -0.2])), HERE)
+    assert answer.status[0] is seecr.Status.SINGULAR and not answer.converged[0]
+    assert answer.sentence(0).startswith(seecr.Status.SINGULAR.value)
     assert answer.sentence(0).endswith("(direction +1.00 rz)")
     assert answer.residual[0] < 1e-9  # and yet it balances, and hangs as a pendulum does:
     assert answer.deviation[0, 4] == pytest.approx(np.arctan2(0.1, 0.2), rel=1e-9)
@@ -455,64 +435,60 @@ def test_a_pendulum_is_free_to_turn_about_the_vertical() -> None:
 
 
 def test_two_cables_in_line_with_the_centre_of_mass_leave_one_turn_free() -> None:
-    robot = Robot(
+    robot = seecr.Robot(
         "line", np.array([[-1.0, 0, 1], [1, 0, 1]]), np.array([[-0.1, 0, 0], [0.1, 0, 0]]),
         np.full(2, 1000.0), np.full(2, np.hypot(0.9, 1.0)), 2.0,
     )  # fmt: skip
-    answer = solve(robot, HERE)
-    assert answer.status[0] is Status.SINGULAR
+    answer = seecr.solve(robot, HERE)
+    assert answer.status[0] is seecr.Status.SINGULAR
     assert answer.sentence(0).endswith("(direction +1.00 rx)")
-    below = solve(replace(robot, centre_of_mass=np.array([0.0, 0, -0.01])), HERE)
+    below = seecr.solve(replace(robot, centre_of_mass=np.array([0.0, 0, -0.01])), HERE)
     assert below.converged[0]
 
 
-@pytest.mark.parametrize("method", ["fsolve", "least_squares"])
-def test_a_balanced_but_unstable_pose_is_said_to_be_so(method: str) -> None:
+@pytest.mark.parametrize("method", METHODS)
+def test_a_balanced_but_unstable_pose_is_said_to_be_so_or_left(method: str) -> None:
     """A centre of mass above the only hinge: upright balances, and does not rest."""
     robot = hung(joints=hinge([0.0, 1, 0]), anchor_points=[[0.0, 0, 0.1]],
                  centre_of_mass=[0.0, 0, 0.2], rest_lengths=[0.9])  # fmt: skip
-    answer = solve(robot, HERE, method=method)
-    assert answer.status[0] is Status.UNSTABLE and not answer.converged[0]
+    answer = seecr.solve(robot, HERE, method=method)
+    if method == "newton":
+        assert answer.converged[0] and abs(answer.deviation[0, 4]) > np.deg2rad(90)
+        return
+    assert answer.status[0] is seecr.Status.UNSTABLE and not answer.converged[0]
     assert answer.sentence(0).endswith("(direction +1.00 ry)")
     assert answer.smallest_eigenvalue[0] < 0
 
 
-def test_newton_leaves_an_unstable_balance_and_comes_to_rest() -> None:
-    robot = hung(joints=hinge([0.0, 1, 0]), anchor_points=[[0.0, 0, 0.1]],
-                 centre_of_mass=[0.0, 0, 0.2], rest_lengths=[0.9])  # fmt: skip
-    answer = solve(robot, HERE)
-    assert answer.converged[0] and abs(answer.deviation[0, 4]) > np.deg2rad(90)
-
-
 def test_newton_passes_an_unstable_line_it_starts_on() -> None:
     """A centre of mass above the one anchor point: the fall goes straight down, then over."""
-    answer = solve(hung(centre_of_mass=[0.0, 0, 0.2]), HERE)
-    assert answer.status[0] is Status.SINGULAR  # about the vertical, as any pendulum
+    answer = seecr.solve(hung(centre_of_mass=[0.0, 0, 0.2]), HERE)
+    assert answer.status[0] is seecr.Status.SINGULAR  # about the vertical, as any pendulum
     assert abs(np.linalg.norm(answer.deviation[0, 3:])) == pytest.approx(np.pi, abs=1e-6)
     assert answer.tensions[0, 0] == pytest.approx(2 * 9.81, rel=1e-9)
 
 
 def test_a_platform_whose_cables_cannot_hold_it_falls() -> None:
     robot = hung(joints=slide(), ea=np.array([5.0]))  # stretches to five times its length
-    answer = solve(robot, HERE)
-    assert answer.status[0] is Status.FALLING and not answer.converged[0]
+    answer = seecr.solve(robot, HERE)
+    assert answer.status[0] is seecr.Status.FALLING and not answer.converged[0]
     assert np.all(np.isnan(answer.pose)) and np.all(np.isnan(answer.tensions))
     assert np.isinf(answer.residual[0])
 
 
 def test_no_equilibrium_under_a_moment_that_no_cable_resists() -> None:
     """A constant moment about the vertical turns a pendulum for ever."""
-    answer = solve(hung(centre_of_mass=[0.0, 0, -0.2]), HERE, wrench=[0, 0, 0, 0, 0, 0.5])
-    assert answer.status[0] is Status.SPINNING and not answer.converged[0]
+    answer = seecr.solve(hung(centre_of_mass=[0.0, 0, -0.2]), HERE, wrench=[0, 0, 0, 0, 0, 0.5])
+    assert answer.status[0] is seecr.Status.SPINNING and not answer.converged[0]
     assert np.all(np.isnan(answer.pose)) and np.isinf(answer.residual[0])
 
 
-def test_a_moment_beyond_what_the_cables_can_hold_is_no_answer(cogiro: Robot) -> None:
+def test_a_moment_beyond_what_the_cables_can_hold_is_no_answer(cogiro: seecr.Robot) -> None:
     pose = [0.4, 0.25, 0.1, 1, 0, 0, 0]
-    held = solve(cogiro, pose, wrench=[0, 0, 0, 0, 0, 0.1])
+    held = seecr.solve(cogiro, pose, wrench=[0, 0, 0, 0, 0, 0.1])
     assert held.converged[0]
-    spun = solve(cogiro, pose, wrench=[0, 0, 0, 0, 0, 3.0])
-    assert spun.status[0] is Status.SPINNING and spun.residual[0] > 1e-3
+    spun = seecr.solve(cogiro, pose, wrench=[0, 0, 0, 0, 0, 3.0])
+    assert spun.status[0] is seecr.Status.SPINNING and spun.residual[0] > 1e-3
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -522,54 +498,54 @@ def test_what_large_moments_leave_in_balance_is_found(seed: int) -> None:
     robot = random_robot(rng)
     poses = random_poses(rng, robot, 10)
     moments = 0.3 * robot.weight * robot.length * rng.normal(size=(10, 3))
-    answer = solve(robot, poses, wrench=np.hstack([np.zeros((10, 3)), moments]))
+    answer = seecr.solve(robot, poses, wrench=np.hstack([np.zeros((10, 3)), moments]))
     if seed in (2, 17):  # one pose of each was missed without the skew part of the stiffness
         assert np.all(answer.converged)
     for i in np.flatnonzero(answer.converged):
         assert exact_residual(answer, i, moments[i]) < 1e-9
     # where there is no answer, starting elsewhere finds none within reach either
-    for i in np.flatnonzero(answer.status == Status.SPINNING)[:2]:
+    for i in np.flatnonzero(answer.status == seecr.Status.SPINNING)[:2]:
         away = np.hstack([robot.length * rng.normal(size=(8, 3)), 0.5 * rng.normal(size=(8, 3))])
         starts = pose_add(np.tile(poses[i], (8, 1)), away)
         wrench = np.tile(np.concatenate([np.zeros(3), moments[i]]), (8, 1))
-        elsewhere = solve(robot, np.tile(poses[i], (8, 1)), wrench=wrench, start=starts)
+        elsewhere = seecr.solve(robot, np.tile(poses[i], (8, 1)), wrench=wrench, start=starts)
         assert not np.any(elsewhere.converged)
 
 
 def test_a_singular_pose_names_its_direction_without_cables_that_just_touch() -> None:
     """A third cable as long as its rest length resists one way only: not the way it names."""
-    robot = Robot(
+    robot = seecr.Robot(
         "line", np.array([[-1.0, 0, 1], [1, 0, 1], [0, 1.0, 1]]),
         np.array([[-0.1, 0, 0], [0.1, 0, 0], [0, 0.1, 0]]),
         np.full(3, 1000.0), np.array([1.3, 1.3, 1.3]), 2.0,
     )  # fmt: skip
-    hanging = solve(replace(robot, rest_lengths=np.array([1.3, 1.3, 9.0])), HERE)
-    assert hanging.status[0] is Status.SINGULAR and hanging.slack[0].tolist() == [0, 0, 1]
+    hanging = seecr.solve(replace(robot, rest_lengths=np.array([1.3, 1.3, 9.0])), HERE)
+    assert hanging.status[0] is seecr.Status.SINGULAR and hanging.slack[0].tolist() == [0, 0, 1]
     reach = robot.nominal_lengths(hanging.pose)[0, 2]
-    touching = solve(robot, rest_lengths=[[1.3, 1.3, reach]], start=hanging.pose)
-    assert touching.status[0] is Status.SINGULAR and touching.slack[0].tolist() == [0, 0, 1]
+    touching = seecr.solve(robot, rest_lengths=[[1.3, 1.3, reach]], start=hanging.pose)
+    assert touching.status[0] is seecr.Status.SINGULAR and touching.slack[0].tolist() == [0, 0, 1]
     assert touching.sentence(0) == hanging.sentence(0)
     assert touching.sentence(0).endswith("(direction +1.00 rx)")
     assert abs(touching.smallest_eigenvalue[0]) < 1e-9 * 1000.0
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_the_limit_of_iterations_is_said(method: str, parallel: Robot) -> None:
-    answer = solve(parallel, [0.17, 0.25, 0.1, 1, 0, 0, 0], method=method, max_iterations=1)
-    assert answer.status[0] in (Status.ITERATIONS, Status.GAVE_UP)
-    assert (answer.status[0] is Status.ITERATIONS) == (method == "newton")
+def test_the_limit_of_iterations_is_said(method: str, parallel: seecr.Robot) -> None:
+    answer = seecr.solve(parallel, [0.17, 0.25, 0.1, 1, 0, 0, 0], method=method, max_iterations=1)
+    assert answer.status[0] in (seecr.Status.ITERATIONS, seecr.Status.GAVE_UP)
+    assert (answer.status[0] is seecr.Status.ITERATIONS) == (method == "newton")
     assert not answer.converged[0] and answer.residual[0] > 1e-9
 
 
-def test_nothing_to_carry_and_nothing_pulls(cogiro: Robot) -> None:
+def test_nothing_to_carry_and_nothing_pulls(cogiro: seecr.Robot) -> None:
     """Without gravity every platform pose within slack cables is as good as the next."""
     robot = replace(cogiro, rest_lengths=cogiro.rest_lengths + 0.01)
-    answer = solve(robot, [0.4, 0.25, 0.1, 1, 0, 0, 0], gravity=[0.0, 0, 0])
-    assert answer.status[0] is Status.SINGULAR and np.all(answer.slack)
+    answer = seecr.solve(robot, [0.4, 0.25, 0.1, 1, 0, 0, 0], gravity=[0.0, 0, 0])
+    assert answer.status[0] is seecr.Status.SINGULAR and np.all(answer.slack)
     tight = replace(cogiro, exit_points=cogiro.exit_points - [0, 0, 0.335])
     lengths = tight.nominal_lengths(tight.reference_pose[None])[0]
     tight = replace(tight, rest_lengths=0.99 * lengths)
-    held = solve(tight, tight.reference_pose, gravity=[0.0, 0, 0])
+    held = seecr.solve(tight, tight.reference_pose, gravity=[0.0, 0, 0])
     assert np.all(held.tensions > 0) and held.residual[0] < 1e-9
 
 
@@ -603,40 +579,40 @@ def test_nothing_to_carry_and_nothing_pulls(cogiro: Robot) -> None:
     ],
 )
 def test_bad_input_is_one_sentence(arguments: dict[str, Any], text: str) -> None:
-    with pytest.raises(InputError, match=text) as caught:
-        solve(hung(), **arguments)
+    with pytest.raises(seecr.InputError, match=text) as caught:
+        seecr.solve(hung(), **arguments)
     assert "\n" not in str(caught.value)
 
 
 def test_a_pose_off_the_joints_is_refused() -> None:
-    with pytest.raises(InputError, match="its joints cannot reach the commanded pose, "):
-        solve(hung(joints=slide()), [0.1, 0, 0, 1, 0, 0, 0])
+    with pytest.raises(seecr.InputError, match="its joints cannot reach the commanded pose, "):
+        seecr.solve(hung(joints=slide()), [0.1, 0, 0, 1, 0, 0, 0])
 
 
 def test_a_quaternion_is_normalised_only_where_it_needs_to_be() -> None:
     quat = quat_from_rotvec(np.array([0.1, 0.2, 0.3]))
-    loose = solve(hung(), [0, 0, 0, *(1.0005 * quat)])
+    loose = seecr.solve(hung(), [0, 0, 0, *(1.0005 * quat)])
     assert loose.command[0, 3:] == pytest.approx(quat, abs=1e-15)
-    exact = solve(hung(), [0, 0, 0, *quat])
+    exact = seecr.solve(hung(), [0, 0, 0, *quat])
     assert np.array_equal(exact.command[0, 3:], quat)
 
 
 def test_effects_act_in_a_solve_as_in_a_prediction(cogiro):
     pose = [[0.3, 0.2, 0.1, 1, 0, 0, 0], [0.5, 0.3, 0.2, 1, 0, 0, 0]]
-    sag = Term.of(cogiro, "cable_weight", weight_N_per_m=0.02)
-    lag = Term.of(cogiro, "hysteresis", amplitude_N=0.05)
+    sag = seecr.Term.of(cogiro, "cable_weight", weight_N_per_m=0.02)
+    lag = seecr.Term.of(cogiro, "hysteresis", amplitude_N=0.05)
     for effects in ([sag], [sag, lag]):
-        solved = solve(cogiro, pose, effects=effects)
+        solved = seecr.solve(cogiro, pose, effects=effects)
         assert solved.converged.all()
-        np.testing.assert_array_equal(solved.pose, predict(cogiro, pose, effects).pose)
-    plain = solve(cogiro, pose).pose[:, :3]
+        np.testing.assert_array_equal(solved.pose, seecr.predict(cogiro, pose, effects).pose)
+    plain = seecr.solve(cogiro, pose).pose[:, :3]
     assert np.all(np.abs(solved.pose[:, :3] - plain).max(axis=1) > 1e-6)
 
 
 def test_what_history_does_not_go_with_is_said(cogiro):
-    lag = Term.of(cogiro, "hysteresis", amplitude_N=0.05)
-    with pytest.raises(InputError, match=r"solved along the path; expected no other method"):
-        solve(cogiro, cogiro.reference_pose, effects=[lag], method="fsolve")
+    lag = seecr.Term.of(cogiro, "hysteresis", amplitude_N=0.05)
+    with pytest.raises(seecr.InputError, match=r"solved along the path; expected no other method"):
+        seecr.solve(cogiro, cogiro.reference_pose, effects=[lag], method="fsolve")
 
 
 @pytest.mark.parametrize(
@@ -645,10 +621,33 @@ def test_what_history_does_not_go_with_is_said(cogiro):
 )
 def test_a_cable_without_any_length_left_is_no_equilibrium(method: str, history: bool) -> None:
     """Formulas go on below a length of 0, with tensions of either sign."""
-    robot = load_robot(model_path("demobot_parallel"))
-    shorter = Term.of(robot, "cable_length_offset", offset_1_m=-2.0 * robot.rest_lengths[0])
-    effects = [shorter, *([Term.of(robot, "backlash", gap_m=1e-3)] if history else [])]
-    found = solve(robot, robot.reference_pose[None], effects=effects, method=method)
-    assert found.status[0] is Status.NO_LENGTH
+    robot = seecr.load_robot("demobot_parallel")
+    shorter = seecr.Term.of(robot, "cable_length_offset", offset_1_m=-2.0 * robot.rest_lengths[0])
+    effects = [shorter, *([seecr.Term.of(robot, "backlash", gap_m=1e-3)] if history else [])]
+    found = seecr.solve(robot, robot.reference_pose[None], effects=effects, method=method)
+    assert found.status[0] is seecr.Status.NO_LENGTH
     assert np.isnan(found.tensions).all() and found.residual[0] == np.inf
-    assert not predict(robot, robot.reference_pose[None], effects).solved[0]
+    assert not seecr.predict(robot, robot.reference_pose[None], effects).solved[0]
+
+
+# --- The paper's own search on SciPy: its first guess, and where it gives up
+
+
+def test_the_first_guess_falls_by_the_weight_on_the_mean_vertical_extent() -> None:
+    """Step 4: m g l_vmean / k_c, written out for one pose."""
+    robot = robot_of("demobot_cogiro")
+    pose = np.array([[0.3, 0.2, 0.1, 1.0, 0, 0, 0]])
+    below = robot.exit_points[:, 2] - (pose[0, 2] + robot.anchor_points[:, 2])
+    fall = robot.mass * 9.81 * below.mean() / robot.ea.mean()
+    found = first_guess(plain_setup(robot, seecr.Commands(pose)))
+    assert found == pytest.approx([fall], rel=1e-3)
+
+
+def test_what_balances_is_an_answer_though_scipy_gives_up() -> None:
+    """fsolve says here that it makes no progress, at forces that balance to rounding."""
+    robot = robot_of("demobot_parallel")
+    pose = robot.reference_pose.copy()
+    pose[[0, 2]] = 0.49, 0.1
+    found = seecr.solve(robot, pose, method="fsolve")
+    assert found.status[0] is seecr.Status.CONVERGED and found.residual[0] < 1e-12
+    np.testing.assert_allclose(found.pose, seecr.solve(robot, pose).pose, atol=1e-9)

@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 
 from crosscheck.settle.settler import Settler
-from seecr.commands import Commands
-from seecr.description.mjcf import load_robot, model_path
-from seecr.description.robot import Robot
-from seecr.effects import Term
-from seecr.equilibrium.solving import solve
-from seecr.errors import InputError
+from seecr import Commands, InputError, Robot, Term, load_robot, model_path, solve
 from seecr.pose import Array, pose_difference, quat_from_rotvec
 from seecr.show.batch_words import jump_lines
 from seecr.show.files import SweepRows
@@ -22,7 +17,7 @@ pytestmark = pytest.mark.slow
 
 
 def parallel(softer: float = 1.0) -> Robot:
-    robot = load_robot(model_path("demobot_parallel"))
+    robot = load_robot("demobot_parallel")
     return replace(robot, ea=softer * robot.ea)
 
 
@@ -107,7 +102,7 @@ def test_where_a_rest_ends_the_platform_jumps() -> None:
 
 
 def test_a_way_back_ends_where_it_began_and_lengths_are_followed_alike() -> None:
-    robot = load_robot(model_path("planar_vertical"))
+    robot = load_robot("planar_vertical")
     poses = np.tile(robot.reference_pose, (3, 1))
     poses[1, 0] += 0.005
     led = solve(robot, poses, follow=True)

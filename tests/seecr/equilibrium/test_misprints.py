@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from seecr.description.mjcf import load_robot, model_path
+from seecr import load_robot, model_path
 from seecr.pose import quat_from_rxyz, quat_to_matrix
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -90,7 +90,7 @@ def test_step_4_guess_falls_by_the_mean_length() -> None:
     for _ in range(3000):
         mujoco.mj_step(model, data)
     fall = model.body("platform").pos[2] - data.body("platform").xpos[2]
-    robot = load_robot(model_path("demobot_cogiro"))
+    robot = load_robot("demobot_cogiro")
     vertical = robot.exit_points[:, 2] - (robot.reference_pose[2] + robot.anchor_points[:, 2])
     guess = robot.weight * vertical / robot.ea
     assert 0.3 < guess.mean() / fall < 3

@@ -7,17 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from seecr import InputError, Robot, Status, Term, equilibria, load_robot, solve
 from seecr.description.joints import pose_of_values
-from seecr.description.mjcf import load_robot, model_path
-from seecr.description.robot import Robot
-from seecr.effects import Term
 from seecr.equilibrium.following import moved
-from seecr.equilibrium.search import _spread, elsewhere, equilibria
-from seecr.equilibrium.solving import solve
-from seecr.errors import InputError
+from seecr.equilibrium.search import elsewhere, starts_about
 from seecr.pose import Array, pose_difference, quat_from_rotvec, quat_multiply
 from seecr.show.pose_words import other_lines, softest_words
-from seecr.statics.solution import Status
 
 # To one of this command's rests only few starts lead.
 HARD = np.array([0.308667, 0.214797, 0.14935, 0.996763, -0.037391, -0.069476, 0.015419])
@@ -59,7 +54,7 @@ def test_what_thousands_of_starts_find_is_found(starts: int) -> None:
     """All but one in a hundred: there are rests to which one start in 40,000 leads."""
     there, lost = 0, []
     for name in ("demobot_off_centre", "demobot_cogiro", "cogiro_large", "demobot_parallel"):
-        robot, random = load_robot(model_path(name)), np.random.default_rng(7)
+        robot, random = load_robot(name), np.random.default_rng(7)
         for pose in [*commands_of(robot, 5, random), HARD]:
             found = equilibria(robot, pose)
             assert found.converged.all() and np.all(np.diff(found.energy) >= 0)
@@ -70,22 +65,15 @@ def test_what_thousands_of_starts_find_is_found(starts: int) -> None:
 
 
 def test_search_goes_on_while_starts_lead_where_no_other_did() -> None:
-    robot = load_robot(model_path("demobot_off_centre"))
+    robot = load_robot("demobot_off_centre")
     found = equilibria(robot, HARD)
     np.testing.assert_allclose(found.pose[-1, :3], [0.31089, 0.17045, 0.19257], atol=1e-5)
     assert found.energy[-1] - found.energy[0] == pytest.approx(0.228, abs=0.001)
     assert len(equilibria(robot, HARD, most=256)) <= len(found) == 3
 
 
-def test_on_joints_starts_lie_about_the_command() -> None:
-    robot = load_robot(model_path("planar_two_cable"))
-    values = np.array([[0.3, -0.1, 0.2]])
-    command = pose_of_values(robot, values)[0]
-    assert np.allclose(_spread(robot, command[0], np.full((1, 4), 0.5)), command)
-
-
 def test_the_tilted_command_with_two_rests() -> None:
-    robot = load_robot(model_path("demobot_parallel"))
+    robot = load_robot("demobot_parallel")
     quat = np.array([0.943, 0.163, -0.288, -0.038])
     pose = np.array([0.351, 0.216, 0.109, *(quat / np.linalg.norm(quat))])
     found = equilibria(robot, pose)
@@ -99,7 +87,7 @@ def test_the_tilted_command_with_two_rests() -> None:
 
 def test_where_it_drifts_to_without_resistance_is_no_other_equilibrium() -> None:
     """Two cables are tight, and the platform can turn until a third one is: that is one rest."""
-    robot = load_robot(model_path("demobot_parallel"))
+    robot = load_robot("demobot_parallel")
     pose = np.array([0.1, 0.1, 0.1, 1.0, 0.0, 0.0, 0.0])
     own, found = solve(robot, pose, others=True), equilibria(robot, pose)
     assert own.status[0] is Status.SINGULAR and own.others is not None
@@ -113,7 +101,7 @@ def test_where_it_drifts_to_without_resistance_is_no_other_equilibrium() -> None
 
 
 def test_solve_tells_the_others() -> None:
-    robot = load_robot(model_path("demobot_parallel"))
+    robot = load_robot("demobot_parallel")
     quat = np.array([0.943, 0.163, -0.288, -0.038])
     tilted = np.array([0.351, 0.216, 0.109, *(quat / np.linalg.norm(quat))])
     found = solve(robot, [tilted, robot.reference_pose], others=True)
@@ -134,17 +122,23 @@ def test_solve_tells_the_others() -> None:
 
 
 def test_a_robot_with_one_rest_says_so() -> None:
-    robot = load_robot(model_path("planar_vertical"))
+    robot = load_robot("planar_vertical")
     found = equilibria(robot, robot.reference_pose)
     assert len(found) == 1
     own = solve(robot, robot.reference_pose)
     assert list(other_lines(own, found)) == ["no other stable equilibrium was found"]
     assert softest_words(own).startswith("move along ")
-    free = load_robot(model_path("demobot_parallel"))
+    free = load_robot("demobot_parallel")
     assert softest_words(solve(free, free.reference_pose)).startswith(("turn about", "move along"))
 
 
 def test_several_poses_are_refused() -> None:
-    robot = load_robot(model_path("demobot_cogiro"))
+    robot = load_robot("demobot_cogiro")
     with pytest.raises(InputError, match=r"equilibria needs one commanded pose \(7,\), got 2"):
         equilibria(robot, np.tile(robot.reference_pose, (2, 1)))
+
+
+def test_on_joints_starts_lie_about_the_command() -> None:
+    robot = load_robot("planar_two_cable")
+    command = pose_of_values(robot, np.array([[0.3, -0.1, 0.2]]))[0]
+    assert np.allclose(starts_about(robot, command[0], np.full((1, 4), 0.5)), command)

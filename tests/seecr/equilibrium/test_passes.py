@@ -7,40 +7,32 @@ from functools import cache
 import numpy as np
 import pytest
 
-from seecr.description.mjcf import load_robot, model_path
-from seecr.description.robot import Robot
-from seecr.effects import Term, effect_named, layout_of
-from seecr.equilibrium import saddles
-from seecr.equilibrium.following import _stepped, evaluated, moved
-from seecr.equilibrium.saddles import Barrier, barriers
-from seecr.equilibrium.search import elsewhere, equilibria
-from seecr.equilibrium.solving import solve
-from seecr.errors import InputError
+import seecr
+from seecr.equilibrium.following import evaluated, moved
+from seecr.equilibrium.search import elsewhere
 from seecr.pose import pose_difference, quat_from_rotvec, transform_points
-from seecr.prediction.model import load_model
 from seecr.show.pose_words import other_lines
-from seecr.statics.solution import Solution
 from seecr.statics.tables import take
 
 
 @cache
-def tilted() -> tuple[Robot, np.ndarray, Solution, Solution, Solution]:
+def tilted() -> tuple[seecr.Robot, np.ndarray, seecr.Solution, seecr.Solution, seecr.Solution]:
     """A robot, a command with two rests, its own, both by energy, and the other one."""
-    robot = load_robot(model_path("demobot_parallel"))
+    robot = seecr.load_robot("demobot_parallel")
     pose = np.array([0.351, 0.216, 0.109, 0.943, 0.163, -0.288, -0.038])
     pose[3:] /= np.linalg.norm(pose[3:])
-    own, every = solve(robot, pose), equilibria(robot, pose)
+    own, every = seecr.solve(robot, pose), seecr.equilibria(robot, pose)
     return robot, pose, own, every, every.rows(elsewhere(own, every))
 
 
 @pytest.mark.slow
 def test_the_pass_between_the_two_rests_of_the_tilted_command() -> None:
     robot, pose, own, every, other = tilted()
-    (way,) = barriers(own, other)
+    (way,) = seecr.barriers(own, other)
     assert way.exact and not way.twisted
     assert way.energy == pytest.approx(6.80e-5, rel=1e-3)
     # of all equilibria one is the rest itself
-    assert sorted(w.energy for w in barriers(own, every)) == [0.0, way.energy]
+    assert sorted(w.energy for w in seecr.barriers(own, every)) == [0.0, way.energy]
     assert way.back - way.energy == pytest.approx(own.energy[0] - other.energy[0], rel=1e-9)
     # a saddle: balanced, one direction falls, and leads to one rest on either side
     there = evaluated(robot, own.tables, way.pose[None])
@@ -49,7 +41,7 @@ def test_the_pass_between_the_two_rests_of_the_tilted_command() -> None:
     sides = [
         moved(robot, way.pose[None], s * 1e-3 * robot.length * vectors[:, :1].T) for s in (1, -1)
     ]
-    ends = [solve(robot, pose, start=side).pose[0] for side in sides]
+    ends = [seecr.solve(robot, pose, start=side).pose[0] for side in sides]
     for rest in (own.pose[0], other.pose[0]):
         assert min(np.abs(pose_difference(end, rest)).max() for end in ends) < 1e-7
     # no way found by chance is lower: straight ones by way of poses near the pass
@@ -70,48 +62,20 @@ def test_the_pass_between_the_two_rests_of_the_tilted_command() -> None:
 
 
 @pytest.mark.slow
-def test_cables_that_stiffen_have_energies_and_a_pass_between_rests() -> None:
-    robot, pose, *_rests = tilted()
-    for part, apart in ((1e-3, 2e-3), (1.0, 1.0)):
-        stiffer = layout_of(effect_named("nonlinear_elasticity"), robot)
-        model = [Term(stiffer, part * stiffer.scale)]
-        own, every = solve(robot, pose, effects=model), equilibria(robot, pose, effects=model)
-        assert len(every) == 2 and np.all(np.diff(every.energy) > 0)
-        other = every.rows(elsewhere(own, every))
-        (way,) = barriers(own, other)
-        assert way.exact and way.energy == pytest.approx(6.80e-5, rel=apart)
-        assert way.back - way.energy == pytest.approx(own.energy[0] - other.energy[0], rel=1e-9)
-
-
-@pytest.mark.slow
 def test_mirrored_rests_are_twisted_and_as_far_up() -> None:
-    robot = load_robot(model_path("demobot_cogiro"))
+    robot = seecr.load_robot("demobot_cogiro")
     pose = robot.reference_pose
     turned = np.array(
         [[0.4, 0.25, 0.15, *quat_from_rotvec(np.array([s, 0.0, 0.0]))] for s in (2, -2)]
     )
-    own, others = solve(robot, pose), solve(robot, np.tile(pose, (2, 1)), start=turned)
+    own, others = seecr.solve(robot, pose), seecr.solve(robot, np.tile(pose, (2, 1)), start=turned)
     assert others.converged.all()
-    one, two = barriers(own, others)
+    one, two = seecr.barriers(own, others)
     assert one.twisted and two.twisted and one.energy == pytest.approx(two.energy, rel=1e-6)
     assert one.energy > others.energy[0] - own.energy[0] > 0.01
 
 
-@pytest.mark.slow
-def test_where_there_is_no_energy_no_way_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Hundreds of rounds ended with the highest of numbers that were none."""
-    _robot, _pose, own, _every, other = tilted()
-    own, other = own.rows([0]), other.rows([0])  # which are changed below
-    monkeypatch.setattr(saddles, "strings", pytest.fail)
-    for energy in (own, other):
-        energy.energy[:] = np.nan
-        (way,) = barriers(own, other)
-        assert np.isnan([way.energy, way.back, *way.pose]).all()
-        assert not way.exact and not way.twisted
-        energy.energy[:] = 0.0
-
-
-def energy_by_hand(own: Solution, pose: np.ndarray, moment: float) -> float:
+def energy_by_hand(own: seecr.Solution, pose: np.ndarray, moment: float) -> float:
     """Of a platform in the x-z plane: springs, weight, and a moment about y times the turn."""
     robot, rest = own.robot, own.rest_lengths[0]
     spans = np.linalg.norm(transform_points(pose[None], robot.anchor_points)[0] - EXITS, axis=1)
@@ -123,16 +87,16 @@ def energy_by_hand(own: Solution, pose: np.ndarray, moment: float) -> float:
     return springs + robot.weight * lifted - moment * from_command
 
 
-PLANAR = load_robot(model_path("planar_horizontal"))
+PLANAR = seecr.load_robot("planar_horizontal")
 EXITS = PLANAR.exit_points
 LEANING = np.array([0.6, 0.0, 0.4, 0.9, 0.0, np.sqrt(0.19), 0.0])
 
 
 @cache
-def barrier_without_a_moment() -> tuple[Barrier, float]:
+def barrier_without_a_moment() -> tuple[seecr.Barrier, float]:
     """The same barrier if nothing acts, and the turn [rad] to its top."""
-    own, every = solve(PLANAR, LEANING), equilibria(PLANAR, LEANING)
-    (way,) = barriers(own, every.rows(elsewhere(own, every)))
+    own, every = seecr.solve(PLANAR, LEANING), seecr.equilibria(PLANAR, LEANING)
+    (way,) = seecr.barriers(own, every.rows(elsewhere(own, every)))
     return way, float(pose_difference(way.pose, own.pose[0])[4])
 
 
@@ -140,9 +104,12 @@ def barrier_without_a_moment() -> tuple[Barrier, float]:
 @pytest.mark.parametrize("moment", [0.02, -0.05])
 def test_under_a_moment_a_planar_platform_has_energies_and_barriers(moment: float) -> None:
     """They were nan once: on one hinge the work of a moment depends on the turn alone."""
-    acting = [Term.of(PLANAR, "external_wrench", moment_y_Nm=moment)]
-    own, every = solve(PLANAR, LEANING, effects=acting), equilibria(PLANAR, LEANING, effects=acting)
-    (way,) = barriers(own, every.rows(elsewhere(own, every)))
+    acting = [seecr.Term.of(PLANAR, "external_wrench", moment_y_Nm=moment)]
+    own, every = (
+        seecr.solve(PLANAR, LEANING, effects=acting),
+        seecr.equilibria(PLANAR, LEANING, effects=acting),
+    )
+    (way,) = seecr.barriers(own, every.rows(elsewhere(own, every)))
     own_energy, there, top = (
         energy_by_hand(own, pose, moment) for pose in (own.pose[0], every.pose[-1], way.pose)
     )
@@ -164,51 +131,58 @@ def test_under_a_moment_a_planar_platform_has_energies_and_barriers(moment: floa
 
 @pytest.mark.slow
 def test_full_turns_under_a_moment_are_not_counted() -> None:
-    acting = [Term.of(PLANAR, "external_wrench", moment_y_Nm=0.02)]
+    acting = [seecr.Term.of(PLANAR, "external_wrench", moment_y_Nm=0.02)]
     starts = np.tile(LEANING, (24, 1))
     for k, angle in enumerate(np.linspace(-3.1, 3.1, 24)):
         starts[k, 3:] = quat_from_rotvec(np.array([0.0, angle, 0.0]))
-    found = solve(PLANAR, np.tile(LEANING, (24, 1)), start=starts, effects=acting)
+    found = seecr.solve(PLANAR, np.tile(LEANING, (24, 1)), start=starts, effects=acting)
     assert found.converged.sum() > 12
     turned = found.evaluation.values[:, 2] / PLANAR.length
     assert np.abs(turned).max() > 2.0
     for k in np.flatnonzero(found.converged):
         by_hand = energy_by_hand(found.rows([k]), found.pose[k], 0.02)
         assert found.energy[k] == pytest.approx(by_hand, rel=1e-7)
-    # a hinge's value begins anew behind half a turn, and a moment's work with it
-    behind = moved(PLANAR, LEANING[None], np.array([[0.0, 0.0, 2.2 * PLANAR.length]]))
-    step = np.array([0.0, 0.0, 0.2 * PLANAR.length])
-    assert _stepped(PLANAR, behind, step)[1] and not _stepped(PLANAR, behind, -step)[1]
 
 
 def test_the_work_of_a_moment_that_depends_on_the_way_is_said_in_words() -> None:
     robot, pose, *_rests = tilted()
     for acting, why in (
-        ([Term.of(robot, "external_wrench", moment_y_Nm=1e-4)], "what a moment does on a platform"),
-        ([Term.of(robot, "hysteresis", amplitude_N=0.1)], "what its cables take"),
+        (
+            [seecr.Term.of(robot, "external_wrench", moment_y_Nm=1e-4)],
+            "what a moment does on a platform",
+        ),
+        ([seecr.Term.of(robot, "hysteresis", amplitude_N=0.1)], "what its cables take"),
     ):
-        own = solve(robot, pose, effects=acting)
-        (way,) = barriers(own, own)
+        own = seecr.solve(robot, pose, effects=acting)
+        (way,) = seecr.barriers(own, own)
         assert np.isnan(way.energy) and way.why_not.startswith(why)
         assert way.words == f"reachable; no barrier can be given: {way.why_not}"
         assert way.as_json()["why_not"] == way.why_not
 
 
 def test_equilibria_of_something_else_are_refused() -> None:
-    robot = load_robot(model_path("demobot_cogiro"))
-    own, other = solve(robot, robot.reference_pose), solve(robot, [0.5, 0.25, 0.1, 1, 0, 0, 0])
-    with pytest.raises(InputError, match="expected equilibria of one command, got other rest"):
-        barriers(own, other)
+    robot = seecr.load_robot("demobot_cogiro")
+    own, other = (
+        seecr.solve(robot, robot.reference_pose),
+        seecr.solve(robot, [0.5, 0.25, 0.1, 1, 0, 0, 0]),
+    )
+    with pytest.raises(
+        seecr.InputError, match="expected equilibria of one command, got other rest"
+    ):
+        seecr.barriers(own, other)
 
 
 @pytest.mark.slow
 def test_no_barrier_is_lower_than_one_of_its_ends() -> None:
     """A saddle between two other equilibria gave a way back of -794 J, and was called exact."""
-    robot = load_robot(model_path("cogiro_large"))
-    model = load_model(model_path("cogiro_large").with_name("sag.toml"), robot)
+    robot = seecr.load_robot("cogiro_large")
+    model = seecr.load_model(seecr.model_path("cogiro_large").with_name("sag.toml"), robot)
     pose = np.array([3.0, 2.0, 1.5, 1.0, 0.0, 0.0, 0.0])
-    own, every = solve(robot, pose, effects=model), equilibria(robot, pose, effects=model)
-    (way,) = barriers(own, every.rows([-1]))
+    own, every = (
+        seecr.solve(robot, pose, effects=model),
+        seecr.equilibria(robot, pose, effects=model),
+    )
+    (way,) = seecr.barriers(own, every.rows([-1]))
     assert way.energy > 0.0 and way.back > 0.0
     assert way.back == pytest.approx(way.energy + own.energy[0] - every.energy[-1], rel=1e-9)
 
@@ -218,17 +192,17 @@ def test_no_barrier_is_lower_than_one_of_its_ends() -> None:
     "name", ["demobot_cogiro", pytest.param("ipanema", marks=pytest.mark.sweep), "cogiro_large"]
 )
 def test_barriers_of_random_commands_are_as_high_as_both_ends(name: str) -> None:
-    robot, random = load_robot(model_path(name)), np.random.default_rng(5)
+    robot, random = seecr.load_robot(name), np.random.default_rng(5)
     low, high = robot.exit_points.min(axis=0), robot.exit_points.max(axis=0)
     seen = 0
     for _ in range(4):
         place = low + (0.15 + 0.7 * random.random(3)) * (high - low)
         pose = np.concatenate([place, quat_from_rotvec(0.3 * random.normal(size=3))])
-        own, every = solve(robot, pose), equilibria(robot, pose, most=512)
+        own, every = seecr.solve(robot, pose), seecr.equilibria(robot, pose, most=512)
         if not own.converged[0]:
             continue
         others = every.rows(elsewhere(own, every))
-        for way, energy in zip(barriers(own, others), others.energy, strict=True):
+        for way, energy in zip(seecr.barriers(own, others), others.energy, strict=True):
             seen += 1
             assert way.energy >= 0.0 and way.back >= 0.0
             top = evaluated(robot, own.tables, way.pose[None])
@@ -241,15 +215,13 @@ def test_barriers_of_random_commands_are_as_high_as_both_ends(name: str) -> None
 def test_a_saddle_that_joins_other_equilibria_is_not_called_the_top(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Its highest point is reported instead: an upper bound."""
-    robot = load_robot(model_path("demobot_cogiro"))
-    pose = robot.reference_pose
+    """Its highest point is reported instead, an upper bound, if both sides lead to the first."""
+    robot = seecr.load_robot("demobot_cogiro")
     turned = np.array([[0.4, 0.25, 0.15, *quat_from_rotvec(np.array([2.0, 0.0, 0.0]))]])
-    own, other = solve(robot, pose), solve(robot, pose, start=turned)
-    (way,) = barriers(own, other)
-    assert way.exact
-    # a saddle from which both sides lead to the first
-    monkeypatch.setattr(saddles, "_sides", lambda *_: (own.pose, own.pose))
-    (bound,) = barriers(own, other)
-    assert not bound.exact and bound.energy >= way.energy * (1.0 - 1e-6)
+    pose = robot.reference_pose
+    own, other = seecr.solve(robot, pose), seecr.solve(robot, pose, start=turned)
+    (way,) = seecr.barriers(own, other)
+    monkeypatch.setattr("seecr.equilibrium.saddles.beside", lambda *_: (own.pose, own.pose))
+    (bound,) = seecr.barriers(own, other)
+    assert way.exact and not bound.exact and bound.energy >= way.energy * (1.0 - 1e-6)
     assert bound.words.startswith("twisted, at most ")

@@ -9,8 +9,7 @@ import pytest
 from random_robots import KINDS, random_poses, random_robot, write_mjcf
 
 from crosscheck.settle.settler import Settler
-from seecr.description.mjcf import load_robot
-from seecr.equilibrium.solving import solve
+from seecr import load_robot, solve
 from seecr.pose import pose_difference
 
 SEEDS = range(5)

@@ -8,11 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from seecr.description.mjcf import load_robot, model_path
-from seecr.description.robot import Robot
-from seecr.equilibrium.solving import solve
-from seecr.errors import InputFileError
-from seecr.prediction.model import DataReach, Model, load_model
+from seecr import InputFileError, Model, Robot, load_model, load_robot, solve
+from seecr.prediction.model import DataReach
 
 TABLE = """
 [[effect]]
@@ -30,7 +27,7 @@ LENGTH = 0.5
 
 @pytest.fixture(scope="module")
 def robot() -> Robot:
-    return load_robot(model_path("demobot_cogiro"))
+    return load_robot("demobot_cogiro")
 
 
 def model_of(text: str, folder: Path, robot: Robot) -> Model:

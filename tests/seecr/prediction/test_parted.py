@@ -5,12 +5,9 @@ from __future__ import annotations
 import numpy as np
 from made_data import soft_cogiro, term
 
-from seecr.commands import Commands
-from seecr.effects import Own, Term, Terms, apart
-from seecr.prediction.experiment import Experiment
+from seecr import Commands, Experiment, Term, Terms, sensitivities
+from seecr.effects import Own, apart
 from seecr.prediction.parted import Parted, rates
-from seecr.prediction.sensitivity import sensitivities
-from seecr.statics import batch
 
 ROBOT = soft_cogiro()
 POSES = np.tile(ROBOT.reference_pose, (6, 1)) + np.linspace(-0.05, 0.05, 6)[:, None] * np.array(
@@ -167,6 +164,8 @@ def test_history_stays_within_its_file():
     rows = FILES == "a"
     alone = Experiment(ROBOT, Commands(POSES[rows])).predict(friction.only(["hysteresis"]).effects)
     assert found.has_history
+    needed = Parted(ROBOT, commands()).predict(friction.effects, needed=FILES != "c")
+    np.testing.assert_array_equal(needed.pose, found.pose)
     np.testing.assert_allclose(found.pose[rows], alone.pose, atol=1e-12)
 
 
@@ -176,20 +175,3 @@ def test_a_term_says_where_its_values_come_from_and_what_is_impossible_is_seen()
     assert own("platform_mass", added_kg=[0.1, 0.2]).is_possible(ROBOT)
     assert heavy.layout.names == ("a: added_kg", "b: added_kg")
     assert Term(heavy.layout, heavy.vector, own=Own("file", {})).with_vector(heavy.vector).own
-
-
-def test_rows_that_are_needed_are_those_of_each_part(monkeypatch):
-    friction = Terms(
-        [term(ROBOT, "hysteresis", amplitude_N=0.05), own("tracker_frame", shift_x_m=[0.01, 0.02])]
-    )
-    walk, asked = batch.walk, []
-
-    def spied(tables, path, limit, needed):
-        asked.append(needed)
-        return walk(tables, path, limit, needed)
-
-    monkeypatch.setattr(batch, "walk", spied)
-    needed = np.array([True, False, True, True, True, False])
-    found = Parted(ROBOT, commands()).predict(friction.effects, needed=needed)
-    assert [rows.tolist() for rows in asked] == [needed[rows].tolist() for rows in found.rows]
-    assert found.solved.all() and len(asked) == 3

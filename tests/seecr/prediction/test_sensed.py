@@ -9,14 +9,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from seecr import Commands, Term, correct, load_robot, placed, tracked
 from seecr.cli import main
-from seecr.commands import Commands
 from seecr.description.joints import off_joints
-from seecr.description.mjcf import load_robot, model_path
-from seecr.effects import Term
-from seecr.inverse.correction import correct
 from seecr.pose import pose_difference, quat_rotate
-from seecr.prediction.experiment import placed, tracked
 
 NAME = "demobot_cogiro"
 
@@ -32,7 +28,7 @@ def text_of(*terms: Term) -> str:
 
 
 def test_a_platform_is_placed_where_its_tracker_reads_what_is_wanted() -> None:
-    robot = load_robot(model_path(NAME))
+    robot = load_robot(NAME)
     target = Term.of(robot, "tracker_target", shift_z_m=0.05)
     frame = Term.of(robot, "tracker_frame", shift_x_m=0.002, rotation_z_rad=0.01)
     wanted = Commands(np.tile(robot.reference_pose, (3, 1)) + 0.01 * np.eye(3, 7))
@@ -50,7 +46,7 @@ def test_a_platform_is_placed_where_its_tracker_reads_what_is_wanted() -> None:
 
 def test_on_joints_readings_are_as_near_as_these_allow(tmp_path: Path) -> None:
     """A tracker that stands a little askew reads no planar robot in its plane: it was refused."""
-    robot = load_robot(model_path("planar_vertical"))
+    robot = load_robot("planar_vertical")
     frame = Term.of(robot, "tracker_frame", shift_x_m=0.002, rotation_x_rad=0.001)
     target = Term.of(robot, "tracker_target", shift_z_m=0.05)
     poses = np.tile(robot.reference_pose, (3, 1))
@@ -74,7 +70,7 @@ def test_on_joints_readings_are_as_near_as_these_allow(tmp_path: Path) -> None:
 def test_the_command_tells_of_the_tracker(tmp_path: Path) -> None:
     poses, model = tmp_path / "wanted.csv", tmp_path / "model.toml"
     poses.write_text("cmd_x_m,cmd_y_m,cmd_z_m\n0.4,0.25,0.2\n0.45,0.25,0.2\n")
-    robot = load_robot(model_path(NAME))
+    robot = load_robot(NAME)
     frame = Term.of(robot, "tracker_frame", shift_x_m=0.002)
     model.write_text(text_of(frame, Term.of(robot, "tracker_target", shift_z_m=0.05)))
     args = ["correct", NAME, str(poses), "--out", str(tmp_path / "out")]

@@ -9,17 +9,17 @@ import pytest
 from effect_cases import KINDS, experiment_of, random_term, robot_of, worst_mismatch
 from random_robots import random_poses
 
-from seecr.commands import Commands
-from seecr.compiled.columns import REST, STRAIN
-from seecr.effects import Term, Terms, effect_named, layout_of
-from seecr.equilibrium.solving import solve
+import seecr
+from seecr.compiled.columns import ARM, FORCE, REST, STRAIN
 from seecr.pose import Array, pose_difference
-from seecr.prediction.experiment import Experiment
+from seecr.prediction import sensitivity
+from seecr.prediction.parted import forget
 from seecr.prediction.sensitivity import (
+    are_by_point,
+    cable_rates,
     length_sensitivities,
     read_by_length,
     readings_difference,
-    sensitivities,
 )
 
 
@@ -33,7 +33,7 @@ def test_by_rest_lengths_as_solving_again_gives(kind: str) -> None:
     for i in range(robot.n_cables):
         step = np.zeros(robot.n_cables)
         step[i] = 1e-6 * robot.length
-        ahead, behind = (solve(robot, poses, rest_lengths=rest + s * step) for s in (1, -1))
+        ahead, behind = (seecr.solve(robot, poses, rest_lengths=rest + s * step) for s in (1, -1))
         move = pose_difference(ahead.pose, behind.pose) / (2 * step[i])
         pull = (ahead.tensions - behind.tensions) / (2 * step[i])
         assert found[:, :6, i] == pytest.approx(move, rel=1e-4, abs=1e-5 * np.abs(move).max())
@@ -69,11 +69,11 @@ def test_a_constant_moment_has_no_potential_and_is_accounted_for(kind: str, seed
     """It skews the stiffness, which an energy's second derivative cannot show."""
     experiment = experiment_of(kind, seed=seed)
     rng = np.random.default_rng(seed)
-    terms = Terms([random_term(rng, experiment, "external_wrench", part=3.0)])
+    terms = seecr.Terms([random_term(rng, experiment, "external_wrench", part=3.0)])
     at = experiment.predict(terms.effects)
     if not np.all(at.solved):
         pytest.skip("this robot does not hold against such a moment")
-    worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
+    worst, whose = worst_mismatch(experiment, terms, seecr.sensitivities(experiment, terms, at))
     assert worst < 1e-4, whose
 
 
@@ -81,11 +81,11 @@ def test_columns_picks_parameters_through_all_terms() -> None:
     experiment = experiment_of("demobot_cogiro")
     rng = np.random.default_rng(0)
     names = ("pulley_radius", "drum_gain", "tracker_target")
-    terms = Terms(random_term(rng, experiment, name) for name in names)
+    terms = seecr.Terms(random_term(rng, experiment, name) for name in names)
     at = experiment.predict(terms.effects)
-    whole = sensitivities(experiment, terms, at)
+    whole = seecr.sensitivities(experiment, terms, at)
     assert whole.shape == (6, 14, 1 + 8 + 6)
-    some = sensitivities(experiment, terms, at, columns=(9, 0, 3))
+    some = seecr.sensitivities(experiment, terms, at, columns=(9, 0, 3))
     assert some == pytest.approx(whole[..., [9, 0, 3]], rel=1e-12, abs=1e-12)
 
 
@@ -93,11 +93,11 @@ def test_columns_picks_parameters_through_all_terms() -> None:
 def test_history_that_is_not_there_yet_is_seen_from_its_null(name: str) -> None:
     """One-sided: its amplitude cannot be negative."""
     experiment = experiment_of("demobot_parallel", seed=3)
-    layout = layout_of(effect_named(name), experiment.robot)
+    layout = seecr.layout_of(seecr.effect_named(name), experiment.robot)
     shapes = layout.effect.shapes(experiment.setup([]))
-    term = Term(layout, layout.start(shapes[len(shapes) // 2]))
+    term = seecr.Term(layout, layout.start(shapes[len(shapes) // 2]))
     plain = experiment.predict([term.effect()])
-    found = sensitivities(experiment, Terms([term]), plain)[..., 0]
+    found = seecr.sensitivities(experiment, seecr.Terms([term]), plain)[..., 0]
     step = 1e-4 * layout.scale[0]
     vector = term.vector.copy()
     vector[0] = step
@@ -112,7 +112,7 @@ def test_history_that_is_not_there_yet_is_seen_from_its_null(name: str) -> None:
 
 def test_at_a_bound_the_difference_stays_inside() -> None:
     experiment = experiment_of("demobot_cogiro")
-    layout = layout_of(effect_named("pulley_radius"), experiment.robot)
+    layout = seecr.layout_of(seecr.effect_named("pulley_radius"), experiment.robot)
     seen: list[float] = []
 
     class Watched(layout.effect):  # type: ignore[name-defined,misc]
@@ -120,34 +120,21 @@ def test_at_a_bound_the_difference_stays_inside() -> None:
             seen.append(self.radius)
             super().edit_setup(setup)
 
-    term = Term(replace(layout, effect=Watched), layout.null)
+    term = seecr.Term(replace(layout, effect=Watched), layout.null)
     at = experiment.predict([term.effect()])
-    found = sensitivities(experiment, Terms([term]), at)
+    found = seecr.sensitivities(experiment, seecr.Terms([term]), at)
     assert min(seen) >= 0.0 and max(seen) > 0.0
     assert np.abs(found).max() > 1e-2
-
-
-def test_sensitivities_do_not_care_where_the_rows_stand() -> None:
-    robot = robot_of("demobot_cogiro")
-    poses = random_poses(np.random.default_rng(0), robot, 5)
-    order = np.array([3, 0, 4, 1, 2])
-    both = []
-    for rows in (poses, poses[order]):
-        experiment = Experiment(robot, Commands(rows))
-        terms = Terms([random_term(np.random.default_rng(1), experiment, "anchor_point_error")])
-        at = experiment.predict(terms.effects)
-        both.append(sensitivities(experiment, terms, at))
-    assert both[1] == pytest.approx(both[0][order], rel=1e-6, abs=1e-9)
 
 
 def test_a_row_that_is_free_to_move_gives_finite_numbers() -> None:
     """Three cables through one line leave a swing: its direction is no one's to say."""
     robot = replace(robot_of("demobot_cogiro"), anchor_points=np.zeros((8, 3)))
-    experiment = Experiment(robot, Commands(robot.reference_pose[None]))
+    experiment = seecr.Experiment(robot, seecr.Commands(robot.reference_pose[None]))
     at = experiment.predict()
     assert at.singular.tolist() == [True] and not at.solved.any()
-    layout = layout_of(effect_named("stiffness"), robot)
-    found = sensitivities(experiment, Terms([Term(layout, layout.null)]), at)
+    layout = seecr.layout_of(seecr.effect_named("stiffness"), robot)
+    found = seecr.sensitivities(experiment, seecr.Terms([seecr.Term(layout, layout.null)]), at)
     assert np.all(np.isfinite(found))
     assert np.abs(found[:, 3:6]).max() < 1e-6 and found[0, 2, 0] > 0  # stiffer: higher
 
@@ -157,9 +144,9 @@ def test_the_planes_of_hanging_cables_tilt_with_gravity() -> None:
     experiment = experiment_of("demobot_cogiro")
     rng = np.random.default_rng(3)
     names = ("gravity_tilt", "cable_weight")
-    terms = Terms(random_term(rng, experiment, name) for name in names)
+    terms = seecr.Terms(random_term(rng, experiment, name) for name in names)
     at = experiment.predict(terms.effects)
-    worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
+    worst, whose = worst_mismatch(experiment, terms, seecr.sensitivities(experiment, terms, at))
     assert worst < 1e-4, whose
 
 
@@ -167,26 +154,26 @@ def test_a_platform_that_stands_still_turns_no_cable_round() -> None:
     """Where nothing moves a cable is stiff either way, by different amounts."""
     robot = robot_of("demobot_cogiro")
     poses = random_poses(np.random.default_rng(3), robot, 3)[[0, 1, 1, 1, 2]]
-    experiment = Experiment(robot, Commands(poses, run=np.zeros(5, dtype=np.int64)))
+    experiment = seecr.Experiment(robot, seecr.Commands(poses, run=np.zeros(5, dtype=np.int64)))
     rng = np.random.default_rng(2)
     names = ("hysteresis", "exit_friction", "pulley_radius", "centre_of_mass", "drum_gain")
-    terms = Terms(random_term(rng, experiment, name) for name in names)
+    terms = seecr.Terms(random_term(rng, experiment, name) for name in names)
     at = experiment.predict(terms.effects)
     assert np.abs(at.pose[1] - at.pose[3]).max() < 1e-12
-    worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
+    worst, whose = worst_mismatch(experiment, terms, seecr.sensitivities(experiment, terms, at))
     assert worst < 1e-4, whose
 
 
 def test_friction_that_is_not_there_yet_has_its_cable_behind_the_exit_point() -> None:
     """Beside another effect with history, whose way was walked without that cable."""
     experiment = experiment_of("demobot_parallel", seed=3)
-    layout = layout_of(effect_named("exit_friction"), experiment.robot)
-    term = Term(layout, layout.start(layout.effect.shapes(experiment.setup([]))[-1]))
+    layout = seecr.layout_of(seecr.effect_named("exit_friction"), experiment.robot)
+    term = seecr.Term(layout, layout.start(layout.effect.shapes(experiment.setup([]))[-1]))
     creep = random_term(np.random.default_rng(1), experiment, "creep")
-    terms = Terms([creep, term])
+    terms = seecr.Terms([creep, term])
     at = experiment.predict([creep.effect()])
     column = terms.part("exit_friction").start
-    found = sensitivities(experiment, terms, at, columns=[column], frozen=True)[..., 0]
+    found = seecr.sensitivities(experiment, terms, at, columns=[column], frozen=True)[..., 0]
     step = 1e-4 * layout.scale[0]
     vector = term.vector.copy()
     vector[0] = step
@@ -199,9 +186,9 @@ def test_errors_of_lengths_reach_beyond_what_hysteresis_holds() -> None:
     """Stuck, a row seemed to feel half of its lengths' noise, which fits took hysteresis for."""
     robot = robot_of("free")
     poses = random_poses(np.random.default_rng(4), robot, 6)
-    experiment = Experiment(robot, Commands(poses))
-    third = 0.3 * float(layout_of(effect_named("hysteresis"), robot).scale[0])
-    term = Term.of(robot, "hysteresis", amplitude_N=third, stretch_m=1e-9)
+    experiment = seecr.Experiment(robot, seecr.Commands(poses))
+    third = 0.3 * float(seecr.layout_of(seecr.effect_named("hysteresis"), robot).scale[0])
+    term = seecr.Term.of(robot, "hysteresis", amplitude_N=third, stretch_m=1e-9)
     plain, stuck = experiment.predict(), experiment.predict([term.effect()])
     assert stuck.has_history
     free, noisy = read_by_length(plain), read_by_length(stuck)
@@ -214,8 +201,71 @@ def test_errors_of_lengths_reach_beyond_what_friction_holds() -> None:
     robot = robot_of("free")
     poses = np.repeat(random_poses(np.random.default_rng(4), robot, 2), 2, axis=0)
     poses[1::2, 0] -= 1e-5 * robot.length
-    term = Term.of(robot, "exit_friction", friction=0.03, length_m=0.25)
-    at = Experiment(robot, Commands(poses)).predict([term.effect()])
+    term = seecr.Term.of(robot, "exit_friction", friction=0.03, length_m=0.25)
+    at = seecr.Experiment(robot, seecr.Commands(poses)).predict([term.effect()])
     slips, sticks = read_by_length(at)[::2], read_by_length(at)[1::2]
     assert np.linalg.norm(sticks - slips) < 0.01 * np.linalg.norm(slips)
     assert np.linalg.norm(length_sensitivities(at)[1::2] - slips) > 0.05 * np.linalg.norm(slips)
+
+
+# --- Sensitivities to where cables begin and end: by one evaluation of each, and by differences
+
+
+ENDS = ("exit_point_error", "anchor_point_error")
+LAWS = ("nonlinear_elasticity", "hysteresis", "creep", "exit_friction", "frame_compliance")
+LIGHT, HEAVY = ("pulley_radius", *LAWS), ("cable_weight", *LAWS)
+
+
+def predicted(kind: str, names: tuple[str, ...]) -> tuple[seecr.Prediction, seecr.Terms, Array]:
+    """A prediction with such effects beside both ends, and its derivatives, history constant."""
+    experiment, rng = experiment_of(kind, seed=5, reach=0.4), np.random.default_rng(5)
+    terms = seecr.Terms(random_term(rng, experiment, name) for name in (*ENDS, *names))
+    at = experiment.predict(terms.effects)
+    assert at.solved.all()
+    return at, terms, seecr.sensitivities(experiment, terms, at, frozen=True)
+
+
+@pytest.mark.parametrize("names", [(), LIGHT, HEAVY])
+@pytest.mark.parametrize("kind", ["demobot_cogiro", "demobot_parallel", "planar_vertical"])
+def test_they_are_those_of_differences(
+    kind: str, names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at, terms, found = predicted(kind, names)
+    assert are_by_point(at.tables)
+    monkeypatch.setattr(sensitivity, "are_by_point", lambda _tables: False)
+    _at, _terms, differences = predicted(kind, names)
+    for name in ENDS:
+        own = terms.part(name)
+        largest = np.abs(differences[..., own]).max(axis=(0, 2))
+        off = np.abs(found[..., own] - differences[..., own]).max(axis=(0, 2))
+        assert np.all(off <= 1e-6 * largest + 1e-12), name
+
+
+def test_the_stiffness_of_heavy_cables_over_pulleys_is_no_derivative() -> None:
+    """It is the symmetric part of one: differences are taken."""
+    at, _terms, _found = predicted("demobot_cogiro", ("cable_weight", "pulley_radius"))
+    assert not are_by_point(at.tables)
+
+
+@pytest.mark.parametrize("frozen", [True, False])
+@pytest.mark.parametrize("names", [("pulley_radius",), LIGHT])
+def test_what_a_prediction_forgot_is_computed_again(names: tuple[str, ...], frozen: bool) -> None:
+    at, terms, _found = predicted("demobot_cogiro", names)
+    experiment = experiment_of("demobot_cogiro", seed=5, reach=0.4)
+    before, pose = seecr.sensitivities(experiment, terms, at, frozen=frozen), at.pose
+    forget(at)
+    assert at.walk is None and not at.kept
+    assert np.array_equal(at.pose, pose)
+    assert np.array_equal(seecr.sensitivities(experiment, terms, at, frozen=frozen), before)
+
+
+def test_the_force_is_what_the_platform_is_held_with() -> None:
+    at, _terms, _found = predicted("demobot_cogiro", LIGHT)
+    rates = cable_rates(at)
+    force, arm = rates[..., FORCE : FORCE + 3], rates[..., ARM : ARM + 3]
+    assert np.linalg.norm(force, axis=2) == pytest.approx(at.tensions, rel=1e-9)
+    weight, length = at.setup.mass * at.setup.gravity, at.setup.robot.length
+    off = 1e-6 * float(np.linalg.norm(weight))
+    assert force.sum(axis=1) == pytest.approx(np.tile(-weight, (6, 1)), abs=off)
+    moment = np.cross(arm, force).sum(axis=1)
+    assert np.abs(moment).max() < off * length

@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 from calibrated import POSES, ROBOT, model_of
 
-from seecr.effects import Term, Terms
-from seecr.equilibrium.solving import solve
-from seecr.errors import InputFileError
+from seecr import InputFileError, Term, Terms, solve, spread_of
 from seecr.files import json_text
 from seecr.pose import pose_difference
-from seecr.prediction.uncertainty import covariance_of, spread_of
+from seecr.prediction.uncertainty import covariance_of
 from seecr.show.batch_words import sweep_lines
 from seecr.show.files import SweepRows
 from seecr.show.pose_words import cable_lines, pose_lines

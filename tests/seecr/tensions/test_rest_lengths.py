@@ -5,14 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seecr.commands import Commands
+from seecr import Commands, Effect, Experiment, Robot, load_robot
 from seecr.compiled.columns import TENSION
-from seecr.description.mjcf import load_robot, model_path
-from seecr.description.robot import Robot
-from seecr.effects.base import Effect
 from seecr.effects.cable import CableWeight
 from seecr.effects.geometry import FrameCompliance, PulleyRadius
-from seecr.prediction.experiment import Experiment
 from seecr.statics import batch
 from seecr.statics.tables import Tables, assemble
 from seecr.tensions.balance import (
@@ -49,7 +45,7 @@ def tensions_of(tables: Tables, rest: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("times", [1.0, 1.5, 4.0, 50.0])
 def test_a_cable_has_the_tension_its_length_is_for(times: float) -> None:
-    robot = load_robot(model_path("cogiro_large"))
+    robot = load_robot("cogiro_large")
     tables = tables_at(robot, all_over(robot))
     wanted = times * least_of_heavy(tables)
     # what is left: the stretch of a cable is not the mean of its ends
@@ -57,7 +53,7 @@ def test_a_cable_has_the_tension_its_length_is_for(times: float) -> None:
 
 
 def test_cables_without_weight_are_as_long_as_their_stretch_says() -> None:
-    robot = load_robot(model_path("cogiro_large"))
+    robot = load_robot("cogiro_large")
     tables, pulls = tables_at(robot, all_over(robot), 0.0), np.full((3, 8), 300.0)
     assert not least_of_heavy(tables).any()
     np.testing.assert_array_equal(
@@ -67,7 +63,7 @@ def test_cables_without_weight_are_as_long_as_their_stretch_says() -> None:
 
 def test_balance_about_tensions_is_exact_there() -> None:
     """A pose that tensions at their limits hold, far from where cables just pull, is held."""
-    robot = load_robot(model_path("cogiro_large"))
+    robot = load_robot("cogiro_large")
     tables, low, high = tables_at(robot, all_over(robot)[:2]), np.zeros(8), np.full(8, 5000.0)
     first = hold(tables, np.zeros((2, 8)), low, high)
     assert first.fine.all()
@@ -90,7 +86,7 @@ def test_balance_about_tensions_is_exact_there() -> None:
 )
 def test_balance_is_linearised_at_the_tensions_it_is_asked_for(effects: list[Effect]) -> None:
     """Their lengths were approximate: what is left of the balance then is no error of the pose."""
-    robot = load_robot(model_path("cogiro_large"))
+    robot = load_robot("cogiro_large")
     poses = all_over(robot)
     commands = Commands(poses, lengths=robot.commanded_lengths(poses), told=True)
     tables = assemble(Experiment(robot, commands).setup(effects))
@@ -103,7 +99,7 @@ def test_balance_is_linearised_at_the_tensions_it_is_asked_for(effects: list[Eff
 
 def test_cables_that_pull_nothing_are_longer_than_their_span() -> None:
     """A slack cable that is just as long would pull as soon as the platform moves a little."""
-    robot = load_robot(model_path("demobot_parallel"))
+    robot = load_robot("demobot_parallel")
     apart = np.random.default_rng(0).random((40, 3)) - 0.5
     poses = np.tile(robot.reference_pose, (40, 1))
     poses[:, :3] += np.ptp(robot.exit_points, axis=0) * [0.6, 0.6, 0.18] * apart
@@ -122,7 +118,7 @@ def test_cables_that_pull_nothing_are_longer_than_their_span() -> None:
 
 def test_lengths_that_are_lost_are_sought_from_the_start() -> None:
     """Where lengths held before do not lead to any, as if nothing had been held before."""
-    robot = load_robot(model_path("cogiro_large"))
+    robot = load_robot("cogiro_large")
     tables, m = tables_at(robot, all_over(robot)), robot.n_cables
     low, high, aim = np.full(m, 50.0), np.full(m, np.inf), np.full((len(tables), m), 50.0)
     held = hold(tables, aim, low, high)
