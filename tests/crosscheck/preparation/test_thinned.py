@@ -139,7 +139,6 @@ def test_what_was_filled_in_is_no_part_of_what_is_told_of_the_others() -> None:
 @pytest.mark.slow
 def test_a_diagnosis_of_some_rows_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     few = functools.partial(thinned, most=80)
-    monkeypatch.setattr("crosscheck.diagnosis.diagnose.thinned", few)
     monkeypatch.setattr("crosscheck.calibration.thinned", few)
     twin = crosscheck.make_twin(ROBOT, seed=4, effects=["pulley_radius"])
     found = crosscheck.diagnose(ROBOT, twin.measured, only="pulley_radius")
