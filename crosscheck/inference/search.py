@@ -55,7 +55,7 @@ _MINIMUM = 8.0
 # An effect that waits joins the fit of all effects if it promises this much ln evidence.
 _PAYS = 2.0
 # Fits of more effects than are a diagnosis take longer, and only what all of them do together is
-# asked of them: one counts as so many. Of more than twice as many, one is all.
+# asked of them: one counts as so many.
 _LONG = 4
 # Effort: most hypotheses that are fitted about one linear model, and most linear models about
 # better and better hypotheses.
@@ -573,16 +573,21 @@ class Search:
                 break
         own = [k for k in centre.key if is_field(k)]
         # with noise of its own a field may be worth more
-        self._fit_best(scores, centre, dict.fromkeys(end | {kind} for kind in [*kinds[:1], *own]))
+        first = dict.fromkeys(end | {kind} for kind in [*kinds[:1], *own])
+        self._fit_best(scores, centre, first)
 
     def _fit_best(self, scores: Scores, centre: Hypothesis, first: Iterable[Key]) -> None:
-        """Fit some hypotheses and what a linear model considers best, within the budget."""
+        """Fit some hypotheses, and what a linear model considers best, within the budget."""
         seen, done = scores.seen, 0
         top = max(seen.values())
-        best = [k for k in scores.best(4 * _FITS) if not (k > centre.key and seen[k] < top - EQUAL)]
-        for key in [*first, *best]:
-            if done < _FITS:
+        for key in first:
+            self._fit_new(scores, key)
+        met = any(map(self._is_endless, first))
+        for key in scores.best(4 * _FITS):
+            adds = key > centre.key and seen[key] < top - EQUAL
+            if not adds and done < _FITS and not (met and self._is_endless(key)):
                 done += self._fit_new(scores, key)
+                met = met or self._is_endless(key)
 
     def _fit_new(self, scores: Scores, key: Key) -> int:
         """Fit a hypothesis unless that was done; what it counts.
@@ -597,8 +602,7 @@ class Search:
                 return 0
             self._again.add((key, scores.centre.key))
         self.fit(scores, key)
-        count = len(bare(key) - self.stood)
-        return 1 if count <= FEW else _LONG if count <= 2 * FEW else _FITS
+        return 1 if len(bare(key) - self.stood) <= FEW else _LONG
 
     def _close(self) -> None:
         """Fit the neighbours of the best that are near, until none is better."""
