@@ -366,7 +366,8 @@ def found_covariance(found: Diagnosis) -> Array | None:
     # some are wider still, by what a further effect would do to them
     listed = np.concatenate([one.stderr for one in found_effects(found)]) ** 2
     seen = np.isfinite(listed) & np.isfinite(np.diag(whole))
-    whole[np.diag_indices_from(whole)] += np.where(seen, listed - np.diag(whole), 0.0).clip(0.0)
+    at = np.flatnonzero(seen)
+    whole[at, at] = np.maximum(whole[at, at], listed[at])
     return np.asarray(whole)
 
 
