@@ -655,7 +655,11 @@ def page_of(found: dict[str, Any]) -> str:
         _words_table("nothing is missing; the noise is", found["nulls"]),
         _words_table("something unknown is there", found["unknown"]),
         "Called unknown, by what it does that no effect that acts at once could imitate: "
-        + ", ".join(f"{n} of {m} {size} σ" for size, (n, m) in found["unknown_by_size"].items())
+        + ", ".join(
+            f"{n} of {m} {'' if size.startswith('from') else 'at '}{size} σ"
+            for size, (n, m) in found["unknown_by_size"].items()
+            if m
+        )
         + ".",
     ]
     return "\n\n".join(parts)
