@@ -27,8 +27,8 @@ from seecr.pose import Array
 
 # Prior width of each degree of a smooth field over that of the degree before.
 _SMOOTH = 0.3
-# A wave over the room is forgotten after this part of half its range: a cubic follows longer ones,
-# and shorter ones pass between readings that stand as far apart as a dozen on a line do.
+# A wave over the room is forgotten after this part of half its range: a cubic follows longer ones.
+# Shorter ones would need more columns than 144 rows can bear.
 _SHORT = 0.3
 # Of more cables than these, pairs have no numbers of their own: they would be hundreds.
 _MOST_CABLES = 12
