@@ -140,7 +140,9 @@ def row(lab: Lab) -> str:
 
 def _cells(lab: Lab) -> tuple[str, ...]:
     hidden = lab.answer["hidden"]
-    options = [_OPTIONS.get(k, {}).get(value, "") for k, value in lab.answer["options"].items()]
+    options = [
+        _OPTIONS.get(k, {}).get(value, "") for k, value in lab.answer.get("options", {}).items()
+    ]
     return (
         _HIDDEN.get(hidden[0]) or ", ".join(f"`{name}`" for name in hidden),
         ", ".join(filter(None, options)),
