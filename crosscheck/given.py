@@ -16,6 +16,7 @@ from seecr.description.mjcf import GivenRobot, load_robot, robot_file, robot_of
 from seecr.description.robot import Robot
 from seecr.effects import Term, Terms, catalogue, effect_named
 from seecr.errors import InputError, RobotError
+from seecr.folders import check_ours
 from seecr.pose import Array
 from seecr.prediction.model import Model, effects_given, model_given, new_model, no_effects
 
@@ -24,6 +25,7 @@ __all__ = [
     "GivenRobot",
     "basis_of",
     "check_above_zero",
+    "check_case",
     "considered",
     "copy_robot",
     "file_of",
@@ -82,6 +84,21 @@ def copy_robot(source: Path, copy: Path) -> None:
             f"{source}: needs other files, which a case folder does not have; expected an "
             "MJCF that stands alone"
         ) from None
+
+
+def check_case(out: str | Path, files: Iterable[str], robot: Path) -> None:
+    """Check that a case may be written into a folder, before the work that it is for.
+
+    Args:
+        out: the folder. files: the names of its files. robot: copied to ``robot.xml`` there,
+            which it may be itself.
+
+    Raises:
+        InputFileError: it holds files of these names that no command wrote.
+    """
+    copy = Path(out) / "robot.xml"
+    same = copy.exists() and robot.exists() and copy.samefile(robot)
+    check_ours(Path(out), {*files} - ({copy.name} if same else set()))
 
 
 def file_of(given: GivenRobot) -> Path:

@@ -13,11 +13,9 @@ import json
 import math
 import os
 import re
-import secrets
-import shutil
 import tempfile
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from datetime import date
@@ -192,109 +190,9 @@ def check_writable(path: Path) -> None:
         raise InputFileError.at(path, f"cannot be written: {what}; expected the name of a file")
 
 
-def check_replaces(
-    out: str | Path, names: Sequence[str], mark: str, same: Mapping[str, Path] | None = None,
-    read: Iterable[Path | None] = (),
-) -> None:  # fmt: skip
-    """Check that files in a folder belong to an older result before new ones replace them.
-
-    Measurements, and poses that somebody wrote by hand, cannot be made again.
-
-    Args:
-        out: the folder; it need not exist yet.
-        names: of the files to be written. mark: a file that only such a result has.
-        same: by name, the file that it is a copy of; it may already be that file.
-        read: files that :func:`staged` is told of; it says what is wrong with them.
-
-    Raises:
-        InputFileError: there are files of these names without the mark.
-    """
-    out = Path(out)
-    there = [name for name in names if (out / name).exists()]
-    if (out / mark).exists():
-        return
-    said = [path for path in read if path is not None and path.exists()]
-    for name in there:
-        if any((out / name).samefile(path) for path in said):
-            continue
-        copied = (same or {}).get(name)
-        if copied is None or not copied.exists() or not (out / name).samefile(copied):
-            raise InputFileError.at(
-                out / name,
-                f"would be overwritten, but is not part of an older result: there is no {mark} "
-                "next to it; expected a new folder or that of an older result; name one with --out",
-            )
-
-
-@contextmanager
-def staged(
-    out: str | Path, option: str = "--out", sometimes: Iterable[str] = (),
-    read: Iterable[Path | None] = (),
-) -> Iterator[Path]:  # fmt: skip
-    """A temporary folder whose files move into ``out`` if the block ends without an error.
-
-    It lies inside ``out``, so that moving is renaming; if the block fails, ``out`` is as it was.
-
-    Args:
-        out: the folder of results, made if need be.
-        option: the option that named it, for the error.
-        sometimes: names of files that only some results have. If they are not written now they are
-            removed, since they belong to an older result; nothing else is.
-        read: files that the results are made from; they are neither overwritten nor removed.
-
-    Raises:
-        InputError: the folder cannot be made or written to; this comes before any work is done.
-        InputFileError: a result has the name of a file that was read; for ``sometimes`` this, too,
-            comes before any work is done.
-    """
-    out, sometimes, read = Path(out), {*sometimes}, [*read]
-    for name in sorted(sometimes):
-        _check_not_read(out / name, read, option)
-    made, folder, done = _missing(out), out / f".unfinished-{secrets.token_hex(4)}", False
-    try:  # from before the folder is made: whoever ends the program then leaves nothing either
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-            folder.mkdir(mode=0o700)
-        except OSError as error:
-            raise InputError(
-                f"{option} {out}: cannot write there: {reason_of(error)}; expected a folder that "
-                "can be made or written to"
-            ) from None
-        yield folder
-        written_now = sorted(folder.iterdir())
-        for file in written_now:
-            _check_not_read(out / file.name, read, option)
-        for file in written_now:
-            file.replace(out / file.name)
-        for name in sometimes - {file.name for file in written_now}:
-            if (out / name).is_file():
-                (out / name).unlink()
-        done = True
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-        for above in () if done else made:
-            if above.is_dir() and not any(above.iterdir()):
-                above.rmdir()
-
-
-def _check_not_read(path: Path, read: Iterable[Path | None], option: str) -> None:
-    """Check that a file to be written or removed is none of those that were read."""
-    there = [one for one in read if one is not None and one.exists()]
-    if path.exists() and any(path.samefile(one) for one in there):
-        raise InputFileError.at(
-            path,
-            f"would be overwritten, but was read; expected another folder; name one with {option}",
-        )
-
-
 def with_toml(path: Path | None) -> list[Path]:
     """A file of commands and the TOML beside it, which is read with it; empty without a file."""
     return [] if path is None else [path, path.with_suffix(".toml")]
-
-
-def _missing(path: Path) -> list[Path]:
-    """The folders that do not exist yet, innermost first."""
-    return [folder for folder in (path, *path.parents) if not folder.exists()]
 
 
 def json_text(document: Mapping[str, Any], indent: int | None = 1) -> str:
@@ -364,14 +262,21 @@ class Made:
         return cls(__version__, command, date.today().isoformat(), hashes)
 
     @property
+    def result(self) -> str:
+        """The identifier of the result: of the version, the command and the files read."""
+        what = json.dumps([self.version, self.command, dict(self.files)], sort_keys=True)
+        return hashlib.sha256(what.encode()).hexdigest()[:_DIGITS]
+
+    @property
     def words(self) -> str:
-        """Command, date and files in one line."""
+        """Command, date, files and the result's identifier in one line."""
         files = ", ".join(f"{name} {digits}" for name, digits in self.files.items())
-        return " · ".join(part for part in (self.command, self.date, files) if part)
+        own = f"result {self.result}"
+        return " · ".join(part for part in (self.command, self.date, files, own) if part)
 
     def as_json(self) -> dict[str, Any]:
         """``made`` in every result."""
         return {
-            "version": self.version, "command": self.command, "date": self.date,
-            "sha256": dict(self.files),
+            "result": self.result, "version": self.version, "command": self.command,
+            "date": self.date, "sha256": dict(self.files),
         }  # fmt: skip

@@ -82,12 +82,13 @@ SHOWING = ("crosscheck.show.", "seecr.show.")
 TRADE = {
     f"{module}.{name}"
     for line in """
-crosscheck.importing: check_case write_case
 crosscheck.model.write: check_place
-crosscheck.planning.write: NAME box_of check_own sometimes_written
+crosscheck.planning.write: NAME box_of planned_files
 crosscheck.suite.cases: select
 crosscheck.suite.run: every_shipped shipped_like
 crosscheck.suite.write: FILE_NAME RESULTS
+crosscheck.given: check_case
+crosscheck.importing: FILES write_case
 crosscheck.twin: FILES
 seecr.columns.commands: read_commands
 seecr.columns.plausible: ABSURD scalar_last
@@ -100,7 +101,8 @@ seecr.effects.base: unfed
 seecr.equilibrium.search: elsewhere on_their_way
 seecr.equilibrium.solving: strained strained_rows
 seecr.exported.export: wrote
-seecr.files: Made check_replaces check_writable json_text staged with_toml write_text write_texts
+seecr.folders: check_ours staged
+seecr.files: Made check_writable json_text with_toml write_text write_texts
 seecr.parallel: processors
 seecr.pose: NORM_TOLERANCE
 seecr.statics.starts: commanded_poses
@@ -150,7 +152,7 @@ def test_commands_use_public_names_and_those_of_their_trade(path: Path) -> None:
 def test_what_is_neither_is_seen() -> None:
     seen = {
         "crosscheck.diagnose": True,
-        "seecr.files.staged": True,
+        "seecr.folders.staged": True,
         "seecr.show.pose_words.pose_lines": True,
         # declared by their modules, and yet no command's
         "crosscheck.given.considered": False,

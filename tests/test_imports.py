@@ -19,7 +19,7 @@ from sources import ROOT, imports, imports_of, modules, name_of, tree_of
 # The rooms, folders or files, floor by floor from the lowest up.
 TABLE = (
     "seecr: errors lazy counted parallel compiled",
-    "seecr: files pose arguments result units",
+    "seecr: files folders pose arguments result units",
     "seecr: description commands columns",
     "seecr: effects statics prediction",
     "seecr: tensions equilibrium inverse workspace exported",
@@ -142,7 +142,7 @@ def test_a_package_is_imported_in_its_places_alone(who: str) -> None:
 # beside it what winches are told, how things are counted, that numbers are numbers, and files.
 SHARED = rooms_of(
     "seecr: errors result pose description.robot description.mjcf effects commands counted "
-    "arguments files"
+    "arguments files folders"
 )
 # What the effects edit, and the path through commands, are SEECR's side of them.
 PHYSICS = rooms_of(

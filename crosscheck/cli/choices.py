@@ -77,7 +77,7 @@ def figures_in(folder: Path | None) -> Iterator[None]:
         yield
         return
     from crosscheck.show.figures import keeping
-    from seecr.files import staged
+    from seecr.folders import staged
 
     with staged(folder, "--figures") as unfinished, keeping(unfinished):
         yield

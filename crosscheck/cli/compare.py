@@ -55,20 +55,22 @@ def command(
     from crosscheck import Limits, Sigma, compare, exceeded, load_limits, load_measurements
     from crosscheck.show.page import write_page
     from seecr import load_model, load_robot, with_history
-    from seecr.files import json_text, staged, write_text
+    from seecr.files import json_text, write_text
+    from seecr.folders import staged
 
     limits = (load_limits(limits_file) if limits_file else Limits()).but(errors)
     machine = load_robot(robot)
     measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     own = load_model(model, machine) if model is not None else None
+    made = options.made_by(machine.source, *data, model)
+    names, sometimes = ["comparison.json", "comparison.html"], ["comparison.rrd"]
     with (
-        staged(out, sometimes=["comparison.rrd"]) as folder,
+        staged(out, names=names, sometimes=sometimes, read=data, made=made) as folder,
         options.progress_share("comparing") as progress,
     ):
         found = compare(machine, measured, own.terms if own else ())
         beyond = exceeded(limits, found)
         status = 1 if beyond else (0 if found.converged else 3)
-        made = options.made_by(machine.source, *data, model)
         stated = {k: v for k, v in vars(limits).items() if v is not None}
         head = {"made": made, "exit_status": status, "limits": stated, "exceeded": beyond}
         notes = own.notes if own else ()

@@ -52,7 +52,8 @@ def command(
     from crosscheck.show.page import write_page
     from seecr import load_model, load_robot, new_model, with_history
     from seecr.description.fingerprint import fingerprint
-    from seecr.files import json_text, staged, write_text
+    from seecr.files import json_text, write_text
+    from seecr.folders import staged
 
     gates = [DiagnosisVerdict.named(word) for word in fail_on]
     tolerance = Tolerance.parsed(tolerances)
@@ -62,13 +63,14 @@ def command(
     own = load_model(model, machine) if model is not None else new_model(machine)
     if model_out is not None:
         check_place(model_out)
-    with staged(out, sometimes=["diagnosis.rrd"]) as folder:
+    made = options.made_by(machine.source, *data, model)
+    names, sometimes = ["diagnosis.json", "diagnosis.html"], ["diagnosis.rrd"]
+    with staged(out, names=names, sometimes=sometimes, read=data, made=made) as folder:
         with options.progress_share("diagnosing") as progress:
             found = diagnose(
                 machine, measured, own, progress, only=only, exclude=exclude,
                 tolerance=tolerance,
             )  # fmt: skip
-        made = options.made_by(machine.source, *data, model)
         text = json_text({"made": made, "robot": fingerprint(machine), **found.as_json()})
         write_text(folder / "diagnosis.json", text + "\n")
         with choices.figures_in(figures):

@@ -90,13 +90,14 @@ def command(
       import.json      what was done
     """
     from crosscheck import ImportChoices, import_case
-    from crosscheck.importing import check_case, write_case
+    from crosscheck.given import check_case
+    from crosscheck.importing import FILES, write_case
     from seecr import load_robot
     from seecr.files import json_text
 
     machine = load_robot(robot)
     choices = ImportChoices.said(machine, **said)
-    check_case(out, robot)
+    check_case(out, FILES, robot)
     with options.progress_share("reading the recordings") as progress:
         found = import_case(form, files, machine, logs, choices)
         made = options.made_by(machine.source, *files, *logs)

@@ -81,12 +81,13 @@ def command(
         got = "neither" if poses is None else "both"
         raise click.UsageError(f"expected POSES.csv or --rows N, got {got}")
     from crosscheck import Sigma, choose_poses, load_commands, make_plan, write_plan
-    from crosscheck.planning.write import NAME, box_of, check_own, sometimes_written
+    from crosscheck.planning.write import NAME, box_of, planned_files
     from crosscheck.show.page import write_page
     from crosscheck.show.plan import print_plan
     from seecr import load_robot
     from seecr.cli.arguments import check_places
-    from seecr.files import json_text, staged, with_toml, write_text
+    from seecr.files import json_text, with_toml, write_text
+    from seecr.folders import staged
 
     machine = load_robot(robot)
     room = box_of(box) if box else None
@@ -95,17 +96,15 @@ def command(
     sigma = Sigma.parsed(sigmas)
     given = None if poses is None else load_commands(poses, machine, sigma=sigma)
     sigma = sigma if given is None else given.sigma
-    if poses is None:
-        check_own(out)
-    sometimes = sometimes_written(out, poses)
-    with staged(out, sometimes=sometimes, read=with_toml(poses)) as folder:
+    made = options.made_by(machine.source, poses)
+    where = planned_files(out, poses)
+    with staged(out, read=with_toml(poses), made=made, **where) as folder:
         with options.progress_share("planning") as progress:
             asked: dict[str, Any] = {"reads": reads, "limits": (lowest, highest), "box": room}
             commands = given or choose_poses(
                 machine, rows or 0, sigma=sigma, progress=progress, **asked
             )
             plan = make_plan(machine, commands, sigma, progress, **asked)
-        made = options.made_by(machine.source, poses)
         status = 0 if plan.converged else 3
         files = write_plan(plan, folder, own=given is None)
         head = {"made": made, "exit_status": status}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -119,13 +119,15 @@ def _run(
     recordings: bool, out: Path,
 ) -> Run:  # fmt: skip
     from crosscheck import run_suite, write_run
-    from crosscheck.suite.write import FILE_NAME
-    from seecr.files import staged
+    from crosscheck.suite.write import FILE_NAME, RESULTS
+    from seecr.folders import staged
     from seecr.parallel import processors
 
     # effects alone have no worst pose
-    sometimes = [FILE_NAME, *(f"{case.name}.rrd" for case in chosen)]
-    with staged(out, sometimes=sometimes) as folder:
+    every = {f"{case.name}.rrd" for case in chosen}
+    names = {RESULTS, "junit.xml", "summary.md", "thresholds.toml", *(every if recordings else ())}
+    where: dict[str, Any] = {"sometimes": {FILE_NAME, *every}, "made": options.made_by()}
+    with staged(out, names=names, **where) as folder:
         with options.progress_bar("compiling", sum(map(len, chosen))) as advance:
             run = run_suite(
                 chosen, thresholds, seed=seed, jobs=jobs or processors(),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from crosscheck.importing.case import Imported, check_case, import_case, write_case
+from crosscheck.importing.case import FILES, Imported, import_case, write_case
 from crosscheck.importing.choices import ImportChoices
 
-__all__ = ["ImportChoices", "Imported", "check_case", "import_case", "write_case"]
+__all__ = ["FILES", "ImportChoices", "Imported", "import_case", "write_case"]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.given import GivenRobot, copy_robot, file_of, numbers_of, robot_of
+from crosscheck.given import GivenRobot, check_case, copy_robot, file_of, numbers_of, robot_of
 from crosscheck.importing.align import (
     LEFT,
     MOST,
@@ -35,7 +35,8 @@ from seecr.columns.csv import table_text
 from seecr.counted import counted
 from seecr.description.robot import Robot
 from seecr.errors import InputError, InputFileError
-from seecr.files import Made, check_replaces, json_text, staged, write_text
+from seecr.files import Made, json_text, write_text
+from seecr.folders import staged
 from seecr.pose import Array
 from seecr.result import Record, Result
 
@@ -210,7 +211,7 @@ def import_case(
     choices.check(form)
     source, robot = None if out is None else file_of(robot), robot_of(robot)
     if out is not None and source is not None:
-        check_case(out, source)
+        check_case(str(out), FILES, source)
     files = [files] if isinstance(files, str | Path) else files
     commands = [commands] if isinstance(commands, str | Path) else commands
     if len(files) != len(commands):
@@ -245,21 +246,12 @@ def import_case(
     return found
 
 
-def check_case(out: str | Path, robot_path: Path) -> None:
-    """Check that a case may be written into a folder, before the work that it is for.
-
-    Raises:
-        InputFileError: it holds measurements or a robot that no import made.
-    """
-    check_replaces(out, FILES, NAME, {"robot.xml": robot_path})
-
-
 def write_case(found: Imported, robot_path: Path, out: Path, made: Made | None = None) -> None:
     """Write the case folder, completely or not at all; ``made`` is its provenance."""
     said = {} if made is None else {"made": made}
-    check_case(out, robot_path)
+    check_case(out, FILES, robot_path)
     read = [file for take in found.takes for file in (take.stream.path, take.held.log.path)]
-    with staged(out, read=read) as folder:
+    with staged(out, read=read, made=made) as folder:
         write_measurements(folder / "measured.csv", found.measured)
         copy_robot(robot_path, folder / "robot.xml")
         rows = found.records()

@@ -41,6 +41,7 @@ from seecr.counted import counted
 from seecr.effects import catalogue
 from seecr.errors import InputError, InputFileError
 from seecr.files import Toml, path_of, read_toml
+from seecr.folders import check_together
 from seecr.pose import Array, rxyz_from_quat
 
 if TYPE_CHECKING:
@@ -461,6 +462,7 @@ def _of_one_clock(given: Commands, robot: Robot) -> Measurements:
 
 
 def _open(path: Path, robot: Robot) -> Columns:
+    check_together(path, path.with_suffix(".toml"))
     return know_columns(read_table(path), robot.n_cables, robot.cable_names)
 
 

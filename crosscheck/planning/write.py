@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from crosscheck.measurements.write import write_measurements
 from crosscheck.planning.planned import Adding
 from crosscheck.planning.proposer import Suggestion
 from crosscheck.planning.result import Plan
-from seecr.errors import InputError, InputFileError
+from seecr.errors import InputError
 from seecr.files import check_writable
 from seecr.pose import Array
 
@@ -52,42 +53,20 @@ def write_plan(plan: Plan, folder: str | Path, own: bool = True) -> tuple[str, .
     return tuple(files)
 
 
-def sometimes_written(out: Path, read: Path | None) -> list[str]:
-    """Names of the files that only some plans have, for :func:`seecr.files.staged`.
+def planned_files(out: Path, read: Path | None) -> dict[str, Any]:
+    """``names`` and ``sometimes`` for :func:`seecr.folders.staged`.
 
-    Users call their own commands ``poses.csv``, too. It is an older plan's only if that plan
-    in ``out`` says that it wrote it, and stays if it is what is planned now, ``read``.
+    Commands that are planned now, ``read``, may be those of an older plan in ``out``: they stay.
     """
-    planned = read is not None and (out / _OWN).resolve() == read.resolve()
-    own = [_OWN] if _OWN in _wrote(out) and not planned else []
-    names = [Path(name) for name in (*own, *map(_addition, Adding))]
-    return [str(one) for name in names for one in (name, name.with_suffix(".toml"))]
+    own = [] if read is not None and (out / _OWN).resolve() == read.resolve() else [_OWN]
+    return {
+        "names": [NAME, "plan.html", *(_with_toml([_OWN]) if read is None else ())],
+        "sometimes": _with_toml([*own, *map(_addition, Adding)]),
+    }
 
 
-def check_own(out: Path) -> None:
-    """Check that chosen poses replace none but those of an older plan.
-
-    Raises:
-        InputFileError: there are others.
-    """
-    there = [out / _OWN, (out / _OWN).with_suffix(".toml")]
-    mine = [path for path in there if path.exists()]
-    if mine and _OWN not in _wrote(out):
-        raise InputFileError.at(
-            mine[0],
-            f"would be overwritten, but is not part of an older result: no {NAME} next to it says "
-            "that it wrote it; expected a new folder or that of an older plan; name one with --out",
-        )
-
-
-def _wrote(out: Path) -> list[object]:
-    """``files`` of the older plan in a folder; nothing if there is none that can be read."""
-    try:
-        older = json.loads((out / NAME).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return []
-    files = older.get("files") if isinstance(older, dict) else None
-    return files if isinstance(files, list) else []
+def _with_toml(names: Iterable[str]) -> list[str]:
+    return [one for name in names for one in (name, str(Path(name).with_suffix(".toml")))]
 
 
 def _addition(kind: Adding) -> str:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.given import GivenRobot, copy_robot, file_of, robot_of
+from crosscheck.given import GivenRobot, check_case, copy_robot, file_of, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import GivenCommands, commands_of
 from crosscheck.measurements.write import write_measurements
@@ -37,7 +37,8 @@ from seecr.arguments import whole
 from seecr.description.mjcf import quiet_mujoco
 from seecr.description.robot import Robot
 from seecr.effects import Term
-from seecr.files import check_replaces, staged, write_text
+from seecr.files import write_text
+from seecr.folders import staged
 from seecr.result import Record, Result
 
 FILES = ("robot.xml", "measured.csv", "measured.toml", NAME)
@@ -131,7 +132,7 @@ def make_twin(
     n_effects = None if n_effects is None else whole(n_effects, "n_effects")
     path, robot = file_of(robot), robot_of(robot)
     if out is not None:
-        check_replaces(out, FILES, NAME, {"robot.xml": path})
+        check_case(out, FILES, path)
     given = None if poses is None else commands_of(poses, robot)
     stated = sigma or (Sigma() if given is None else given.sigma)
     tensions = tensions or stated.tension_N is not None

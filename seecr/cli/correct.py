@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -79,7 +79,8 @@ def command(
     from seecr import InputFileError, correct, kept_chance
     from seecr.cli.arguments import model_at, notes_of, robot_at
     from seecr.columns.commands import read_commands
-    from seecr.files import check_replaces, json_text, staged, with_toml, write_texts
+    from seecr.files import json_text, with_toml, write_texts
+    from seecr.folders import check_ours, staged
     from seecr.show.batch_words import chance_lines, turned_words
     from seecr.show.files import corrected_csv, corrected_toml
 
@@ -98,8 +99,10 @@ def command(
     limits = float("inf") if highest is None else highest
     near = _aim(aim, machine.n_cables)
     commands_of_it = ("corrected.csv", "corrected.toml")
-    check_replaces(out, commands_of_it, "correction.json", read=with_toml(poses))
-    with staged(out, sometimes=commands_of_it, read=with_toml(poses)) as folder:
+    made = options.made_by(machine.source, poses, model)
+    where: dict[str, Any] = {"read": with_toml(poses), "made": made}
+    with staged(out, names=["correction.json"], sometimes=commands_of_it, **where) as folder:
+        check_ours(out, commands_of_it)
         with options.progress_share("correcting") as tell:
             found = correct(
                 machine, wanted.commands, effects=own or (), lowest=lowest, highest=limits,
@@ -116,7 +119,6 @@ def command(
         notes = [*notes_of(own, told, wanted.commands), *wanted.notes, *tracker]
         if turns and found.reached.any():
             notes.append(turned_words(found))
-        made = options.made_by(machine.source, poses, model)
         told_of_it = {"made": made, "exit_status": status, "notes": notes}
         text = json_text({**told_of_it, **found.as_json(kept)})
         files = {"correction.json": text + "\n"}

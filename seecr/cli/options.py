@@ -176,9 +176,11 @@ limits = together(
 )
 
 
-def files_of_pictures(name: str) -> list[str]:
-    """All files of that name that ``--figure`` and ``--no-recording`` write or leave out."""
-    return [f"{name}.{kind}" for kind in ("png", "svg", "rrd")]
+def files_of_pictures(name: str, figure: str, no_recording: bool) -> tuple[set[str], set[str]]:
+    """Pictures of that name: those that ``--figure`` and ``--no-recording`` ask for, and all."""
+    every = {kind: f"{name}.{kind}" for kind in ("png", "svg", "rrd")}
+    now = {figure} | (set() if no_recording else {"rrd"})
+    return {file for kind, file in every.items() if kind in now}, {*every.values()}
 
 
 def turned(of: str) -> Callable[[F], F]:
@@ -277,10 +279,11 @@ def progress_share(text: str) -> Iterator[Callable[[str, float], None]]:
 @contextmanager
 def result_in(out: Path | None, name: str) -> Iterator[Callable[[str], None]]:
     """A function that keeps a result's text in a folder, if any; it is tried before the work."""
-    from seecr.files import staged, write_text
+    from seecr.files import write_text
+    from seecr.folders import staged
 
     if out is None:
         yield lambda _text: None
         return
-    with staged(out) as folder:
+    with staged(out, names=[name]) as folder:
         yield lambda text: write_text(folder / name, text + "\n")

@@ -78,7 +78,8 @@ def command(
     """
     from seecr import midline_points, spread_of
     from seecr.cli.arguments import commands_of, model_at, notes_of, robot_at
-    from seecr.files import check_replaces, json_text, staged, with_toml, write_text
+    from seecr.files import json_text, with_toml, write_text
+    from seecr.folders import check_ours, staged
     from seecr.show.batch_words import jump_lines, span_lines, sweep_lines
     from seecr.show.files import SweepRows, toml_beside
     from seecr.show.pose_words import at_rest
@@ -87,9 +88,12 @@ def command(
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
     commands, more, said, wanted, runs = commands_of(machine, poses, **ways)
-    check_replaces(out, ("sweep.csv", "sweep.toml"), "sweep.json", read=with_toml(poses))
-    sometimes = ("sweep.toml", *options.files_of_pictures("sweep"))
-    with staged(out, sometimes=sometimes, read=with_toml(poses)) as folder:
+    made = options.made_by(machine.source, poses, model)
+    pictures, every = options.files_of_pictures("sweep", figure, no_recording)
+    names, sometimes = {"sweep.json", "sweep.csv", *pictures}, {"sweep.toml", *every}
+    where: dict[str, Any] = {"read": with_toml(poses), "made": made}
+    with staged(out, names=names, sometimes=sometimes, **where) as folder:
+        check_ours(out, ["sweep.toml"])  # it would say what sweep.csv beside it is
         with options.progress_bar("solving", len(commands)) as tell:
             solution, search = _solved(machine, commands, own, follow, method)
             spread = None
@@ -109,7 +113,7 @@ def command(
             said = (*said, _WANTED)
         notes = [*notes_of(own, solution, commands), *said, *gave_up, *why_not, *too_many]
         text = json_text({
-            "made": options.made_by(machine.source, poses, model), "exit_status": status,
+            "made": made, "exit_status": status,
             "robot": machine.name, "cables": machine.cable_names,
             "model": None if own is None else own.names, "notes": notes,
             **({} if search is None else {"search": search}), "zones": spans,

@@ -86,7 +86,8 @@ def command(
     from seecr.cli.arguments import axes_of, model_at, robot_at
     from seecr.columns.plausible import scalar_last
     from seecr.equilibrium.solving import strained
-    from seecr.files import json_text, staged, write_text
+    from seecr.files import json_text, write_text
+    from seecr.folders import staged
     from seecr.show.batch_words import (
         beyond_line,
         edge_line,
@@ -110,7 +111,11 @@ def command(
         "lowest": lowest, "highest": np.inf if highest is None else highest,
         "wrenches": wrenches or None, "effects": own or (),
     }  # fmt: skip
-    with staged(out, sometimes=options.files_of_pictures("map")) as folder:
+    pictures, sometimes = options.files_of_pictures("map", figure, no_recording)
+    made = options.made_by(machine.source, model)
+    # a figure of few axes is not drawn
+    names = {"map.json", "map.npz", *(pictures & {"map.rrd"})}
+    with staged(out, names=names, sometimes=sometimes, made=made) as folder:
         with options.progress_bar("mapping", total) as tell:
             found = workspace_map(
                 machine, *axes, orientation=turned or None, elastic=not no_elastic,
@@ -128,7 +133,7 @@ def command(
             notes += [*own.notes, *beyond_line(found, own.reach)]
         status = 3 if found.elastic and not np.any(found.rests) else 0
         text = json_text({
-            "made": options.made_by(machine.source, model), "exit_status": status, "notes": notes,
+            "made": made, "exit_status": status, "notes": notes,
             **found.as_json(at_least),
             "edge": None if places is None else {"tolerance_m": edge, "places": len(places)},
         })  # fmt: skip

@@ -25,6 +25,7 @@ from seecr.commands import Commands, Loads
 from seecr.description.robot import Robot
 from seecr.errors import InputFileError
 from seecr.files import Toml, read_toml
+from seecr.folders import check_together
 from seecr.pose import Array
 
 # The commands part of the TOML beside a file; the rest of it is about measurements.
@@ -340,6 +341,7 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
         InputFileError: with line and column of the mistake.
     """
     path = Path(path)
+    check_together(path, path.with_suffix(".toml"))
     columns = know_columns(read_table(path), robot.n_cables, robot.cable_names)
     run = runs(columns)
     lengths = command_lengths(columns, robot)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -20,7 +19,6 @@ from seecr.files import (
     read_bytes,
     read_text,
     read_toml,
-    staged,
     with_toml,
     write_text,
     write_texts,
@@ -153,51 +151,6 @@ def test_json_has_null_for_what_is_not_finite() -> None:
     assert plain(np.array(["a"])) == ["a"]
 
 
-def test_what_was_read_is_not_overwritten(tmp_path: Path) -> None:
-    """A sweep of the commands of sweep.csv, written to its own folder, had lost its readings."""
-    measured, other = tmp_path / "sweep.csv", tmp_path / "other.csv"
-    measured.write_text("readings")
-    refused = pytest.raises(InputFileError, match=r"sweep\.csv: would be overwritten, but was")
-    with refused, staged(tmp_path, read=[None, measured]) as folder:
-        (folder / "other.csv").write_text("new")
-        (folder / "sweep.csv").write_text("new")
-    assert measured.read_text() == "readings" and not other.exists()
-    other.write_text("poses")
-    with staged(tmp_path, read=[other]) as folder:
-        (folder / "sweep.csv").write_text("new")
-    assert measured.read_text() == "new"
-
-
-def test_what_was_read_is_not_removed(tmp_path: Path) -> None:
-    """`correct` had removed its own input, which only some of its results would have replaced."""
-    wanted = tmp_path / "corrected.csv"
-    wanted.write_text("poses")
-    worked = False
-    refused = pytest.raises(InputFileError, match=r"corrected\.csv: would be overwritten, but was")
-    read = [None, tmp_path / "no.toml", wanted]
-    with refused, staged(tmp_path, sometimes=["corrected.csv"], read=read):
-        worked = True
-    assert not worked and [file.name for file in tmp_path.iterdir()] == ["corrected.csv"]
-
-
 def test_commands_are_read_with_the_toml_beside_them() -> None:
     assert with_toml(None) == []
     assert with_toml(Path("a/poses.csv")) == [Path("a/poses.csv"), Path("a/poses.toml")]
-
-
-@pytest.mark.parametrize("made", ["results", ".unfinished"])
-def test_whoever_ends_the_program_as_a_folder_is_made_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, made: str
-) -> None:
-    """A signal came between the making of the folder and what removes it, once in many runs."""
-    make = os.mkdir
-
-    def ended(path: str, mode: int = 0o777) -> None:
-        make(path, mode)
-        if Path(path).name.startswith(made):
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(os, "mkdir", ended)
-    with pytest.raises(KeyboardInterrupt), staged(tmp_path / "results"):
-        pytest.fail("nothing is written")
-    assert list(tmp_path.iterdir()) == []

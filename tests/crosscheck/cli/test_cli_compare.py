@@ -11,6 +11,8 @@ import pytest
 from click.testing import Result
 from made_data import refused, run
 
+from seecr.folders import MANIFEST
+
 pytestmark = pytest.mark.slow
 
 Files = tuple[Path, Path]
@@ -38,7 +40,9 @@ def test_without_limits_it_reports_and_ends_0(stiff: Files, out: Path) -> None:
         *("travel +x", "region x", "mm", "deg"),
     ):
         assert words in result.stdout
-    assert {file.name for file in out.iterdir()} == {"comparison.json", "comparison.html"}
+    assert {file.name for file in out.iterdir()} == {
+        "comparison.json", "comparison.html", MANIFEST
+    }  # fmt: skip
     document = comparison(out)
     assert document["is_noise"] is False and document["exit_status"] == 0
     assert document["rows"] == {"all": 64, "compared": 64}

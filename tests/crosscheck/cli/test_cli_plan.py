@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 from made_data import case, refused, run
 
+from seecr.folders import staged
+
 pytestmark = pytest.mark.slow
 
 XML = "planar_vertical"
@@ -117,7 +119,8 @@ def test_a_plan_replaces_an_older_one_but_not_what_it_reads(tmp_path: Path) -> N
     assert "add-payload.csv: would be overwritten, but was read" in text
     assert {file.name: file.read_bytes() for file in out.iterdir()} == written
     # what is planned is not stale, though the older plan wrote it
-    (out / "add-tensions.csv").write_text("of a plan that had an addition more")
+    with staged(out) as older:
+        (older / "add-tensions.csv").write_text("of a plan that had an addition more")
     assert run("plan", XML, out / "poses.csv", *given, "--out", out).exit_code == 0
     assert (out / "poses.csv").read_bytes() == written["poses.csv"]
     assert {file.name for file in out.glob("*.csv")} == {"poses.csv", *plan_in(out)["files"]}

@@ -23,6 +23,7 @@ from crosscheck.suite.cases import shipped_cases
 from crosscheck.twin.robot import TRUE_EFFECTS
 from seecr import __version__, model_path
 from seecr.cli.group import LazyGroup
+from seecr.folders import MANIFEST, staged
 
 SMALL = ("--case", "planar-two-cable", "--no-recordings", "--jobs", "1")
 PLANAR = model_path("planar_vertical")
@@ -58,7 +59,7 @@ def test_agreement_ends_0_and_writes_what_it_promises(out):
     assert result.exit_code == 0 and result.stderr == ""
     assert "SEECR and MuJoCo agree at 24 poses of 1 case; worst difference" in result.stdout
     names = {"results.json", "junit.xml", "summary.md", "worst_pose.xml", "thresholds.toml"}
-    assert {file.name for file in out.iterdir()} == names
+    assert {file.name for file in out.iterdir()} == {*names, MANIFEST}
     assert results(out)["cases"][0]["name"] == "planar-two-cable"
     assert suites(out)[0].get("failures") == "0"
 
@@ -142,7 +143,8 @@ def test_an_effect_is_a_case_like_any_other(out):
 
 @pytest.mark.slow
 def test_effects_alone_run_in_several_processes(tmp_path):
-    (tmp_path / "worst_pose.xml").write_text("of an older run")
+    with staged(tmp_path) as older:
+        (older / "worst_pose.xml").write_text("of an older run")
     result = run("--case", "effect-*-platform_mass", "--jobs", "2", "--out", tmp_path)
     assert result.exit_code == 0
     said = "1 effect on 2 robots against MuJoCo's own means (1): all agree; worst "

@@ -210,19 +210,19 @@ def test_measurements_are_not_replaced_by_those_of_a_twin(stiff: Files, tmp_path
     mine = tmp_path / "measured.csv"
     mine.write_bytes(data.read_bytes())
     said = refused("twin", robot, "--hide", 1, "--out", tmp_path)
-    assert f"{mine}: would be overwritten, but is not part of an older result: there is no" in said
+    assert f"{mine}: would be overwritten, but no command wrote it" in said
     log = tmp_path / "log.csv"
     log.write_text("t_s,x_mm,y_mm,z_mm\n0,1,2,3\n")
     words = ("import", "poses", log, "--robot", robot, "--commands", data)
-    assert "there is no import.json next to it; expected a new folder or that of" in refused(
+    assert "no command wrote it; move it away, or name another folder with --out" in refused(
         *words, "--out", tmp_path
     )
     assert mine.read_bytes() == data.read_bytes()
     poses = tmp_path / "poses.csv"
     poses.write_text("cmd_x_m\n0.4\n")
     said = refused("plan", robot, "--rows", 8, "--out", tmp_path)
-    assert f"{poses}: would be overwritten, but is not part of an older result" in said
+    assert f"{poses}: would be overwritten, but no command wrote it" in said
     # nor if an older plan is there, which was made of them
     (tmp_path / "plan.json").write_text('{"files": ["add-payload.csv"]}')
-    assert "says that it wrote it" in refused("plan", robot, "--rows", 8, "--out", tmp_path)
+    assert "no command wrote it" in refused("plan", robot, "--rows", 8, "--out", tmp_path)
     assert poses.read_text() == "cmd_x_m\n0.4\n"

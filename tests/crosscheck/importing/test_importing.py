@@ -200,7 +200,7 @@ def test_recordings_are_a_case_folder_in_one_call(made, commands, tmp_path):
     assert again.n_rows == found.measured.n_rows
     sent = commands.rename(case / "measured.csv")
     kept = sent.read_bytes()
-    with pytest.raises(InputFileError, match=r"measured\.csv: would be overwritten, but was read"):
+    with pytest.raises(InputFileError, match=r"measured\.csv: would be overwritten, but was"):
         crosscheck.import_case("poses", log, robot, sent, out=case)
     assert sent.read_bytes() == kept
     with pytest.raises(InputError, match=r"^form must be one of motive, vicon, poses, got 'csv'$"):

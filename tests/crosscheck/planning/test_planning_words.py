@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +18,7 @@ from crosscheck.planning.planned import Adding, kinds_of
 from crosscheck.planning.proposer import Gain, Suggestion
 from crosscheck.planning.result import Sight, Visible, alike, gain_words, signal_words
 from crosscheck.planning.visibility import Signal
-from crosscheck.planning.write import slack_remark, sometimes_written
+from crosscheck.planning.write import planned_files, slack_remark
 from seecr.effects import layout_of
 from seecr.errors import InputError
 
@@ -156,22 +155,10 @@ OWN = {"poses.csv", "poses.toml"}
 
 def test_files_of_every_addition_may_be_stale(tmp_path: Path) -> None:
     added = {f"add-{kind.value}.{end}" for kind in Adding for end in ("csv", "toml")}
-    assert set(sometimes_written(tmp_path, None)) == added
-
-
-def test_poses_are_removed_only_if_the_older_plan_wrote_them(tmp_path: Path) -> None:
-    poses, plan = tmp_path / "poses.csv", tmp_path / "plan.json"
-    plan.write_text(json.dumps({"files": ["poses.csv"]}))
-    assert set(sometimes_written(tmp_path, tmp_path / "mine.csv")) > OWN
-    assert not OWN & set(sometimes_written(tmp_path, tmp_path / ".." / tmp_path.name / poses.name))
-    plan.write_text(json.dumps({"files": ["add-payload.csv"]}))
-    assert not OWN & set(sometimes_written(tmp_path, None))
-
-
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"files": 3}'])
-def test_a_file_that_is_no_plan_says_nothing(tmp_path: Path, text: str) -> None:
-    (tmp_path / "plan.json").write_text(text)
-    assert not OWN & set(sometimes_written(tmp_path, None))
+    assert set(planned_files(tmp_path, None)["sometimes"]) == added | OWN
+    assert set(planned_files(tmp_path, None)["names"]) > OWN
+    given = tmp_path / ".." / tmp_path.name / "poses.csv"
+    assert set(planned_files(tmp_path, given)["sometimes"]) == added
 
 
 def test_lines_that_leave_cables_slack_are_remarked_in_the_file_itself() -> None:

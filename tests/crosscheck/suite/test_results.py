@@ -21,7 +21,7 @@ from crosscheck.suite.run import Run, results_json, run_case, verdict_line
 from crosscheck.suite.verdicts import PoseFinding, Verdict
 from crosscheck.suite.write import junit_xml, summary_md, worst_pose, write_worst_pose
 from seecr.description.mjcf import model_path
-from seecr.files import json_text, staged
+from seecr.files import json_text
 
 THRESHOLDS = load_thresholds()
 
@@ -232,19 +232,3 @@ def test_worst_pose_prefers_what_failed(good):
     result, pose = worst_pose([good])
     assert result is good
     assert pose == max(good.worst.values(), key=lambda worst: worst.ratio).pose
-
-
-def test_output_folder_is_complete_or_untouched(tmp_path):
-    out = tmp_path / "a" / "b"
-    with pytest.raises(RuntimeError), staged(out) as folder:
-        (folder / "x").write_text("half")
-        raise RuntimeError
-    assert not (tmp_path / "a").exists()
-    with staged(out) as folder:
-        (folder / "x").write_text("whole")
-    assert [file.name for file in out.iterdir()] == ["x"]
-    with pytest.raises(RuntimeError), staged(out) as folder:
-        (folder / "x").write_text("half")
-        raise RuntimeError
-    assert [file.name for file in out.iterdir()] == ["x"]
-    assert (out / "x").read_text() == "whole"

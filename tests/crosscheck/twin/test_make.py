@@ -29,6 +29,7 @@ from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Term, effect_named, layout_of
 from seecr.errors import InputError, InputFileError
 from seecr.files import json_text
+from seecr.folders import MANIFEST
 from seecr.inverse.correction import correct
 from seecr.pose import pose_difference
 from seecr.prediction.experiment import Experiment
@@ -175,7 +176,7 @@ def is_noise(values):
 def test_a_twin_is_a_case_folder_that_loads(tmp_path):
     twin = make_twin(COGIRO, 3, out=tmp_path, points=POINTS)
     assert {f.name for f in tmp_path.iterdir()} == {
-        "robot.xml", "measured.csv", "measured.toml", NAME
+        "robot.xml", "measured.csv", "measured.toml", NAME, MANIFEST
     }  # fmt: skip
     assert filecmp.cmp(COGIRO, tmp_path / "robot.xml", shallow=False)
     robot = load_robot(tmp_path / "robot.xml")

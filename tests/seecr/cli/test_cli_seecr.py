@@ -20,6 +20,7 @@ from seecr.cli import COMMANDS
 from seecr.cli.arguments import axes_of, robot_at
 from seecr.columns.commands import read_commands
 from seecr.columns.plausible import scalar_last
+from seecr.folders import MANIFEST, staged
 from seecr.pose import transform_points
 from seecr.workspace.grid import own_directions
 from seecr.workspace.planar import midline_point
@@ -38,7 +39,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def names_in(folder: str) -> set[str]:
-    return {file.name for file in Path(folder).iterdir()}
+    """Files of results; the list of them in the folder is not counted."""
+    return {file.name for file in Path(folder).iterdir()} - {MANIFEST}
 
 
 def read(path: str) -> dict[str, Any]:
@@ -292,12 +294,15 @@ def test_sweep_writes_its_files() -> None:
 def test_an_older_result_in_the_same_folder_goes_and_nothing_else() -> None:
     Path("poses.csv").write_text("cmd_x_m,cmd_z_m\n0.4,0.15\n")
     Path("out/sweep.png").mkdir(parents=True)
-    for name in ("sweep.svg", "sweep.rrd", "map.rrd", "mine.png", "sweep.txt"):
-        Path("out", name).write_text("old")
+    with staged("out") as older:
+        for name in ("sweep.svg", "map.rrd"):
+            (older / name).write_text("old")
+    for name in ("sweep.rrd", "mine.png", "sweep.txt"):
+        Path("out", name).write_text("the user's")
     drawn_bare("seecr sweep planar_vertical none.csv --out out", 2)
-    assert Path("out/sweep.rrd").is_file()
+    assert Path("out/sweep.svg").is_file()
     drawn_bare("seecr sweep planar_vertical poses.csv --out out", 0)
-    kept = {"sweep.png", "map.rrd", "mine.png", "sweep.txt"}
+    kept = {"sweep.png", "sweep.rrd", "map.rrd", "mine.png", "sweep.txt"}
     assert names_in("out") == {"sweep.json", "sweep.csv"} | kept
 
 

@@ -221,7 +221,7 @@ def test_files_that_no_older_result_made_are_not_replaced(command: str, own: str
     mine.write_text("mine\n")
     words = f"seecr {command} planar_vertical poses.csv --out out"
     said = refused_in_a_line(words)
-    assert f"{mine}: would be overwritten, but is not part of an older result" in said
+    assert f"{mine}: would be overwritten, but no command wrote it" in said
     assert list(mine.parent.iterdir()) == [mine] and mine.read_text() == "mine\n"
     mine.unlink()
     for _again in range(2):
