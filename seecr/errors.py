@@ -2,7 +2,23 @@
 
 from __future__ import annotations
 
+import unicodedata
 from pathlib import Path
+
+
+def printable(text: str, most: int | None = None) -> str:
+    """Text without control characters, which would steer a terminal or break a file of XML.
+
+    Args:
+        text: such as a name in a user's file. most: characters to show; a longer text is cut.
+    """
+    shown = "".join("\ufffd" if _is_control(letter) else letter for letter in text)
+    return shown if most is None or len(shown) <= most else f"{shown[: most - 1]}…"
+
+
+def _is_control(letter: str) -> bool:
+    """Whether a character is none that people see: control, surrogate, or not a character."""
+    return unicodedata.category(letter) in ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
 
 
 class SeecrError(ValueError):
@@ -61,4 +77,4 @@ class InputFileError(SeecrError):
         if column is not None:
             place.append(f"column {column}")
         start = f"{path}: {', '.join(place)}: " if place else f"{path}: "
-        return cls(" ".join((start + text).split()))
+        return cls(printable(" ".join((start + text).split())))

@@ -13,6 +13,8 @@ import json
 import math
 import os
 import re
+import secrets
+import stat
 import tempfile
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
@@ -28,6 +30,10 @@ import numpy as np
 from seecr import __version__
 from seecr.errors import InputError, InputFileError
 
+UNFINISHED = ".unfinished-"
+"""How names of folders begin whose files are not complete, see :func:`seecr.folders.staged`."""
+# Bytes of a file that is read at once: ten million rows of measurements.
+_LARGEST, _PART = 10**9, 10**7
 _BEGINNINGS = (
     (b"\x89PNG", "a PNG picture"),
     (b"\xff\xd8\xff", "a JPEG picture"),
@@ -53,10 +59,21 @@ def read_bytes(path: Path, expected: str) -> bytes:
     """The bytes of a file; an error says what was expected.
 
     Raises:
-        InputFileError: the file is missing or unreadable.
+        InputFileError: the file is missing, unreadable, a device, or larger than 1 GB.
     """
     try:
-        return path.read_bytes()
+        with path.open("rb") as file:
+            if stat.S_ISCHR(os.fstat(file.fileno()).st_mode) and not file.isatty():
+                raise InputFileError.at(path, f"is a device; {expected}")
+            if os.fstat(file.fileno()).st_size <= _LARGEST:
+                parts: list[bytes] = []
+                while more := file.read(_PART):  # a pipe does not know its size
+                    parts.append(more)
+                    if sum(map(len, parts)) > _LARGEST:
+                        break
+                else:
+                    return b"".join(parts)
+        raise InputFileError.at(path, f"is larger than 1 GB; {expected}")
     except FileNotFoundError:
         raise InputFileError.at(path, f"no such file; {expected}") from None
     except OSError as error:
@@ -145,20 +162,27 @@ def written(*paths: Path, failure: str = "cannot be written") -> Iterator[tuple[
     Raises:
         InputFileError: one of them cannot be written; all are then as they were.
     """
-    temporary = tuple(path.with_name(f".{path.name}.{os.getpid()}.part") for path in paths)
+    temporary = tuple(path.with_name(f".{path.name}.{secrets.token_hex(4)}.part") for path in paths)
     try:
         for path in paths:
             if path.is_dir():  # else it would only show after others have been renamed
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
         yield temporary
         for part, path in zip(temporary, paths, strict=True):
-            part.replace(path)
+            if part.exists():  # else the block has put it in its place itself
+                part.replace(path)
     except OSError as error:
-        raise InputFileError.at(paths[-1], f"{failure}: {reason_of(error)}") from None
+        raise InputFileError.at(_meant(paths[-1]), f"{failure}: {reason_of(error)}") from None
     finally:
         for part in temporary:
             with contextlib.suppress(OSError):
                 part.unlink()
+
+
+def _meant(path: Path) -> Path:
+    """Where a file is to be in the end, if it is written in a folder of an unfinished result."""
+    above = path.parent
+    return above.parent / path.name if above.name.startswith(UNFINISHED) else path
 
 
 def write_texts(contents: Mapping[Path, str], failure: str = "cannot be written") -> None:
@@ -230,7 +254,8 @@ _DIGITS = 16
 
 def digits_of(file: Path) -> str:
     """The first digits of a file's SHA-256."""
-    return hashlib.sha256(file.read_bytes()).hexdigest()[:_DIGITS]
+    with file.open("rb") as opened:
+        return hashlib.file_digest(opened, "sha256").hexdigest()[:_DIGITS]
 
 
 @dataclass(frozen=True)

@@ -25,13 +25,12 @@ from pathlib import Path
 from typing import Any
 
 from seecr.errors import InputError, InputFileError
-from seecr.files import Made, digits_of, reason_of
+from seecr.files import UNFINISHED, Made, digits_of, reason_of
 
 if sys.platform != "win32":
     import fcntl
 
 MANIFEST = ".seecr-manifest.json"
-_UNFINISHED = ".unfinished-"
 _MOVES = "moves.json"
 
 
@@ -134,7 +133,7 @@ def staged(
     out, names, sometimes, read = Path(out), {*names}, {*sometimes}, [*read]
     for name in sorted(names | sometimes):
         check_not_read(out / name, read, option)
-    above, folder, done = _missing(out), out / f"{_UNFINISHED}{secrets.token_hex(4)}", False
+    above, folder, done = _missing(out), out / f"{UNFINISHED}{secrets.token_hex(4)}", False
     try:  # from before the folder is made: whoever ends the program then leaves nothing either
         try:
             out.mkdir(parents=True, exist_ok=True)
@@ -150,7 +149,11 @@ def staged(
             yield folder
             with locked(out):
                 _check_replaced(out, folder, read, option)
-                _plan_moves(out, folder, sometimes, made)
+                try:
+                    _plan_moves(out, folder, sometimes, made)
+                except OSError as error:
+                    what = f"the result cannot be written there: {reason_of(error)}"
+                    raise InputFileError.at(out, what) from None
                 done = True  # from here on, whoever looks next can finish
                 _move(out, folder)
     finally:
@@ -235,7 +238,7 @@ def finish_moves(out: Path) -> None:
 
     A folder that another process is still writing to is left alone.
     """
-    for folder in sorted(out.glob(f"{_UNFINISHED}*")) if out.is_dir() else ():
+    for folder in sorted(out.glob(f"{UNFINISHED}*")) if out.is_dir() else ():
         with contextlib.suppress(FileNotFoundError), locked(folder, wait=False) as dead:
             if not dead or not folder.is_dir():
                 continue

@@ -82,7 +82,7 @@ SHOWING = ("crosscheck.show.", "seecr.show.")
 TRADE = {
     f"{module}.{name}"
     for line in """
-crosscheck.model.write: check_place
+crosscheck.model.write: check_place state_of
 crosscheck.planning.write: NAME box_of planned_files
 crosscheck.suite.cases: select
 crosscheck.suite.run: every_shipped shipped_like
@@ -98,6 +98,7 @@ seecr.description.fingerprint: fingerprint
 seecr.description.mjcf: CABLES
 seecr.description.robot: ITS_A_POINT
 seecr.effects.base: unfed
+seecr.errors: printable
 seecr.equilibrium.search: elsewhere on_their_way
 seecr.equilibrium.solving: strained strained_rows
 seecr.exported.export: wrote

@@ -53,7 +53,7 @@ def command(
     equilibrium or a fit that does not converge.
     """
     from crosscheck import Sigma, add_effect, add_effects, load_diagnosed, load_measurements
-    from crosscheck.model.write import check_place
+    from crosscheck.model.write import check_place, state_of
     from crosscheck.show.fits import print_addition
     from seecr import effect_named, load_robot
 
@@ -65,6 +65,7 @@ def command(
     machine = load_robot(robot)
     listed, said = load_diagnosed(all_from, machine) if all_from is not None else ((), ())
     names = [effect] if effect is not None else [term.name for term in listed]
+    before = state_of(model)
     old = choices.model_or_new(model, machine)
     for name in names:
         _check_names(old, name, refit, model)
@@ -81,7 +82,7 @@ def command(
         # of the model as it was read
         made = options.made_by(machine.source, *data, all_from, model)
         more = {"model_notes": list(old.notes)}
-        text = choices.keep_grown(found, model, written, made, keep, more)
+        text = choices.keep_grown(found, model, before, written, made, keep, more)
     if as_json:
         click.echo(text)
     else:

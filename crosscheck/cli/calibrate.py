@@ -39,12 +39,13 @@ def command(
     2 bad input, 3 rows without an equilibrium or a fit that does not converge.
     """
     from crosscheck import Sigma, calibrate, load_measurements
-    from crosscheck.model.write import check_place
+    from crosscheck.model.write import check_place, state_of
     from crosscheck.show.fits import print_calibration
     from seecr import load_robot
 
     choices.check_effects(only, exclude)  # a wrong name is told before any file is read
     machine = load_robot(robot)
+    before = state_of(model)
     old = choices.model_or_new(model, machine)
     measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     check_place(model)
@@ -53,7 +54,7 @@ def command(
             found = calibrate(machine, measured, old, progress, only=only, exclude=exclude)
         written = found.pays or (force and found.settled)
         made = options.made_by(machine.source, *data, model)  # of the model as it was read
-        text = choices.keep_grown(found, model, written, made, keep, {})
+        text = choices.keep_grown(found, model, before, written, made, keep, {})
     if as_json:
         click.echo(text)
     else:

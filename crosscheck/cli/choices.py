@@ -91,13 +91,13 @@ def model_or_new(path: Path, robot: Robot) -> Model:
 
 
 def keep_grown(
-    found: Addition | Calibrated, model: Path, written: bool, made: Made,
+    found: Addition | Calibrated, model: Path, replaces: str, written: bool, made: Made,
     keep: Callable[[str], None], more: Mapping[str, Any],
 ) -> str:  # fmt: skip
     """Keep what was found, and the model if it is ``written``; returns the JSON that was kept.
 
     Args:
-        found: with its model. model: the file for that.
+        found: with its model. model: the file for that; replaces: its state when it was read.
         made: of the files as they were read.
         keep: keeps the JSON, see :func:`seecr.cli.options.result_in`. more: for the JSON too.
     """
@@ -108,5 +108,5 @@ def keep_grown(
     text = json_text(said)
     keep(text)
     if written:
-        save_model(model, found.model)
+        save_model(model, found.model, replaces)
     return text

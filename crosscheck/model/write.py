@@ -20,8 +20,9 @@ from seecr.description.fingerprint import fingerprint
 from seecr.description.robot import Robot
 from seecr.effects import ApartLayout, Knowledge, Own, Term, Terms, Values
 from seecr.effects.base import Layout
-from seecr.errors import InputError
-from seecr.files import check_writable, written
+from seecr.errors import InputError, InputFileError
+from seecr.files import check_writable, digits_of, written
+from seecr.folders import locked
 from seecr.pose import Array
 from seecr.prediction.effect_tables import UNSEEN
 from seecr.prediction.experiment import predict
@@ -439,7 +440,7 @@ def renewed(model: Model, robot: Robot, data: Measurements) -> Model:
     return replace(model, document=document, notes=(), reach=reach)
 
 
-def save_model(path: str | Path, model: Model) -> None:
+def save_model(path: str | Path, model: Model, replaces: str | None = None) -> None:
     """Write a model, such as a calibration's ``model``, with the comments that its file had.
 
     It is written to a temporary file first, so that the old one stays complete until then.
@@ -447,9 +448,10 @@ def save_model(path: str | Path, model: Model) -> None:
     Args:
         path: of the TOML; its folder is made if need be.
         model: as read, or the ``model`` of a diagnosis, a calibration or an addition.
+        replaces: what the file must still be, as :func:`state_of` told when the model was read.
 
     Raises:
-        InputFileError: the file cannot be written, or the file there is not a model.
+        InputFileError: the file cannot be written, is no model, or was changed since it was read.
         InputError: not a model.
     """
     if not isinstance(model, Model):
@@ -459,9 +461,23 @@ def save_model(path: str | Path, model: Model) -> None:
         )
     path = Path(path)
     check_place(path)
+    text = tomlkit.dumps(_in_step(model))
     with written(path, failure="the model cannot be written") as (partial,):
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_text(tomlkit.dumps(_in_step(model)), encoding="utf-8", newline="\n")
+        partial.write_text(text, encoding="utf-8", newline="\n")
+        with locked(path.parent):  # two commands at once would lose what one of them found
+            if replaces is not None and state_of(path) != replaces:
+                raise InputFileError.at(
+                    path,
+                    "was changed by another command since it was read; nothing was written: run "
+                    "this command again",
+                )
+            partial.replace(path)
+
+
+def state_of(path: Path) -> str:
+    """What a model's file holds, as the first digits of its SHA-256; "" if there is none."""
+    return digits_of(path) if path.is_file() else ""
 
 
 def _in_step(model: Model) -> Any:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import math
 import textwrap
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -174,6 +175,8 @@ def _shape(layout: Layout, k: int, robot: Robot, random: Generator) -> float:
 # searches it should learn what was hidden before they mean to.
 
 NAME = "answer.sealed"
+# Bytes of an unpacked answer: a thousand cables' worth of numbers.
+_LARGEST = 10**6
 _FIRST_LINE = "# What this twin hides. To see it: crosscheck twin --open"
 _EXPECTED = f"expected a file {NAME} of crosscheck twin"
 
@@ -236,12 +239,45 @@ class Answer:
         """The answer that :meth:`as_json` described.
 
         Raises:
-            KeyError, TypeError: the document is something else.
+            ValueError: the document is something else.
         """
-        own = {field.name: document[field.name] for field in fields(cls)}
-        own["moves_over_noise"] = {k: Moves(**one) for k, one in own["moves_over_noise"].items()}
-        own["all_move_over_noise"] = Moves(**own["all_move_over_noise"])
-        return cls(**own)
+        words: list[Any] = [document.get(key) for key in ("robot", "truth")]
+        counts: list[Any] = [document.get(key) for key in ("seed", "poses")]
+        values, moves = (_table(document.get(key)) for key in ("values", "moves_over_noise"))
+        known = {*TRUE_EFFECTS, _OF_TENSIONS, *CONTAINED}
+        if (
+            not all(isinstance(word, str) and word.isprintable() for word in words)
+            or not all(type(count) is int and count >= 0 for count in counts)
+            or values.keys() != moves.keys()
+            or not values.keys() <= known
+        ):
+            raise ValueError
+        return cls(
+            robot=words[0], truth=words[1], seed=counts[0], poses=counts[1],
+            values={name: _numbers(one) for name, one in values.items()},
+            moves_over_noise={name: Moves(**_numbers(one, _MOVES)) for name, one in moves.items()},
+            all_move_over_noise=Moves(**_numbers(document.get("all_move_over_noise"), _MOVES)),
+            sigma=_numbers(document.get("sigma")),
+        )  # fmt: skip
+
+
+_MOVES = {"max", "rms"}
+
+
+def _table(given: object) -> dict[str, Any]:
+    """A table, if it is one."""
+    if not isinstance(given, dict):
+        raise ValueError
+    return given
+
+
+def _numbers(given: object, keys: set[str] | None = None) -> dict[str, float]:
+    """A table of finite numbers, with these keys if they are known."""
+    table = _table(given)
+    numbers = all(type(one) in (int, float) and math.isfinite(one) for one in table.values())
+    if not numbers or not all(map(str.isprintable, table)) or keys not in (None, {*table}):
+        raise ValueError
+    return table
 
 
 def seal(answer: Answer) -> str:
@@ -264,6 +300,10 @@ def unseal(path: str | Path) -> Answer:
     try:
         if first != _FIRST_LINE:
             raise ValueError
-        return Answer.of_json(json.loads(zlib.decompress(base64.b64decode(body))))
-    except (ValueError, KeyError, TypeError, zlib.error, binascii.Error):
+        opened = zlib.decompressobj()
+        text = opened.decompress(base64.b64decode(body), _LARGEST)
+        if not opened.eof:  # cut off, or larger: small files can unpack to any size
+            raise ValueError
+        return Answer.of_json(_table(json.loads(text)))
+    except (ValueError, RecursionError, zlib.error, binascii.Error):
         raise InputFileError.at(file, f"is not a sealed answer; {_EXPECTED}") from None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import signal
 import sys
+import traceback
 from collections.abc import Mapping
 from importlib import import_module
 from itertools import pairwise
@@ -14,6 +15,7 @@ import click
 
 from seecr import SeecrError, __version__
 from seecr.compiled.compile_notice import tell_compiling
+from seecr.errors import printable
 
 CommandTable: TypeAlias = Mapping[str, tuple[str, str]]
 
@@ -23,7 +25,13 @@ ARGUMENTS = "seecr.arguments"
 _HELP = """\b
 {} is an MJCF file, or the name of a shipped robot (demobot_cogiro, planar_vertical ...).
 Exit status: 0 all well, 1 a threshold exceeded, 2 bad input or usage,
-3 a solve did not converge."""
+3 a solve did not converge, 70 a defect of the program: --debug, beside
+any command, shows where."""
+DEBUG = "--debug"
+_DEFECT = 70
+"""EX_SOFTWARE of sysexits.h: it is nobody's gate that failed, and no input that is wrong."""
+_MOST = 300
+"""Characters of an exception's text that are shown."""
 # As a shell counts what SIGINT, SIGPIPE and SIGTERM end.
 _INTERRUPTED, _CUT_OFF, _ENDED = 130, 141, 143
 
@@ -88,8 +96,11 @@ class LazyGroup(click.Group):
             tell_compiling(self._tell_compiling)
             gc.set_threshold(100_000, 50, 100)  # collecting took an eighth of the time
             signal.signal(signal.SIGTERM, _end)
+        given = args[0] if args else extra.pop("args", None)
+        words = sys.argv[1:] if given is None else list(given)
+        debug = DEBUG in words
         try:
-            status = self._run(*args, **extra)
+            status = self._run([word for word in words if word != DEBUG], *args[1:], **extra)
         except click.ClickException as error:
             sys.exit(self._refuse(_usage_text(error)))
         except SeecrError as error:
@@ -101,14 +112,26 @@ class LazyGroup(click.Group):
             sys.exit(self._refuse(f"{error.filename or 'file'}: {error.strerror or error}"))
         except (click.Abort, KeyboardInterrupt):
             sys.exit(self._refuse("interrupted", _INTERRUPTED))
+        except Exception as error:
+            if debug:
+                traceback.print_exc()
+            sys.exit(self._refuse(self._defect(error), _DEFECT))
         sys.exit(status if isinstance(status, int) else 0)
+
+    def _defect(self, error: Exception) -> str:
+        """What to say of an exception that nobody foresaw."""
+        what = f"{type(error).__name__}: {error}"[:_MOST]
+        return (
+            f"a defect of {self.name} {__version__}, not of your input: {what}; please report it "
+            f"with the command and what {DEBUG} shows (CONTRIBUTING.md)"
+        )
 
     def _tell_compiling(self) -> None:
         text = "compiling the solver, only this first time; it takes up to a minute"
         click.echo(f"{self.name}: {text}", err=True)
 
     def _refuse(self, text: str, status: int = BAD_INPUT) -> int:
-        click.echo(f"{self.name}: {' '.join(text.split())}", err=True)
+        click.echo(f"{self.name}: {printable(' '.join(text.split()))}", err=True)
         return status
 
     def _run(self, *args: Any, **extra: Any) -> Any:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.counted import counted
-from seecr.errors import InputFileError, MissingPackageError
+from seecr.errors import InputFileError, MissingPackageError, printable
 from seecr.files import no_text, read_bytes
 from seecr.pose import LARGEST, Array
 
@@ -330,7 +330,10 @@ def _cell(value: object, digits: int | None) -> str:
 
 
 def _quoted(text: str) -> str:
-    """Text as a cell; a leading # would make its line a comment."""
+    """Text as a cell; a leading # would make its line a comment, = or @ a formula of Excel."""
+    text = printable(text)
+    if text.lstrip().startswith(("=", "@")):
+        text = "'" + text
     if any(mark in text for mark in ',"\n\r') or text.lstrip().startswith("#"):
         return '"' + text.replace('"', '""') + '"'
     return text

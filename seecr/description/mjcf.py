@@ -15,7 +15,7 @@ import numpy as np
 
 from seecr.counted import counted
 from seecr.description.robot import ABSURD, Joint, Robot
-from seecr.errors import InputError, RobotError, SeecrError
+from seecr.errors import InputError, RobotError, SeecrError, printable
 from seecr.files import no_text, path_of, read_bytes
 from seecr.pose import Array, quat_rotate, quat_to_matrix
 
@@ -145,6 +145,8 @@ def _names_near(name: str) -> str:
 _NO_NUMBER = re.compile(
     rb"""\b(?!name\b)\w+\s*=\s*["'](?:[-+.\deE\s]*\s)?[-+]?nan\b[-+.\deE\sna]*["']""", re.IGNORECASE
 )
+# Characters of a name that still fit a line of a table.
+_LONGEST = 100
 # No cable is stretched to a hundred times its rest length.
 _LEAST = 0.01
 # A plane is level if the cosine of its tilt is so near to one: 0.08 degrees.
@@ -325,7 +327,7 @@ def not_mjcf(path: Path) -> str:
 
 
 def _check_names(model: mujoco.MjModel, path: Path) -> None:
-    """Check that names are UTF-8: MuJoCo keeps bytes, and decodes names only when they are used."""
+    """Check that names are UTF-8, which MuJoCo checks only when they are used, and can be shown."""
     for name in model.names.split(b"\0"):
         try:
             name.decode("utf-8")
@@ -334,6 +336,11 @@ def _check_names(model: mujoco.MjModel, path: Path) -> None:
                 f"{path}: the name {name.decode('utf-8', 'replace')!r} is not UTF-8; expected a "
                 "file in UTF-8: save it again as that"
             ) from None
+        if printable(shown := name.decode(), _LONGEST) != shown:
+            raise RobotError(
+                f"{path}: the name {printable(shown, _LONGEST)} cannot be shown; expected at most "
+                f"{_LONGEST} characters, none of them a control character"
+            )
 
 
 def _model_name(model: mujoco.MjModel, path: Path) -> str:

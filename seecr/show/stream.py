@@ -19,6 +19,8 @@ from seecr.show.colours import COMMAND, Rgba
 
 POSE, SETTLING, MODEL_STEP = "pose", "settling_time", "model_step"
 Index: TypeAlias = rr.TimeColumn | Sequence[rr.TimeColumn]
+# The last bytes of a complete recording hold this mark.
+_END, _TAIL = b"FOOT", 64
 # Positions on a timeline are rounded by less than this part of a step.
 _ROUNDED = 0.03
 
@@ -135,5 +137,22 @@ def recording_file(path: str | Path, name: str, blueprint: rrb.Blueprint) -> Ite
             stream.send_recording_name(name)
             yield Recording(stream)
             stream.flush()
+        except RuntimeError as error:  # of Rerun's own thread that writes
+            if "File-writer" not in str(error):
+                raise
+            raise OSError("it stopped half way; is the disk full?") from None
         finally:
             stream.disconnect()
+        _check_complete(partial)
+
+
+def _check_complete(path: Path) -> None:
+    """Check that a recording has its end; Rerun tells of a full disk only in its log.
+
+    Raises:
+        OSError: it has none.
+    """
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - _TAIL))
+        if _END not in file.read():
+            raise OSError("it is incomplete; is the disk full?")

@@ -446,7 +446,13 @@ def test_a_seal_comes_off_again_and_only_a_seal_does(tmp_path, answer):
     assert nothing.hidden == [] and nothing.as_json()["hidden"] == ["null"]
     whole, first = answer.as_json(), seal(answer).partition("\n")[0]
     parts = [{k: v for k, v in whole.items() if k != key} for key in ("values", "seed")]
-    parts.append({**whole, "all_move_over_noise": {"most": 1.0}})
+    others = {
+        "all_move_over_noise": {"most": 1.0}, "seed": "1", "poses": True, "robot": "\x1b[31m",
+        "sigma": {"position_m": "much"}, "values": {"nothing_known": {}}, "truth": None,
+        "moves_over_noise": {name: [1.0] for name in whole["values"]},
+    }  # fmt: skip
+    parts += [{**whole, key: value} for key, value in others.items()]
+    parts += [{"much": "0" * 10**7}]  # ten thousand bytes that unpack to ten million
     others = [base64.b64encode(zlib.compress(json_text(one).encode())).decode() for one in parts]
     for text in (seal(answer)[:-9], *(f"{first}\n{body}\n" for body in others)):
         file.write_text(text, encoding="ascii")
