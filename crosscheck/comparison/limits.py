@@ -127,7 +127,7 @@ def exceeded(limits: Limits, found: Comparison) -> list[Exceeded]:
     """The limits that a comparison exceeds: each with its ``name``, ``limit``, ``value`` and words.
 
     Raises:
-        CrosscheckError: a limit is on something that was not measured.
+        CrosscheckError: a limit is on something that was not measured, or nothing can exceed it.
     """
     out = []
     for name, rule in RULES.items():
@@ -140,6 +140,7 @@ def exceeded(limits: Limits, found: Comparison) -> list[Exceeded]:
                 f"{option(name)}: {data.path} has no {rule.kind.name} readings; expected limits on "
                 "what was measured"
             )
+        _check_gate(name, limit, rule, found)
         sizes = found.errors_of(rule.kind.name)
         if not np.isfinite(sizes).any():
             continue
@@ -147,6 +148,21 @@ def exceeded(limits: Limits, found: Comparison) -> list[Exceeded]:
         if value is not None and value > limit:
             out.append(Exceeded(name, limit, value, _words(found, rule, limit, value)))
     return out
+
+
+def _check_gate(name: str, limit: float, rule: Rule, found: Comparison) -> None:
+    """Check that a limit can be exceeded: with a typing error in its unit it would never fail."""
+    robot, kind = found.problem.robot, rule.kind
+    most = {"position": robot.reach, "orientation": np.pi, "tension": float(np.sum(robot.ea))}
+    if limit >= most[kind.name]:
+        what = {
+            "position": "the robot's frame, across", "orientation": "half a turn",
+            "tension": "what stretches all cables to twice their lengths",
+        }  # fmt: skip
+        raise CrosscheckError(
+            f"{option(name)}: expected less than {kind.factor * most[kind.name]:.3g} {kind.unit}, "
+            f"{what[kind.name]}; got {kind.factor * limit:.4g} {kind.unit}, which nothing exceeds"
+        )
 
 
 def _words(found: Comparison, rule: Rule, limit: float, value: float) -> str:

@@ -65,7 +65,7 @@ LEAST, MOST = 1e-15, 1e15
 # Of noise: beside less, what effects do is so large that rounding leaves nothing of the rest.
 LEAST_NOISE = 1e-9
 
-_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
+_NUMBER = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(\S*)\s*")
 
 
 def parse_quantity(label: str, kind: str, text: str, least: float = LEAST) -> float:

@@ -294,7 +294,7 @@ def _check_names(file: Toml, got: Iterable[str], known: Collection[str], what: s
 
 def _value(file: Toml, table: str, key: str, value: Any) -> Any:
     """A value in the form that the dataclasses hold, checked for the kind that its key needs."""
-    expected, fits, hold = _KINDS.get(key, _POSITIVE)
+    expected, fits, hold = _KINDS[key]
     if not fits(value):
         raise file.error(f"[{table}] {key}: expected {expected}, got {value!r}", key)
     return hold(value)
@@ -309,8 +309,18 @@ def _are_names(value: Any) -> bool:
 
 
 _Kind = tuple[str, Callable[[Any], bool], Callable[[Any], Any]]
-_POSITIVE: _Kind = ("a positive number", lambda v: _is_number(v) and v > 0, float)
+
+
+def _positive(most: float) -> _Kind:
+    return f"a positive number up to {most:.3g}", lambda v: _is_number(v) and 0 < v <= most, float
+
+
+# Two physics that differ by a metre, half a turn or a kilonewton agree on no robot: a larger
+# threshold is a typing error that would switch its gate off.
 _KINDS: dict[str, _Kind] = {
+    "position_m": _positive(1.0),
+    "orientation_rad": _positive(math.pi),
+    "tension_N": _positive(1000.0),
     "branches": ("a whole number from 0 on", lambda v: _is_number(v, int) and v >= 0, int),
     "free_to_move": ('a list of names "CASE POSE"', _are_names, tuple),
     "free_elsewhere": ("a share from 0 to 1", lambda v: _is_number(v) and 0 <= v <= 1, float),

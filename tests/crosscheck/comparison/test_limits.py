@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields
 from pathlib import Path
 
@@ -49,6 +50,21 @@ def test_a_limit_just_below_is_exceeded_and_one_just_above_holds(found: Comparis
     assert exceeded(Limits(max_position_worst=1.01 * sizes.max()), found) == []
     (item,) = exceeded(Limits(max_position_worst=0.99 * sizes.max()), found)
     assert item.words.startswith("worst position error")
+
+
+@pytest.mark.parametrize(
+    ("name", "limit", "words"),
+    [
+        ("max_position", 500.0, "the robot's frame, across; got 5e+05 mm, which nothing exceeds"),
+        ("max_orientation_worst", 50.0, "expected less than 180 deg, half a turn; got 2865 deg"),
+    ],
+)
+def test_a_limit_that_nothing_exceeds_is_a_typing_error(
+    found: Comparison, name: str, limit: float, words: str
+) -> None:
+    """0.5 and 500 mm look alike; the gate was off for ever, and nobody was told."""
+    with pytest.raises(CrosscheckError, match=re.escape(words)):
+        exceeded(Limits(**{name: limit}), found)
 
 
 def test_a_limit_on_what_was_not_read_is_refused(found: Comparison) -> None:
