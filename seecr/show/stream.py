@@ -19,8 +19,6 @@ from seecr.show.colours import COMMAND, Rgba
 
 POSE, SETTLING, MODEL_STEP = "pose", "settling_time", "model_step"
 Index: TypeAlias = rr.TimeColumn | Sequence[rr.TimeColumn]
-# The last bytes of a complete recording hold this mark.
-_END, _TAIL = b"FOOT", 64
 # Positions on a timeline are rounded by less than this part of a step.
 _ROUNDED = 0.03
 
@@ -130,29 +128,14 @@ def recording_file(path: str | Path, name: str, blueprint: rrb.Blueprint) -> Ite
     # the viewer keeps one layout per application, and several recordings may be open together
     application = "crosscheck-" + re.sub(r"[^A-Za-z0-9_-]", "-", name)
     stream = rr.RecordingStream(application, recording_id=name)
+    # in memory first: on a full disk Rerun's own files end anywhere, and it may wait for ever
+    memory = stream.memory_recording()
+    stream.send_blueprint(blueprint, make_active=False, make_default=True)
+    stream.send_recording_name(name)
     with written(Path(path), failure="cannot write the recording") as (partial,):
         try:
-            partial.touch()  # Rerun reports a folder that is not writable only in its log
-            stream.save(partial, default_blueprint=blueprint)
-            stream.send_recording_name(name)
             yield Recording(stream)
             stream.flush()
-        except RuntimeError as error:  # of Rerun's own thread that writes
-            if "File-writer" not in str(error):
-                raise
-            raise OSError("it stopped half way; is the disk full?") from None
+            partial.write_bytes(memory.drain_as_bytes() or b"")
         finally:
             stream.disconnect()
-        _check_complete(partial)
-
-
-def _check_complete(path: Path) -> None:
-    """Check that a recording has its end; Rerun tells of a full disk only in its log.
-
-    Raises:
-        OSError: it has none.
-    """
-    with path.open("rb") as file:
-        file.seek(max(0, path.stat().st_size - _TAIL))
-        if _END not in file.read():
-            raise OSError("it is incomplete; is the disk full?")

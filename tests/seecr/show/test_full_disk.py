@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from seecr import InputFileError, solve
-from seecr.show.stream import recording_file
 from seecr.show.sweep_recording import write_sweep_recording
 
 _SWEEP = "seecr sweep planar_vertical --line 0.3 0 0.2 0.5 0 0.2 --count 5 --out"
@@ -43,25 +42,20 @@ def test_a_full_disk_is_said_and_leaves_nothing(small: Path) -> None:
     assert list(small.iterdir()) == []
 
 
-def test_a_recording_without_its_end_replaces_none(
+def test_a_recording_that_cannot_be_written_replaces_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "a.rrd"
-    write_sweep_recording(solve("planar_vertical", [[0.4, 0, 0.2, 1, 0, 0, 0]]), path, True)
+    found = solve("planar_vertical", [[0.4, 0, 0.2, 1, 0, 0, 0]])
+    write_sweep_recording(found, path, True)
     whole = path.read_bytes()
-    import rerun as rr
+    write = Path.write_bytes
 
-    cut = rr.RecordingStream.disconnect
+    def full(part: Path, data: bytes) -> int:
+        write(part, data[: len(data) // 2])
+        raise OSError(28, "No space left on device")
 
-    def half(stream: rr.RecordingStream) -> None:
-        cut(stream)
-        (part,) = tmp_path.glob(".*.part")
-        part.write_bytes(part.read_bytes()[:-40])
-
-    monkeypatch.setattr(rr.RecordingStream, "disconnect", half)
-    with (
-        pytest.raises(InputFileError, match=r"a\.rrd: cannot write the recording: it is incomp"),
-        recording_file(path, "a", rr.blueprint.Blueprint()) as recording,
-    ):
-        recording.text("note", "half")
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(InputFileError, match=r"a\.rrd: cannot write the recording: No space left"):
+        write_sweep_recording(found, path, True)
     assert path.read_bytes() == whole and [*tmp_path.iterdir()] == [path]
