@@ -35,7 +35,7 @@ _MOVES = "moves.json"
 
 
 @contextmanager
-def locked(folder: Path, wait: bool = True) -> Iterator[bool]:
+def folder_lock(folder: Path, wait: bool = True) -> Iterator[bool]:
     """Keep a folder for this process alone; the system frees it when the process ends.
 
     Windows cannot lock a folder: commands at the same time in one folder are not kept apart there.
@@ -145,9 +145,9 @@ def staged(
                 f"{option} {out}: cannot write there: {reason_of(error)}; expected a folder that "
                 "can be made or written to"
             ) from None
-        with locked(folder):
+        with folder_lock(folder):
             yield folder
-            with locked(out):
+            with folder_lock(out):
                 _check_replaced(out, folder, read, option)
                 try:
                     _plan_moves(out, folder, sometimes, made)
@@ -239,11 +239,11 @@ def finish_moves(out: Path) -> None:
     A folder that another process is still writing to is left alone.
     """
     for folder in sorted(out.glob(f"{UNFINISHED}*")) if out.is_dir() else ():
-        with contextlib.suppress(FileNotFoundError), locked(folder, wait=False) as dead:
+        with contextlib.suppress(FileNotFoundError), folder_lock(folder, wait=False) as dead:
             if not dead or not folder.is_dir():
                 continue
             if (folder / _MOVES).exists():
-                with locked(out):
+                with folder_lock(out):
                     _move(out, folder)
             else:
                 shutil.rmtree(folder, ignore_errors=True)

@@ -22,7 +22,7 @@ from seecr.effects import ApartLayout, Knowledge, Own, Term, Terms, Values
 from seecr.effects.base import Layout
 from seecr.errors import InputError, InputFileError
 from seecr.files import check_writable, digits_of, written
-from seecr.folders import locked
+from seecr.folders import folder_lock
 from seecr.pose import Array
 from seecr.prediction.effect_tables import UNSEEN
 from seecr.prediction.experiment import predict
@@ -465,7 +465,7 @@ def save_model(path: str | Path, model: Model, replaces: str | None = None) -> N
     with written(path, failure="the model cannot be written") as (partial,):
         path.parent.mkdir(parents=True, exist_ok=True)
         partial.write_text(text, encoding="utf-8", newline="\n")
-        with locked(path.parent):  # two commands at once would lose what one of them found
+        with folder_lock(path.parent):  # two commands at once would lose what one of them found
             if replaces is not None and state_of(path) != replaces:
                 raise InputFileError.at(
                     path,

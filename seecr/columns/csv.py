@@ -331,7 +331,7 @@ def _cell(value: object, digits: int | None) -> str:
 
 def _quoted(text: str) -> str:
     """Text as a cell; a leading # would make its line a comment, = or @ a formula of Excel."""
-    text = printable(text)
+    text = "".join(part if part.isspace() else printable(part) for part in re.split(r"(\s)", text))
     if text.lstrip().startswith(("=", "@")):
         text = "'" + text
     if any(mark in text for mark in ',"\n\r') or text.lstrip().startswith("#"):

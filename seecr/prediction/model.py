@@ -417,7 +417,7 @@ def _check_tables(where: Where, document: Mapping[str, Any], expected: str) -> N
         has = ", ".join(document)
         raise where.error(f"is not a model, it has {has}; {expected}, with tables [[effect]]")
     version = document.get("format", FORMAT)
-    if version != FORMAT or type(version) is not int:
+    if version != FORMAT or isinstance(version, bool):
         raise where.error(
             f"format {version!r} is not known to this version, which reads {FORMAT}; upgrade it",
             key="format",
