@@ -174,7 +174,8 @@ class Page:
     Attributes:
         title: in the browser's tab. heading: at the top.
         verdict: as programs know it, which sets its colour. name, meaning: in words.
-        sentence: the verdict in full. blocks: what follows. notes: at the end.
+        sentence: the verdict in full. lead: what it means for the robot, in a few lines, which
+            come first. picture: beside them. blocks: what follows. notes: at the end.
         footer: how to read it.
     """
 
@@ -187,6 +188,8 @@ class Page:
     notes: Sequence[str]
     footer: str
     meaning: str = ""
+    lead: Sequence[Words] = ()
+    picture: Figure | None = None
 
 
 def section(title: str, *blocks: Block | None) -> Panel | None:

@@ -26,7 +26,6 @@ from crosscheck.inference.priors import SURE
 from crosscheck.show.blocks import (
     Block,
     Bold,
-    Cell,
     Check,
     Checks,
     Code,
@@ -36,16 +35,14 @@ from crosscheck.show.blocks import (
     Line,
     Page,
     Panel,
-    Small,
-    Styled,
     TextTable,
-    codes,
     cut,
     present,
     rms_table,
     section,
 )
 from crosscheck.show.candidates import candidate_blocks, candidate_lines
+from crosscheck.show.findings import PLAUSIBLE, card, in_brief
 from crosscheck.show.markdown import kinds_table, markdown, row_heading, unused
 from crosscheck.show.residuals import (
     association_section,
@@ -55,10 +52,8 @@ from crosscheck.show.residuals import (
     wall_section,
 )
 from crosscheck.show.terminal import show
-from seecr.counted import counted
-from seecr.effects import Terms
 from seecr.show.colours import AFTER, BEFORE, CALM, TINT
-from seecr.units import in_unit, parameter_name, short, with_error
+from seecr.units import short
 
 _STYLE = {
     DiagnosisVerdict.NO_EFFECT_MISSING: "green",
@@ -70,11 +65,6 @@ _STYLE = {
 # Where not all fit, on the terminal and in a recording: diagnosis.json has the others.
 _FILE = "diagnosis.json"
 _MOST_CANDIDATES, _MOST_PARAMETERS, _MOST_LISTED = 6, 9, 6
-# Correlations above this are named; parameters beyond this many plausible sizes are doubtful.
-_CORRELATED, _PLAUSIBLE = 0.9, 5.0
-_MOST_CORRELATIONS = 8
-# More parameters than this stand in two columns.
-_ONE_COLUMN = 8
 # Noise within this factor of what was stated is as stated.
 _AS_STATED = 1.25
 
@@ -137,12 +127,12 @@ def page_of_diagnosis(found: Diagnosis) -> Page:
     tests = [Checks(some)] if (some := checks(found)) else []
     next_steps = [Items(found.measure_further)] if found.measure_further else []
     blocks = present(
-        None if path is None else _facts(found, path.problem),
-        _no_search(found),
         None if path is None else _waterfall(found, path),
-        section("Missing effects, in the order in which they were added",
-                *(_card(found, k, one) for k, one in enumerate(found.missing, 1))),
+        _no_search(found),
         section("What to measure next", *next_steps),
+        None if path is None else section("The data", _facts(found, path.problem)),
+        section("Missing effects, in the order in which they were added",
+                *(card(found, k, one) for k, one in enumerate(found.missing, 1))),
         section("What speaks for it, and what against", *tests),
         section("What these data can show", *sight),
         *([] if path is None else _errors(found, path)),
@@ -157,12 +147,24 @@ def page_of_diagnosis(found: Diagnosis) -> Page:
         name=found.verdict.heading,
         meaning=found.verdict.meaning,
         sentence=found.reason,
+        lead=[in_brief(one, path.problem.robot.cable_names) for one in found.missing]
+        if path is not None
+        else [],
+        picture=_robot(found),
         blocks=blocks,
         notes=found.notes,
         footer="A named effect is the best explanation of those tried, not a proven cause: carry "
         "out its independent check. Errors are rms of single components, in the base frame. The "
         "same numbers, in SI: diagnosis.json.",
     )
+
+
+def _robot(found: Diagnosis) -> Figure | None:
+    from crosscheck.show.robot_figure import robot_figure
+
+    if found.path is None:
+        return None
+    return Figure(robot_figure(found.path.problem.robot, found.missing), wide=False)
 
 
 def _facts(found: Diagnosis, problem: Problem) -> Block:
@@ -249,96 +251,6 @@ def _confusion(found: Diagnosis) -> Panel | None:
     return section("Which effects these data can tell apart", figure, Line(words, "dim"))
 
 
-# --- missing effects ------------------------------------------------------------------------------
-
-
-def _card(found: Diagnosis, number: int, finding: MissingEffect) -> Panel:
-    """A missing effect on the page: what it does, its values, how to check it."""
-    rivals = finding.indistinguishable
-    removes, errors = removed(finding.share), rms_words(finding.held_out_rms)
-    name, also = probability_name(found).capitalize(), " or one of its equivalents" * bool(rivals)
-    instead = "that" if len(rivals) == 1 else "one of those"
-    correlated = correlations(found, finding)
-    title = finding.title
-    return Panel(
-        (f"{number}. {title[0].upper()}{title[1:]} ",
-         Small(f"{finding.effect}, {finding.layout.effect.place}")),
-        present(
-            Line(
-                f"Adding it {removes}; the error there is then {errors}. {name} that it{also} is "
-                f"missing: {probability_words(finding.probability)}."
-            ),
-            Line((Bold("Indistinguishable on these data from"), " ", *codes(rivals),
-                  f": adding {instead} instead explains the error as well.")) if rivals else None,
-            parameter_table(finding),
-            Line(f"Correlated above {_CORRELATED:g}: {'; '.join(correlated)}.", "dim")
-            if correlated else None,
-            Line((Bold("Independent check:"), f" {finding.check}.")),
-        ),
-        "card",
-    )  # fmt: skip
-
-
-def parameter_table(finding: MissingEffect) -> TextTable:
-    """Values and standard errors of a missing effect, and what is doubtful about each."""
-    layout = finding.layout
-    sizes = (finding.values - layout.null) / layout.scale
-    rows: list[list[Cell]] = []
-    for name, si, value, error, bound, size in zip(
-        layout.names, layout.units, finding.values.tolist(), finding.stderr.tolist(),
-        finding.at_bound.tolist(), sizes.tolist(), strict=True,
-    ):  # fmt: skip
-        factor, unit = in_unit(si)
-        shown, spread = with_error(factor * value, factor * error)
-        seen = bool(np.isfinite(error))
-        flags = [
-            *["at its bound"] * bound,
-            *["not determined by these data"] * (not seen),
-            *[f"{short(abs(size), 2)} plausible sizes"] * (abs(size) > _PLAUSIBLE),
-        ]
-        rows.append([
-            Code(parameter_name(name, si)),
-            shown if seen or bound else "",
-            f"± {spread}" if seen else spread,
-            unit,
-            Styled(", ".join(flags), "bad") if flags else "",
-        ])  # fmt: skip
-    heads = ["parameter", "#value", "#standard error", "unit", "doubts"]
-    if not any(row[-1] for row in rows):
-        heads, rows = heads[:-1], [row[:-1] for row in rows]
-    return TextTable(heads, rows, kind="two" if len(rows) > _ONE_COLUMN else "")
-
-
-def correlations(found: Diagnosis, finding: MissingEffect) -> list[str]:
-    """Parameters that the data hold together, the strongest first."""
-    assert found.path is not None
-    best = found.path.last.fit
-    every = _spoken(best.terms, finding.effect)
-    own = np.flatnonzero(best.terms.own(finding.effect))
-    correlation = best.correlation
-    pairs = {
-        (min(i, j), max(i, j)): float(correlation[i, j])
-        for i in own.tolist()
-        for j in range(len(every))
-        if i != j and abs(correlation[i, j]) > _CORRELATED
-    }
-    ranked = sorted(pairs.items(), key=lambda item: -abs(item[1]))
-    out = [f"{every[i]} with {every[j]} ({short(value)})"
-           for (i, j), value in ranked[:_MOST_CORRELATIONS]]  # fmt: skip
-    if len(ranked) > _MOST_CORRELATIONS:
-        out.append(f"and {counted(len(ranked) - _MOST_CORRELATIONS, 'more pair')}")
-    return out
-
-
-def _spoken(terms: Terms, effect: str) -> list[str]:
-    """Parameters as the cards' tables name them, those of other effects with whose they are."""
-    return [
-        parameter_name(name, unit) + ("" if term.name == effect else f" of {term.name}")
-        for term in terms
-        for name, unit in zip(term.layout.names, term.layout.units, strict=True)
-    ]
-
-
 # --- what was tested ------------------------------------------------------------------------------
 
 
@@ -379,7 +291,7 @@ def checks(found: Diagnosis) -> list[Check]:
         *out,
         Check("held-out runs", better == blocks, "each added effect improves the prediction of "
             f"{better} of {blocks}"),
-        Check("sizes", worst < _PLAUSIBLE and not bound, f"at most {short(worst, 2)} plausible "
+        Check("sizes", worst < PLAUSIBLE and not bound, f"at most {short(worst, 2)} plausible "
               f"sizes ({largest})" + (f"; at its bound: {', '.join(bound)}" if bound else "")),
     ]  # fmt: skip
 

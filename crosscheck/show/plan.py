@@ -13,6 +13,7 @@ from crosscheck.planning.result import Plan, Visible, alike, gain_words
 from crosscheck.planning.visibility import NAMED
 from crosscheck.show.blocks import (
     Block,
+    Bold,
     Cell,
     Code,
     Figure,
@@ -22,6 +23,7 @@ from crosscheck.show.blocks import (
     Panel,
     Small,
     TextTable,
+    Words,
     present,
     section,
 )
@@ -31,7 +33,7 @@ from seecr.counted import some
 from seecr.pose import rotvec_from_quat
 from seecr.units import short
 
-_MOST_GAINS, _MOST_SLACK = 3, 5
+_MOST_GAINS, _MOST_SLACK, _MOST_IN_BRIEF = 3, 5, 3
 
 
 def print_plan(
@@ -83,8 +85,9 @@ def page_of_plan(plan: Plan) -> Page:
         verdict="plan",
         name="What these poses can reveal",
         sentence=plan.sentence,
+        lead=in_brief(plan),
         blocks=present(
-            facts_of(problem),
+            section("The poses", facts_of(problem)),
             *(_visible(plan) if plan.effects else ()),
             section("What to add", *(_card(k, item) for k, item in enumerate(reached, 1))),
             _confusion(plan) if plan.effects else None,
@@ -94,6 +97,23 @@ def page_of_plan(plan: Plan) -> Page:
         f"found, with one false alarm in twenty plans; from {NAMED:g} times the smallest visible "
         "size on, a diagnosis names nine in ten. The same numbers, in SI: plan.json.",
     )
+
+
+def in_brief(plan: Plan) -> list[Words]:
+    """What will be seen, what cannot be told apart, and what to add, a line each."""
+    title = {found.name: found.signal.layout.effect.title for found in plan.effects}
+    shows, pairs = [], []
+    for found in plan.effects:
+        if found.visible and found.twins:
+            others = " or ".join(title.get(name, name) for name in found.twins)
+            pairs.append(f"{title[found.name]} from {others}")
+        elif found.visible:
+            shows.append(
+                f"{title[found.name]} (from {found.words(found.factor).split(', ')[0]} on)"
+            )
+    added = [item.words for item in plan.suggestions if item.reached]
+    heads = ("You will see ", shows), ("You cannot tell ", pairs), ("To tell more: ", added[:1])
+    return [(Bold(head), f"{some(parts, _MOST_IN_BRIEF, '; ')}.") for head, parts in heads if parts]
 
 
 _HEADS = ("smallest visible size", "smallest size to name it", "indistinguishable from")

@@ -134,6 +134,7 @@ def recording_file(path: str | Path, name: str, blueprint: rrb.Blueprint) -> Ite
     stream.send_recording_name(name)
     with written(Path(path), failure="cannot write the recording") as (partial,):
         try:
+            partial.touch()  # a folder that is not writable is told before the work
             yield Recording(stream)
             stream.flush()
             partial.write_bytes(memory.drain_as_bytes() or b"")

@@ -33,14 +33,19 @@ from crosscheck.inference.noise import Noise
 from crosscheck.preparation.prepare import noise_floor
 from crosscheck.show import error_figures
 from crosscheck.show.arrows import drawn, magnification, views_of
+from crosscheck.show.blocks import text_of as text_of_words
 from crosscheck.show.candidates import candidate_rows, untried
-from crosscheck.show.diagnosis import checks, correlations, parameter_table
+from crosscheck.show.diagnosis import checks
 from crosscheck.show.effect_figures import confusion_of, waterfall
 from crosscheck.show.error_figures import Wall, draw_wall, failure_map, length_changes, walls_of
 from crosscheck.show.figures import keeping
+from crosscheck.show.findings import correlations, in_brief, parameter_table
 from crosscheck.show.page import render, write_page
-from seecr.effects import Terms, layout_of
+from crosscheck.show.robot_figure import cables_of, projection
+from seecr import load_robot
+from seecr.effects import Term, Terms, layout_of
 from seecr.errors import InputFileError
+from seecr.pose import transform_points
 from seecr.show.colours import AFTER, BEFORE, CALM
 from seecr.units import short, with_error
 
@@ -588,7 +593,8 @@ def test_pages_are_small() -> None:
 def test_nothing_missing_is_not_drawn_in_the_colour_of_alarm() -> None:
     *calm, _confusion = figures_of(page("nothing"))  # which frames what imitates what
     assert len(calm) > 2 and not any(BEFORE.lower() in figure.lower() for figure in calm)
-    alarming = figures_of(page("unknown"))[0].lower()
+    _robot, errors, *_others = figures_of(page("unknown"))
+    alarming = errors.lower()
     assert BEFORE.lower() in alarming and CALM.lower() not in alarming
 
 
@@ -600,3 +606,33 @@ def test_where_an_axis_has_no_zero_there_are_dots_and_no_bars(name: str, models:
     bars = len(re.findall(fills, figure, re.IGNORECASE))
     assert bars == models * (3 - logarithmic)
     assert (logarithmic > 0) == (name == "pulleys")
+
+
+def test_a_mechanic_reads_first_what_is_wrong_by_how_much_and_where() -> None:
+    robot = made.robot()
+    found = diagnosis("pulleys").missing[0]
+    assert text_of_words(in_brief(found, robot.cable_names)).startswith(
+        "Pulleys with a radius pulley_radius: radius 10.0005 ± 0.0075 mm. Independent check: "
+    )
+    drums = layout_of("drum_gain", robot)
+    gain = np.zeros(len(drums))
+    gain[[1, 2]] = 0.002, -0.0086
+    errors = np.full(len(drums), 3e-5)
+    own = {"stderr": errors, "at_bound": errors < 0.0, "check": "measure the drums"}
+    finding = replace(found, term=Term(drums, gain), **own)
+    said = text_of_words(in_brief(finding, robot.cable_names))
+    assert f": largest at {robot.cable_names[2]}, -0.8600 ± 0.0030 %. Independent" in said
+    assert cables_of(finding, robot.n_cables) == [2]
+    assert cables_of(found, robot.n_cables) == [*range(robot.n_cables)]
+    blind = replace(finding, stderr=np.full(len(drums), np.inf))
+    assert "its values are not determined" in text_of_words(in_brief(blind, robot.cable_names))
+
+
+@pytest.mark.parametrize("name", ["planar_vertical", "demobot_cogiro", "planar_two_cable"])
+def test_a_robot_is_drawn_upright_and_to_one_scale(name: str) -> None:
+    robot = load_robot(name)
+    anchors = transform_points(robot.reference_pose[None], robot.anchor_points)[0]
+    flat = projection(robot, np.concatenate([robot.exit_points, anchors]))
+    assert np.allclose(flat @ flat.T, np.eye(2))
+    right, up = flat @ robot.up
+    assert abs(right) < 1e-12 and up > 0.5
