@@ -27,8 +27,8 @@ from typing import Any
 
 import numpy as np
 
-from seecr import __version__
 from seecr.errors import InputError, InputFileError
+from seecr.version import full_version
 
 UNFINISHED = ".unfinished-"
 """How names of folders begin whose files are not complete, see :func:`seecr.folders.staged`."""
@@ -284,7 +284,7 @@ class Made:
             str(file) if names.count(file.name) > 1 else file.name: digits_of(file)
             for file in read
         }
-        return cls(__version__, command, date.today().isoformat(), hashes)
+        return cls(full_version(), command, date.today().isoformat(), hashes)
 
     @property
     def result(self) -> str:

@@ -108,6 +108,7 @@ seecr.parallel: processors
 seecr.pose: NORM_TOLERANCE
 seecr.statics.starts: commanded_poses
 seecr.units: millimetres
+seecr.version: full_version
 seecr.workspace.grid: own_directions
 seecr.workspace.maps: evenly
 """.strip().splitlines()

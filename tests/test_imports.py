@@ -18,7 +18,7 @@ from sources import ROOT, imports, imports_of, modules, name_of, tree_of
 
 # The rooms, folders or files, floor by floor from the lowest up.
 TABLE = (
-    "seecr: errors lazy counted parallel compiled",
+    "seecr: errors lazy version counted parallel compiled",
     "seecr: files folders pose arguments result units",
     "seecr: description commands columns",
     "seecr: effects statics prediction",

@@ -15,7 +15,6 @@ import tomlkit
 from tomlkit.items import Comment, InlineTable, Table
 
 from crosscheck.model.fitted import Fitted
-from seecr import __version__
 from seecr.description.fingerprint import fingerprint
 from seecr.description.robot import Robot
 from seecr.effects import ApartLayout, Knowledge, Own, Term, Terms, Values
@@ -36,6 +35,7 @@ from seecr.prediction.model import (
     read_document,
 )
 from seecr.prediction.uncertainty import CORRELATION, PARAMETERS, STDERR
+from seecr.version import full_version
 
 if TYPE_CHECKING:
     from tomlkit import TOMLDocument
@@ -178,7 +178,7 @@ class Provenance:
 
 def provenance_of(data: str, by: str) -> Provenance:
     """The provenance of values fitted today to a file by a command."""
-    return Provenance(data, date.today().isoformat(), f"seecr {__version__}", by)
+    return Provenance(data, date.today().isoformat(), f"seecr {full_version()}", by)
 
 
 def with_fit(

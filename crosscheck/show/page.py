@@ -14,8 +14,8 @@ from crosscheck.planning.result import Plan
 from crosscheck.show import blocks, comparison, diagnosis, plan
 from crosscheck.show.blocks import Bar, Cell, Page, Styled, Words, pieces
 from crosscheck.show.glossary import with_glossary
-from seecr import __version__
 from seecr.files import Made, write_text
+from seecr.version import full_version
 
 _TAGS = {
     blocks.Code: Markup("<code>{}</code>"),
@@ -54,7 +54,7 @@ def render(found: Comparison | Diagnosis | Plan, made: Made | None = None) -> st
     kind = attrgetter("__class__.__name__")
     environment.filters |= {"html": _html, "cell": _cell, "kind": kind}
     page = environment.get_template("page.html.jinja").render(
-        page=_page_of(found), version=__version__, made="" if made is None else made.words
+        page=_page_of(found), version=full_version(), made="" if made is None else made.words
     )
     return with_glossary(page.lstrip())
 

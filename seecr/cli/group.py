@@ -13,9 +13,10 @@ from typing import Any, TypeAlias
 
 import click
 
-from seecr import SeecrError, __version__
+from seecr import SeecrError
 from seecr.compiled.compile_notice import tell_compiling
 from seecr.errors import printable
+from seecr.version import full_version
 
 CommandTable: TypeAlias = Mapping[str, tuple[str, str]]
 
@@ -56,7 +57,7 @@ class LazyGroup(click.Group):
             context_settings={"help_option_names": ["-h", "--help"]},
             epilog=f"'{name} COMMAND --help' shows a command's options and examples.",
         )
-        click.version_option(__version__, prog_name=name)(self)
+        click.version_option(full_version(), prog_name=name)(self)
         self.package, self.table = package, table
 
     def resolve_command(
@@ -120,9 +121,9 @@ class LazyGroup(click.Group):
 
     def _defect(self, error: Exception) -> str:
         """What to say of an exception that nobody foresaw."""
-        what = f"{type(error).__name__}: {error}"[:_MOST]
+        own, what = f"{self.name} {full_version()}", f"{type(error).__name__}: {error}"[:_MOST]
         return (
-            f"a defect of {self.name} {__version__}, not of your input: {what}; please report it "
+            f"a defect of {own}, not of your input: {what}; please report it "
             f"with the command and what {DEBUG} shows (CONTRIBUTING.md)"
         )
 

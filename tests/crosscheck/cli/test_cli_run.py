@@ -21,9 +21,10 @@ from crosscheck.suite import effects as effect_suite
 from crosscheck.suite import run as suite
 from crosscheck.suite.cases import shipped_cases
 from crosscheck.twin.robot import TRUE_EFFECTS
-from seecr import __version__, model_path
+from seecr import model_path
 from seecr.cli.group import LazyGroup
 from seecr.folders import MANIFEST, staged
+from seecr.version import full_version
 
 SMALL = ("--case", "planar-two-cable", "--no-recordings", "--jobs", "1")
 PLANAR = model_path("planar_vertical")
@@ -276,7 +277,7 @@ def test_run_help_names_the_robots_of_all_shipped_cases():
 
 
 def test_version_no_command_and_unknown_command():
-    assert ran("crosscheck --version").output == f"crosscheck, version {__version__}\n"
+    assert ran("crosscheck --version").output == f"crosscheck, version {full_version()}\n"
     assert ran("crosscheck", 0).output.startswith("Usage: ")
     assert made_data.refused("rum").startswith("crosscheck: No such command 'rum'")
 
