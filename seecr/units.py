@@ -7,6 +7,7 @@ digits than are known.
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -71,12 +72,30 @@ UNITS = (
     Unit("C", "C", symbol="°C", column=True, shown=True),
     Unit("Nm", "Nm", symbol="N m", column=True, shown=True),
     Unit("mm_per_N", "m_per_N", over=1000.0, symbol="mm/N", shown=True),
+    Unit("N_m", "N_per_m", also=("N/m",), column=True),
+    Unit("N_mm", "N_per_m", times=1000.0, also=("N/mm",), column=True),
+    Unit("kN_m", "N_per_m", times=1000.0, also=("kN/m",), column=True),
     Unit("um_per_m_K", "1_per_K", over=1e6, symbol="µm/(m K)", shown=True),
 )
 """Every unit that files, people and results use."""
 
 
 _SHOWN = {unit.si: unit for unit in UNITS if unit.shown}
+_TYPED = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)")
+
+
+def in_si(text: str, si: str) -> float | None:
+    """A number with its unit, such as ``25kg``, in SI; one without is in SI. None if it is neither.
+
+    Args:
+        text: as people type it. si: the SI unit of the quantity.
+    """
+    names = {name: unit for unit in UNITS if unit.si == si for name in (unit.suffix, *unit.also)}
+    match = _TYPED.fullmatch(text.strip())
+    if match is None or match[2] not in (*names, ""):
+        return None
+    value = float(match[1])
+    return names[match[2]].to_si(value) if match[2] else value
 
 
 def in_unit(si: str) -> tuple[float, str]:

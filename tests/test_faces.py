@@ -94,6 +94,7 @@ seecr.columns.commands: read_commands
 seecr.columns.plausible: ABSURD scalar_last
 seecr.compiled.compile_notice: tell_compiling
 seecr.counted: counted
+seecr.description.cables: ea_of
 seecr.description.fingerprint: fingerprint
 seecr.description.mjcf: CABLES
 seecr.description.robot: ITS_A_POINT
@@ -104,6 +105,9 @@ seecr.equilibrium.solving: strained strained_rows
 seecr.exported.export: wrote
 seecr.folders: check_ours staged
 seecr.files: Made check_writable json_text with_toml write_text write_texts
+seecr.importing.caspr: read_caspr
+seecr.importing.points_table: read_points
+seecr.importing.wirex: read_wirex
 seecr.parallel: processors
 seecr.pose: NORM_TOLERANCE
 seecr.statics.starts: commanded_poses

@@ -20,7 +20,7 @@ from sources import ROOT, imports, imports_of, modules, name_of, tree_of
 TABLE = (
     "seecr: errors lazy version counted parallel compiled",
     "seecr: files folders pose arguments result units",
-    "seecr: description commands columns",
+    "seecr: description commands columns importing",
     "seecr: effects statics prediction",
     "seecr: tensions equilibrium inverse workspace exported",
     "seecr: show cli",

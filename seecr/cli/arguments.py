@@ -18,6 +18,7 @@ from seecr import Commands, InputError, Model, Robot, Solution, load_model, load
 from seecr.columns.commands import read_commands
 from seecr.columns.plausible import ABSURD, scalar_last
 from seecr.counted import counted
+from seecr.description.cables import ea_of
 from seecr.description.mjcf import CABLES
 from seecr.effects.base import unfed
 from seecr.equilibrium.solving import strained, strained_rows
@@ -25,7 +26,6 @@ from seecr.pose import NORM_TOLERANCE
 from seecr.statics.starts import commanded_poses
 from seecr.workspace.maps import evenly
 
-_LEAST_EA, _MOST_EA = 1e-3, 1e12  # [N]: a steel rope as thick as an arm has 1e9
 _MOST_POSES = 10_000_000  # of a grid or line; more would take days, and all memory
 _COUNT = 24  # poses of --line
 
@@ -40,14 +40,9 @@ def robot_at(given: Path, cable: str | None = None) -> Robot:
     if cable is None:
         return robot
     try:
-        ea = CABLES[cable] if cable in CABLES else float(cable)
-    except ValueError:
-        ea = -1.0
-    if not _LEAST_EA <= ea <= _MOST_EA:
-        raise InputError(
-            f"--cable: expected {', '.join(CABLES)} or k_c from {_LEAST_EA:g} to {_MOST_EA:g} N, "
-            f"got {cable!r}"
-        )
+        ea = CABLES[cable] if cable in CABLES else ea_of(cable, "--cable")[0]
+    except InputError as error:
+        raise InputError(f"{error}, or {' or '.join(CABLES)}") from None
     return replace(robot, ea=np.full(robot.n_cables, ea))
 
 

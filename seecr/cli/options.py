@@ -165,8 +165,8 @@ robot = together(
     click.argument("robot", type=FILE, metavar="ROBOT"),
     option(
         "--cable NAME|N",
-        "k_c = E S of all cables, instead of that in the robot's file: vectran, fishing, or a "
-        "number [N].",
+        "k_c = E S of all cables, instead of that in the robot's file: vectran, fishing, a rope "
+        "such as 'steel 7x19 3mm', or a number [N].",
     ),
     option("--model M.toml", "Model file with the robot's effects.  [default: plain SEECR]"),
 )

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from seecr.counted import between, counted
+from seecr.description.cables import EXAMPLE, rope_of
+from seecr.description.points import described
+from seecr.description.scene import plain_text
 from seecr.errors import InputError, RobotError
+from seecr.files import path_of, write_text
 from seecr.pose import LARGEST, Array, all_finite, quat_rotate, transform_points
 
 ABSURD = 10.0
@@ -112,6 +117,74 @@ class Robot:
         if not self.cable_names:
             object.__setattr__(self, "cable_names", tuple(f"cable{i + 1}" for i in range(m)))
         self._check_values()
+
+    @classmethod
+    def from_points(
+        cls, exit_points: ArrayLike, anchor_points: ArrayLike, *, mass: float,
+        ea: ArrayLike | None = None, stiffness: ArrayLike | None = None, cable: str | None = None,
+        at: ArrayLike | None = None, plane: str | None = "auto",
+        centre_of_mass: ArrayLike = (0.0, 0.0, 0.0), inertia: ArrayLike | None = None,
+        gravity: ArrayLike = (0.0, 0.0, -9.81), names: Sequence[str] = (), name: str = "robot",
+    ) -> Robot:  # fmt: skip
+        """A robot from its points.
+
+        Rest lengths are the straight lengths at the reference pose, as if the winches were zeroed
+        there with cables that are just taut: under its weight the platform sags from it.
+        :func:`seecr.correct` finds rest lengths that hold a pose, with a lowest tension.
+
+        Args:
+            exit_points: A_i in the base frame, (m, 3) [m].
+            anchor_points: B_i in the platform frame, (m, 3) [m]; (3,) if all are one point. Then
+                the platform is a point mass and gets slides alone, since nothing could keep it
+                from turning.
+            mass: of the platform [kg].
+            ea, stiffness, cable: one of them: k_c = E S [N], E S over rest length [N/m], each one
+                number or one for each cable, or a rope such as ``"steel 7x19 3mm"``.
+            at: the reference pose (7,), or its position (3,) without a turn; by default level, in
+                the middle of the frame, half way up to the highest exit point.
+            plane: ``"xz"``, ``"xy"`` or ``"yz"`` for a planar platform, which slides and turns in
+                that plane, None for a free one; ``"auto"``: planar if all points are in one plane.
+            centre_of_mass: in the platform frame, (3,) [m].
+            inertia: about the centre of mass, (3, 3) [kg m^2]; by default that of a solid box
+                around the anchor points. It affects no equilibrium.
+            gravity: (3,) [m/s^2]. names: of the m cables. name: of the robot.
+
+        Raises:
+            InputError, RobotError: shapes or numbers that are no robot's.
+
+        Example:
+            >>> corners = [[0, 0, 3], [6, 0, 3], [6, 4, 3], [0, 4, 3]]
+            >>> seecr.Robot.from_points(corners, [0, 0, 0], mass=25, ea=3e5, at=[3, 2, 1])
+        """
+        if sum(one is not None for one in (ea, stiffness, cable)) != 1:
+            raise InputError(
+                "expected one of ea=3e5 [N], stiffness=1e5 [N/m] (numbers, or one for each cable) "
+                f"and cable={EXAMPLE!r}, got none or several"
+            )
+        strength = rope_of(cable).ea if cable is not None else np.nan if ea is None else ea
+        numbers, replaced = described(
+            exit_points, anchor_points, mass, strength, np.nan if stiffness is None else stiffness,
+            at, plane, centre_of_mass, inertia,
+        )  # fmt: skip
+        if names and len(names) != len(numbers["ea"]):
+            raise InputError(f"names: expected {len(numbers['ea'])}, got {len(names)}")
+        if replaced:
+            raise InputError(
+                "inertia: expected that of a body about its centre of mass, with positive moments, "
+                "none larger than the sum of the others; leave it out for that of a solid box"
+            )
+        joints = tuple(Joint(**joint) for joint in numbers.pop("joints"))
+        down = np.asarray(gravity, float)
+        return cls(name, **numbers, gravity=down, cable_names=tuple(names), joints=joints)
+
+    def save(self, path: str | Path, comment: str = "") -> None:
+        """Write the robot as MJCF, which :func:`seecr.load_robot` reads back.
+
+        Raises:
+            InputError, InputFileError: no path, or the file cannot be written.
+        """
+        about = comment or f"{self.name}; written by seecr"
+        write_text(path_of(path, "the MJCF to write"), plain_text(self, about))
 
     def __repr__(self) -> str:
         """The robot in a few lines, for people."""

@@ -15,13 +15,13 @@ from seecr.compiled.cable_law import LEAST
 from seecr.compiled.columns import CUBIC, FORCE_OF_WEIGHT, QUADRATIC, STRAIN, UP
 from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
+from seecr.description.scene import plain_text
 from seecr.effects import Effect
 from seecr.effects.edits import edit_setup, setup_with
 from seecr.effects.setup import QUANTITIES, History, plain_setup
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError, NoRestError
 from seecr.exported.bodies import SEGMENTS, bodies_text
-from seecr.exported.scene import plain_text
 from seecr.prediction.experiment import effects_of, senses
 from seecr.result import Record, Result
 from seecr.statics.solution import Solution

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seecr.description.robot import Robot
 from seecr.pose import quat_conjugate, quat_rotate
+
+if TYPE_CHECKING:
+    from seecr.description.robot import Robot
 
 _PLATFORM_COLOUR, _CABLE_COLOUR = "0.13 0.35 0.62 1", "0.10 0.12 0.14 1"
 
@@ -110,6 +113,11 @@ def plain_text(robot: Robot, comment: str) -> str:
     root, world, _ = scene(robot, comment)
     for i, point in enumerate(robot.exit_points, start=1):
         ET.SubElement(world, "site", name=f"exit{i}", pos=numbers_text(point), size=dot(robot))
+    if robot.floor is not None:
+        ET.SubElement(
+            world, "geom", type="plane", pos=numbers_text(0.0, 0.0, robot.floor), size="0 0 1",
+            contype="0", conaffinity="0",
+        )  # fmt: skip
     tendons = ET.SubElement(root, "tendon")
     for i, name in enumerate(robot.cable_names):
         rest = float(robot.rest_lengths[i])

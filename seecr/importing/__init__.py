@@ -1,0 +1,1 @@
+"""Robots that are no MJCF: tables of points, and the files of CASPR and WireX."""

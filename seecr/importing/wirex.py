@@ -1,0 +1,105 @@
+"""Robots of WireX (and WireCenter): a ``.wcrfx`` file.
+
+Its conventions (A. Pott, WireX, RobotData.cpp): each ``chain`` is a cable from its ``base`` to its
+``platform``, in metres; the base's radius is that of its pulley, which turns about the base's third
+axis; ``elasticity`` is Young's modulus [Pa] on a circle of the cable's ``radius``.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from seecr.importing.draft import Draft, Faults, pulley_notes
+from seecr.importing.xml_tree import Node, numbers_of, read_xml
+from seecr.pose import Array
+
+_EXPECTED = "expected a robot of WireX (*.wcrfx), <models> with a <robot> in it"
+# cos of the angle of a pulley's axis from the vertical beyond which it leans: 0.08 degrees.
+_UPRIGHT = 1.0 - 1e-6
+_FREE = "3R3T"  # its word for six degrees of freedom
+
+
+def read_wirex(path: Path) -> Draft:
+    """The robot of a file; of several the first.
+
+    Raises:
+        InputFileError: no such file, or one without a robot; all its faults are told at once.
+    """
+    root = read_xml(path, "models", _EXPECTED)
+    faults = Faults(path)
+    robot = _part(root, "robot", faults)
+    chains = list(robot.every("chain"))
+    if not chains:
+        faults.add("has no <chain>; expected one for each cable, in <geometry>", robot.line)
+    bases, ends = ([_part(one, tag, faults) for one in chains] for tag in ("base", "platform"))
+    exits, anchors = ([_point(node, faults) for node in some] for some in (bases, ends))
+    platform = _part(robot, "platform", faults)
+    mass = _value(platform, "mass", faults)
+    if mass < 0.0:
+        faults.add(f"<platform>: expected a mass of 0 or more, got {mass:g}", platform.line)
+    centre, tensor = platform.child("centerofgravity"), platform.child("inertiatensor")
+    at = np.zeros(3) if centre is None else _point(centre, faults)
+    inertia = None
+    if tensor is not None:
+        parts = (
+            _value(tensor, f"I{key}", faults, 0.0) for key in ("xx", "yy", "zz", "xy", "xz", "yz")
+        )
+        xx, yy, zz, xy, xz, yz = parts
+        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    radii = [_value(base, "radius", faults, 0.0) for base in bases]
+    leaning = sum(abs(_value(base, "a33", faults, 1.0)) < _UPRIGHT for base in bases)
+    ea, notes = _elasticity(root, faults)
+    faults.check()
+    notes += pulley_notes(radii)
+    if leaning and any(radii):
+        notes.append(f"{leaning} of them turn about a leaning axis; in that effect it is vertical")
+    nan = np.full(len(chains), math.nan)
+    return Draft(
+        path, robot.values.get("name") or path.stem, np.array(exits), np.array(anchors),
+        np.full(len(chains), ea), nan, (), mass, at, inertia, notes=tuple(notes),
+        joints=() if robot.values.get("motionpattern", "").upper() == _FREE else None,
+    )  # fmt: skip
+
+
+def _part(node: Node, tag: str, faults: Faults) -> Node:
+    """The element of that name in a node; an empty one, and a fault, if there is none."""
+    found = node.child(tag)
+    if found is None:
+        faults.add(f"<{node.tag}>: expected <{tag}> in it, got none", node.line)
+        return Node(tag, dict.fromkeys(("x", "y", "z", "mass"), "0"), node.line)
+    return found
+
+
+def _value(node: Node, key: str, faults: Faults, default: float | None = None) -> float:
+    """The number of an attribute; it may be missing if there is a default."""
+    if key not in node.values and default is not None:
+        return default
+    return float(
+        numbers_of(node.values.get(key, ""), f"<{node.tag}> {key}", 1, faults, node.line)[0]
+    )
+
+
+def _point(node: Node, faults: Faults) -> Array:
+    return np.array([_value(node, axis, faults) for axis in "xyz"])
+
+
+def _elasticity(root: Node, faults: Faults) -> tuple[float, list[str]]:
+    """E S [N] of the file's cables, NaN without one; and what to say of it."""
+    cable = root.child("cable")
+    if cable is None:
+        return math.nan, []
+    modulus, radius, mass = (
+        _value(cable, key, faults, 0.0) for key in ("elasticity", "radius", "weight")
+    )
+    if not (modulus > 0.0 and radius > 0.0):
+        return math.nan, []
+    ea = modulus * math.pi * radius**2
+    said = [
+        f"E S = {ea:.4g} N by the file: {modulus / 1e9:g} GPa on a radius of {1e3 * radius:g} mm"
+    ]
+    if mass > 0.0:
+        said.append(f"its cables weigh {9.81 * mass:.3g} N/m, which the effect cable_weight adds")
+    return ea, said
