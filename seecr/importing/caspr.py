@@ -24,7 +24,7 @@ _MOTIONS = {
     "R_X": "rx", "R_Y": "ry", "R_Z": "rz", "U_XY": "rx ry", "U_XZ": "rx rz", "U_YZ": "ry rz",
     "P_X": "x", "P_XY": "x y", "P_XZ": "x z", "T_XYZ": "x y z", "PLANAR_XY": "x y rz",
     "PLANAR_XZ": "x z ry", "PLANAR_YZ": "y z rx", "S_EULER_XYZ": "rx ry rz",
-    "S_FIXED_XYZ": "rz ry rx", "SPATIAL_EULER_XYZ": "x y z rx ry rz",
+    "SPATIAL_EULER_XYZ": "x y z rx ry rz",
 }  # fmt: skip
 _FREE = "SPATIAL_EULER_XYZ"
 # Kinds of cables whose pull is that of a cable, and where the file has E S of them.

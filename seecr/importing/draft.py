@@ -10,7 +10,7 @@ import numpy as np
 
 from seecr.counted import some
 from seecr.description.cables import EXAMPLE, ea_of
-from seecr.description.points import described, plane_of
+from seecr.description.points import described, home_of, plane_of
 from seecr.description.robot import Joint, Robot
 from seecr.errors import InputError, InputFileError
 from seecr.pose import Array
@@ -105,7 +105,9 @@ class Draft:
             changes["centre_of_mass"] = com
         if planar is not None or free:
             if planar == "auto":
-                planar = plane_of(self.exit_points, self.anchor_points)
+                points = (self.exit_points, self.anchor_points)
+                # a level platform below a level frame has two: at home it is in one
+                planar = plane_of(*points, home_of(*points, None)) or plane_of(*points)
             if planar is None and not free:
                 text = f"{self.path}: its points are in no one plane; say --planar xy, xz or yz"
                 raise InputError(text)
