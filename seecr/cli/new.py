@@ -144,12 +144,11 @@ def command(
         "tension_limits_N": draft.limits, "notes": notes, "home": SweepRows(solution).as_json()[0],
         "why_not": None if status == 0 else reason(solution),
     }  # fmt: skip
-    low, high = draft.limits
-    limits = [*(["--lowest", f"{low:g}"] if low > 0.0 else []),
-              *(["--highest", f"{high:g}"] if high < math.inf else [])]  # fmt: skip
+    limits = dict(zip(("--lowest", "--highest"), draft.limits, strict=True)).items()
+    said = [f"{name}={value:g}" for name, value in limits if 0.0 < value < math.inf]
     lines = [
         f"{out}: {robot!r}", *(f"note: {note}" for note in notes), *home_lines(solution),
-        following("seecr", "map", out, *limits),
+        following("seecr", "map", out, *said),
     ]  # fmt: skip
     click.echo(json_text(document) if as_json else "\n".join(lines))
     return status

@@ -18,59 +18,37 @@ from seecr.units import in_si
 _STANDARD_GRAVITY = 9.80665  # [m/s^2]
 # Smallest and largest diameter [m] of what is sold as a rope of one of these materials.
 _THINNEST, _THICKEST = 1e-4, 0.1
-# A braided rope's circle is this part fibre, and the rope has this part of the fibre's modulus,
-# since its strands cross at an angle. Ropes of twelve strands weigh about 0.75 of a full circle,
-# of which finish is a part, and a 6 mm rope of SK78 stretches by 1 % under 13 kN: 0.7 and 0.6
-# (weights and stretch as rope makers state them; McKenna, Hearle, O'Hear, Handbook of fibre rope
-# technology, 2004, chapters 3 and 4).
+# A braid's circle is this part fibre, and the braid has this part of the fibre's modulus, as its
+# strands cross at an angle: ropes of twelve strands weigh about 0.75 of a full circle, part of that
+# is finish, and a 6 mm rope of SK78 stretches by 1 % under 13 kN (as rope makers state it; McKenna,
+# Hearle, O'Hear, Handbook of fibre rope technology, 2004, chapters 3 and 4).
 _FIBRE, _BRAIDED = 0.70, 0.60
+# By EN 12385-4 a wire rope has C d^2 of metal and W d^2 kg per 100 m, with d in mm (the factors are
+# also in Feyrer, Wire Ropes, 2nd ed. 2015, table 1.9; in section 2.2 moduli of about 100 GPa).
+_WIRE_ROPES = {
+    "steel 7x19": (0.418, 0.381, "6x19M around a strand, which is 7x19"),
+    "steel 6x19": (0.384, 0.359, "6x19 with a fibre core"),
+}
+# Modulus [GPa] and density [kg/m^3] of fibres, by their makers' data sheets.
+_FIBRES = {
+    "dyneema": (113.0, 975.0, "Dyneema SK78"),
+    "vectran": (75.0, 1410.0, "Vectran HT"),
+    "kevlar": (70.5, 1440.0, "Kevlar 29"),
+    "polyester": (10.0, 1380.0, "high-tenacity polyester"),
+}
+_SQUARE = 4.0 / math.pi  # the square of a diameter over the area of its circle
 
-
-@dataclass(frozen=True)
-class Material:
-    """What ropes of one kind have in common.
-
-    Attributes:
-        name: as it is typed.
-        modulus: E S over the area of the rope's circle [Pa].
-        density: mass per metre over that area [kg/m^3].
-        source: of both.
-    """
-
-    name: str
-    modulus: float
-    density: float
-    source: str
-
-
-def _wire_rope(name: str, area: float, mass: float, what: str) -> Material:
-    """By EN 12385-4: ``area`` d^2 is metal, and ``mass`` d^2 / 100 is kg/m, with d in mm.
-
-    Feyrer, Wire Ropes, 2nd ed. 2015, has the factors in table 1.9, and moduli in section 2.2.
-    """
-    circle = math.pi / 4.0
-    return Material(
-        name, 100e9 * area / circle, 1e4 * mass / circle,
-        f"{what}, by EN 12385-4 and a rope modulus of 100 GPa",
-    )  # fmt: skip
-
-
-def _braid(name: str, modulus: float, density: float, what: str) -> Material:
-    """Of fibres with this modulus [Pa] and density [kg/m^3], as their makers state them."""
-    return Material(
-        name, _FIBRE * _BRAIDED * modulus, _FIBRE * density,
-        f"a braid of {what}, by its data sheet's {modulus / 1e9:g} GPa and {density:g} kg/m^3",
-    )  # fmt: skip
-
-
-MATERIALS = (
-    _wire_rope("steel 7x19", 0.418, 0.381, "6x19M around a strand, which is 7x19"),
-    _wire_rope("steel 6x19", 0.384, 0.359, "6x19 with a fibre core"),
-    _braid("dyneema", 113e9, 975.0, "Dyneema SK78"),
-    _braid("vectran", 75e9, 1410.0, "Vectran HT"),
-    _braid("kevlar", 70.5e9, 1440.0, "Kevlar 29"),
-    _braid("polyester", 10e9, 1380.0, "high-tenacity polyester"),
-)
+# By name: E S [Pa] and mass per metre [kg/m^3], over the area of the circle, and their source.
+MATERIALS = {
+    name: (100e9 * c * _SQUARE, 1e4 * w * _SQUARE, f"{what}, by EN 12385-4 and 100 GPa")
+    for name, (c, w, what) in _WIRE_ROPES.items()
+} | {
+    name: (
+        _FIBRE * _BRAIDED * 1e9 * e, _FIBRE * rho,
+        f"a braid of {what}, by its data sheet's {e:g} GPa and {rho:g} kg/m^3",
+    )
+    for name, (e, rho, what) in _FIBRES.items()
+}  # fmt: skip
 """The catalogue. Plain ``steel`` is the first of steel."""
 
 EXAMPLE = "steel 7x19 3mm"
@@ -109,10 +87,9 @@ def rope_of(text: str, label: str = "cable") -> Rope:
     """
     words = re.fullmatch(r"\s*([a-z].*?)\s+([-+.\d]\S*?\s*[a-z]*)\s*", text.lower())
     name = "" if words is None else " ".join(words[1].split())
-    material = next((one for one in MATERIALS if name in (one.name, one.name.split()[0])), None)
+    material = next((one for one in MATERIALS if name in (one, one.split()[0])), None)
     if words is None or material is None:
-        known = [one.name for one in MATERIALS]
-        near = difflib.get_close_matches(text.lower(), known, n=len(known), cutoff=0.0)
+        near = difflib.get_close_matches(text.lower(), MATERIALS, n=len(MATERIALS), cutoff=0.0)
         raise InputError(
             f"{label}: expected E S such as 3e5N, or a rope by material and diameter such as "
             f"{EXAMPLE!r}, got {text!r}; known are {', '.join(near)} (nearest first)"
@@ -124,11 +101,10 @@ def rope_of(text: str, label: str = "cable") -> Rope:
             f"{label}: expected a diameter from {1e3 * _THINNEST:g}mm to {1e3 * _THICKEST:g}mm "
             f"after {name}, such as {EXAMPLE!r}, got {words[2]!r} in {text!r}"
         )
+    modulus, density, source = MATERIALS[material]
     area = 0.25 * math.pi * diameter**2
-    return Rope(
-        f"{material.name} {1e3 * diameter:g}mm", area * material.modulus,
-        area * material.density * _STANDARD_GRAVITY, material.source,
-    )  # fmt: skip
+    weight = area * density * _STANDARD_GRAVITY
+    return Rope(f"{material} {1e3 * diameter:g}mm", area * modulus, weight, source)
 
 
 def ea_of(text: str, label: str) -> tuple[float, str]:

@@ -12,7 +12,7 @@ from seecr.counted import some
 from seecr.description.cables import EXAMPLE, ea_of
 from seecr.description.points import described, home_of, plane_of
 from seecr.description.robot import Joint, Robot
-from seecr.errors import InputError, InputFileError
+from seecr.errors import InputError, InputFileError, SeecrError
 from seecr.pose import Array
 from seecr.units import in_si, millimetres
 
@@ -141,7 +141,7 @@ class Draft:
             )  # fmt: skip
             joints = tuple(Joint(**joint) for joint in numbers.pop("joints"))
             robot = Robot(self.name, **numbers, cable_names=self.cable_names, joints=joints)
-        except InputError as error:
+        except SeecrError as error:
             raise InputError(f"{self.path}: {error}") from None
         return robot, (*self.notes, *self._deduced(robot, replaced))
 
@@ -160,7 +160,7 @@ class Draft:
             if not robot.turns:
                 kind = f"a point mass on slides along {slides}, as all its anchor points are one"
             notes.append(f"the platform is {kind}")
-        if replaced:
+        if replaced and robot.turns:
             notes.append(
                 "its inertia is that of no body: replaced by that of a solid box around the anchor "
                 "points, which affects frequencies alone"

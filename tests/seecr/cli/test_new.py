@@ -77,7 +77,7 @@ def test_a_robot_that_does_not_rest_is_written_and_told() -> None:
     words = f"seecr new k.xml --from caspr {bodies} {cables} --ea 1e5N"
     said = ran(words, 3).stdout
     assert "balanced, but free to move" in said and "nothing loads them" in said
-    assert said.splitlines()[-1].endswith("seecr map k.xml --lowest 0.001 --highest 60")
+    assert said.splitlines()[-1].endswith("seecr map k.xml --lowest=0.001 --highest=60")
     assert len(seecr.load_robot("k.xml").joints) == 3
     assert as_json(f"{words} --force --pretension 10")["home"]["tensions_N"] == pytest.approx(
         [10] * 4

@@ -25,7 +25,7 @@ def test_a_braid_is_near_what_rope_makers_say() -> None:
     assert 0.017 < rope.weight / 9.81 < 0.023
 
 
-@pytest.mark.parametrize("material", [one.name for one in MATERIALS])
+@pytest.mark.parametrize("material", MATERIALS)
 def test_stiffness_and_weight_grow_with_the_square_of_the_diameter(material: str) -> None:
     thin, thick = rope_of(f"{material} 2mm"), rope_of(f"  {material.upper()}   0.4 cm ")
     np.testing.assert_allclose([thick.ea, thick.weight], [4 * thin.ea, 4 * thin.weight])
