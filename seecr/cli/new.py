@@ -120,7 +120,7 @@ def command(
     from seecr.show.pose_words import at_rest
 
     out = out if folder is None else folder / out
-    _check_out(out, force)
+    _check_out(out, force, [points, *files])
     draft = _draft(points, program, files, cable_set)
     draft = draft.with_options(mass=mass, ea=ea, at=at, com=com, planar=planar, free=free)
     if points is not None:
@@ -171,16 +171,18 @@ def _tightened(robot: Robot, least: float) -> Robot:
     return replace(robot, rest_lengths=found.commands.lengths[0])
 
 
-def _check_out(out: Path, force: bool) -> None:
-    """That a new file is written, or an old one replaced on purpose.
+def _check_out(out: Path, force: bool, read: list[Path | None]) -> None:
+    """That a new file is written, or an old one replaced on purpose, and none that is read.
 
     Raises:
-        InputError: it has another ending, or there is a file already.
+        InputError: it has another ending, there is a file already, or it is one of those read.
     """
     from seecr import InputError
 
     if out.suffix.lower() not in (".xml", ".mjcf"):
         raise InputError(f"{out}: expected the name of an MJCF file to write, such as robot.xml")
+    if any(out.exists() and file and file.exists() and out.samefile(file) for file in read):
+        raise InputError(f"{out}: is read here; expected the name of another file to write")
     if out.exists() and not force:
         raise InputError(f"{out}: is there already; expected a new name, or --force to replace it")
 

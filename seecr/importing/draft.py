@@ -167,7 +167,8 @@ class Draft:
             )
         low, high = robot.anchor_points.min(axis=0), robot.anchor_points.max(axis=0)
         away = np.linalg.norm(robot.centre_of_mass - np.clip(robot.centre_of_mass, low, high))
-        if robot.turns and away > np.linalg.norm(high - low):
+        told = any("centre of mass" in note for note in self.notes)
+        if robot.turns and not told and away > np.linalg.norm(high - low):
             place = " ".join(f"{part:g}" for part in robot.centre_of_mass)
             notes.append(
                 f"the centre of mass ({place}) m is {away:.3g} m away from the anchor points, "

@@ -20,6 +20,8 @@ _EXPECTED = "expected a robot of WireX (*.wcrfx), <models> with a <robot> in it"
 # cos of the angle of a pulley's axis from the vertical beyond which it leans: 0.08 degrees.
 _UPRIGHT = 1.0 - 1e-6
 _FREE = "3R3T"  # its word for six degrees of freedom
+# The centre of mass that it gives every robot and writes into every file; it reads none.
+_FILLER = [0.0, 1.0, 0.2]
 
 
 def read_wirex(path: Path) -> Draft:
@@ -56,6 +58,11 @@ def read_wirex(path: Path) -> Draft:
     notes += pulley_notes(radii)
     if leaning and any(radii):
         notes.append(f"{leaning} of them turn about a leaning axis; in that effect it is vertical")
+    if at.tolist() == _FILLER:
+        notes.append(
+            "the centre of mass (0 1 0.2) m is what WireX writes for every robot: if it is not "
+            "this robot's, say --com X Y Z"
+        )
     nan = np.full(len(chains), math.nan)
     return Draft(
         path, robot.values.get("name") or path.stem, np.array(exits), np.array(anchors),

@@ -133,6 +133,14 @@ def test_bad_input_is_one_sentence_and_writes_nothing(words: str, told: str) -> 
     assert set(Path().iterdir()) == before
 
 
+def test_no_file_that_is_read_is_replaced() -> None:
+    bodies, cables = caspr_files(Path(), "cogiro")
+    before = bodies.read_text()
+    words = f"seecr new ./{bodies} --from caspr {bodies} {cables} --ea 1e5 --force"
+    assert "is read here; expected the name of another file" in refused_in_a_line(words)
+    assert bodies.read_text() == before
+
+
 def test_a_file_that_is_there_stays_unless_it_is_said() -> None:
     Path("hall.xml").write_text("mine")
     assert "hall.xml: is there already; expected a new name, or --force" in refused_in_a_line(NEW)

@@ -184,12 +184,16 @@ def test_every_kind_of_number_of_a_wirex_robot(tmp_path: Path) -> None:
     for told in (
         "110 GPa on a radius of 6 mm", "0.226 N/m", "pulleys of 100 mm radius",
         "pulley_radius with radius_m = 0.1", "its inertia is that of no body",
-        "the centre of mass (0 1 0.2) m is 0.961 m away from the anchor points", "say --com X Y Z",
+        "the centre of mass (0 1 0.2) m is what WireX writes for every robot", "say --com X Y Z",
         "the reference pose, where the winches are zeroed, is not given: 0 0 1 m",
     ):  # fmt: skip
         assert told in text
+    beside = draft_of(tmp_path, "caspr", "cogiro", centre=[0, 1, 5]).with_options(ea=EA)
+    assert any("(0 1 5) m is 4.03 m away from the anchor" in note for note in beside.robot()[1])
+    assert any("WireX writes" in n for n in draft_of(tmp_path, "wirex", "cablemasterrobot").notes)
+    assert not any("WireX writes" in n for n in draft_of(tmp_path, "wirex", "hrpcables").notes)
     assert not any(
-        "centre of mass" in note for note in draft.with_options(com=(0, 0, 0)).robot()[1]
+        "of mass (0 0 0)" in note for note in draft.with_options(com=(0, 0, 0)).robot()[1]
     )
 
 
