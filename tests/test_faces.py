@@ -106,6 +106,7 @@ seecr.exported.export: wrote
 seecr.folders: check_ours staged
 seecr.files: Made check_writable json_text with_toml write_text write_texts
 seecr.importing.caspr: read_caspr
+seecr.importing.draft: write_robot
 seecr.importing.points_table: read_points
 seecr.importing.wirex: read_wirex
 seecr.parallel: processors

@@ -115,6 +115,7 @@ def command(
     from seecr import solve
     from seecr.cli.arguments import notes_of
     from seecr.files import check_writable, json_text
+    from seecr.importing.draft import write_robot
     from seecr.show.files import SweepRows
     from seecr.show.new_words import home_lines, reason
     from seecr.show.pose_words import at_rest
@@ -134,7 +135,7 @@ def command(
     read = [points, *files]
     made = options.made_by(*read)
     out.parent.mkdir(parents=True, exist_ok=True)
-    robot.save(out, f"{robot.name}; written by {made.command}")
+    write_robot(robot, out, f"{robot.name}; written by {made.command}")
     status = 0 if at_rest(solution) else 3
     document = {
         "made": made, "exit_status": status, "robot": robot.name, "file": str(out),

@@ -10,9 +10,11 @@ import numpy as np
 
 from seecr.counted import some
 from seecr.description.cables import EXAMPLE, ea_of
+from seecr.description.mjcf import load_robot
 from seecr.description.points import described, home_of, plane_of
 from seecr.description.robot import Joint, Robot
 from seecr.errors import InputError, InputFileError, SeecrError
+from seecr.files import written
 from seecr.pose import Array
 from seecr.units import in_si, millimetres
 
@@ -93,8 +95,8 @@ class Draft:
         changes: dict[str, Any] = {}
         if mass is not None:
             changes["mass"] = in_si(mass, "kg")
-            if changes["mass"] is None or changes["mass"] < 0.0:
-                text = f"--mass: expected a mass with its unit such as 25kg, got {mass!r}"
+            if changes["mass"] is None or changes["mass"] <= 0.0:
+                text = f"--mass: expected a mass above zero with its unit, as 25kg, got {mass!r}"
                 raise InputError(text)
         if ea is not None:
             strength, note = ea_of(ea, "--ea")
@@ -125,7 +127,7 @@ class Draft:
         Raises:
             InputError: nobody says the mass or the elasticity, or no robot has these numbers.
         """
-        asked = ["the platform's mass; give it, such as --mass 25kg"] if self.mass is None else []
+        asked = [] if self.mass else ["the platform's mass; give it, such as --mass 25kg"]
         unsaid = np.isnan(self.ea) & np.isnan(self.stiffness)
         if np.any(unsaid):
             names = self.cable_names or [f"cable{i + 1}" for i in range(len(unsaid))]
@@ -175,6 +177,21 @@ class Draft:
                 "farther than these are from each other: if it only fills a field, say --com X Y Z"
             )
         return notes
+
+
+def write_robot(robot: Robot, path: Path, comment: str) -> None:
+    """Write a robot's MJCF if it can be read back, and nothing if it cannot.
+
+    Raises:
+        InputError: it would be refused, as with a platform larger than its frame.
+        InputFileError: the file cannot be written.
+    """
+    with written(path) as (part,):
+        robot.save(part, comment)
+        try:
+            load_robot(part)
+        except SeecrError as error:
+            raise InputError(str(error).replace(str(part), f"{path} (not written)")) from None
 
 
 def pulley_notes(radii: list[float]) -> list[str]:
