@@ -136,10 +136,13 @@ class Draft:
             asked.append(f"how far {of}; give E S or a rope, such as --ea 3e5N or --ea {EXAMPLE!r}")
         if self.mass is None or asked:
             raise InputError(f"{self.path}: does not say {'; nor '.join(asked)}")
+        # nothing keeps a free platform on one point from turning about it: it is a point mass
+        one_point = self.joints == () and bool(np.all(self.anchor_points == self.anchor_points[0]))
         try:
             numbers, replaced = described(
                 self.exit_points, self.anchor_points, self.mass, self.ea, self.stiffness, self.pose,
-                self.plane, self.centre_of_mass, self.inertia, self.joints,
+                None if one_point else self.plane, self.centre_of_mass, self.inertia,
+                None if one_point else self.joints,
             )  # fmt: skip
             joints = tuple(Joint(**joint) for joint in numbers.pop("joints"))
             robot = Robot(self.name, **numbers, cable_names=self.cable_names, joints=joints)
@@ -156,7 +159,7 @@ class Draft:
                 f"the reference pose, where the winches are zeroed, is not given: {place} m is the "
                 "middle of the frame; --at X Y Z says another"
             )
-        if self.joints is None and robot.joints:
+        if robot.joints and not self.joints:
             slides = " ".join(joint.name for joint in robot.joints if joint.kind == "slide")
             kind = f"planar: it slides along {slides} and turns; --free frees it"
             if not robot.turns:

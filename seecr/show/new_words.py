@@ -40,9 +40,8 @@ def reason(solution: Solution) -> str:
     free = unresisted(robot, pose, np.ones(robot.n_cables, dtype=bool))
     if len(free):
         return (
-            f"its {counted(robot.n_cables, 'cable')} leave {counted(len(free), 'motion')} free, "
-            f"whatever they pull: {_motions(solution, free)}; expected more cables, or anchor "
-            "points elsewhere"
+            f"no cable, taut or slack, resists {counted(len(free), 'motion')}: "
+            f"{_motions(solution, free)}; expected more cables, or anchor points elsewhere"
         )
     slack = solution.slack[0]
     if slack.all():

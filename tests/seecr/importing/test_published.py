@@ -226,7 +226,15 @@ def test_cables_through_one_axis_leave_the_turn_about_it(tmp_path: Path) -> None
         .robot()
     )
     said = reason(seecr.solve(robot, robot.reference_pose))
-    assert "8 cables leave 1 motion free, whatever they pull: turn about z" in said
+    assert "no cable, taut or slack, resists 1 motion: turn about z" in said
+
+
+def test_a_free_platform_on_one_point_is_a_point_mass(tmp_path: Path) -> None:
+    rows = [[*row[:3], 0.1, 0.2, 0.3] for row in CASPR["cogiro"]["cables"]]
+    robot, notes = draft_of(tmp_path, "caspr", "cogiro", cables=rows).with_options(ea=EA).robot()
+    assert [joint.name for joint in robot.joints] == ["x", "y", "z"]
+    assert any("a point mass on slides along x y z" in note for note in notes)
+    assert seecr.solve(robot, robot.reference_pose).converged.all()
 
 
 # --- damage ----------------------------------------------------------------------------------
