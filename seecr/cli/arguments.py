@@ -42,7 +42,8 @@ def robot_at(given: Path, cable: str | None = None) -> Robot:
     try:
         ea = CABLES[cable] if cable in CABLES else ea_of(cable, "--cable")[0]
     except InputError as error:
-        raise InputError(f"{error}, or {' or '.join(CABLES)}") from None
+        known = f"expected {', '.join(CABLES)}, E S"
+        raise InputError(str(error).replace("expected E S", known, 1)) from None
     return replace(robot, ea=np.full(robot.n_cables, ea))
 
 

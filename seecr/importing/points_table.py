@@ -37,7 +37,8 @@ def read_points(path: Path) -> Draft:
     if missing:
         faults.add(
             "expected a table of points, one row a cable: exit_x_m exit_y_m exit_z_m anchor_x_m "
-            f"anchor_y_m anchor_z_m; {' '.join(missing)} missing", table.header_line,
+            f"anchor_y_m anchor_z_m; {' '.join(missing)} missing, got {' '.join(table.names)}",
+            table.header_line,
         )  # fmt: skip
     values = {name: _numbers(table, name, *place, faults) for name, place in columns.items()}
     nan, zero = np.full(len(table.line), math.nan), np.zeros(len(table.line))

@@ -40,8 +40,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("pose demobot_parallel 0.4 0.25 nan", "Z: expected metres, in the range of"),
         ("pose demobot_parallel 1e300 0 1", "got 1e+300"),
         ("pose demobot_parallel 0.4 0.25 0.1 --cable 1e300",
-         "--cable: expected E S from 0.001 to 1e+12 N, or a rope such as 'steel 7x19 3mm', got "
-         "'1e300', or vectran or fishing"),
+         "--cable: expected vectran, fishing, E S from 0.001 to 1e+12 N, or a rope such as "
+         "'steel 7x19 3mm', got '1e300'"),
         ("pose demobot_parallel 0.4 0.25 0.1 1 1 0 0",
          "QW QX QY QZ: expected a unit quaternion, scalar first, got one of norm 1.414"),
         ("pose here.csv 0 0 0", "here.csv: begins with 'run,cmd_x_m,cmd_y_m,cmd_z_m', which is "

@@ -113,7 +113,7 @@ def test_all_faults_of_a_table_are_told_at_once(tmp_path: Path) -> None:
         ([HEAD, "a,0,0"], "expected 7 cells as in the header (line 1), got 3 cells"),
         (["<mujoco/>"], "looks like XML"),
         (["exit_x_m,exit_x_mm,exit_y_m,exit_z_m", "0,0,0,0"], "column exit_x_mm: repeats exit_x"),
-        (["cmd_x_m,cmd_y_m", "1,2"], "exit_x_m exit_y_m exit_z_m missing"),
+        (["cmd_x_m,cmd_y_m", "1,2"], "exit_x_m exit_y_m exit_z_m missing, got cmd_x_m cmd_y_m"),
     ],
 )
 def test_what_is_no_table_of_points_is_told(tmp_path: Path, lines: list[str], told: str) -> None:
