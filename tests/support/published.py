@@ -74,7 +74,7 @@ def caspr_files(folder: Path, name: str, **changes: Any) -> tuple[Path, Path]:
 def wirex_file(folder: Path, name: str, **changes: Any) -> Path:
     """The ``.wcrfx`` of a robot, one element a line, with some changes."""
     one = {**WIREX[name], **changes}
-    path = folder / one["file"]
+    path: Path = folder / one["file"]
 
     def point(values: Any) -> str:
         return " ".join(f'{axis}="{value}"' for axis, value in zip("xyz", values, strict=True))
