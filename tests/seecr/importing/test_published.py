@@ -89,7 +89,7 @@ def test_attachments_about_the_centre_of_mass_and_inertia_about_the_joint(tmp_pa
     c, mass = np.array(one["centre"]), one["mass"]
     xx, yy, zz, xy, xz, yz = one["inertia"]
     about_com = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    # MuJoCo: two bodies of half the mass at c +- d, seen from the joint
+    # parallel axes, outwards; what MuJoCo compiles below is the inertia about the centre again
     shifted = about_com + mass * (c @ c * np.eye(3) - np.outer(c, c))
     six = shifted[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist()
     moved = [[*row[:3], *(np.array(row[3:]) - c).tolist()] for row in one["cables"]]
