@@ -237,7 +237,18 @@ def verdict_line(run: Run) -> str:
         Outcome.DIFFER: f"SEECR and MuJoCo differ in {some(bad)}",
         Outcome.NOT_CONVERGED: f"not every solve converged: see {some(bad)}",
     }[run.outcome]
-    return f"{start}; {worst_sentence(run.worst)}."
+    return f"{start}; {_why(run)}."
+
+
+def _why(run: Run) -> str:
+    """The worst difference; where a run fails though that is allowed, what it fails for."""
+    worst = run.worst
+    if run.outcome is not Outcome.DIFFER or (worst is not None and worst[1].ratio > 1.0):
+        return worst_sentence(worst)
+    for result in run.results:
+        for line in failure_lines(result):
+            return f"all differences are allowed, but in {result.case.name} at {line}"
+    return "all differences are allowed, but the effects named fail"
 
 
 def threshold_cells(run: Run) -> list[str]:

@@ -162,6 +162,15 @@ def test_verdict_line_names_the_worst_difference(good):
     assert "agree at 0 of 3 poses of 1 case (3 findings); no pose could be compared" in line
 
 
+def test_verdict_line_says_why_where_all_differences_are_allowed(good):
+    """It had said "differ ...; worst difference ..., 0.28 % of the allowed one"."""
+    bad = failed(good, "slack")
+    near = replace(bad, difference=good.difference)
+    line = verdict_line(run_of(good, near))
+    assert "differ in slack; all differences are allowed, but in slack at pose 1, commanded" in line
+    assert "worst difference" not in line
+
+
 def test_terminal_table_shows_units_thresholds_and_failures(good, capsys):
     print_run(run_of(good, failed(good, "bad")), Path("here"))
     out = capsys.readouterr().out
