@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,7 @@ from crosscheck.fit.state import contradictions
 from crosscheck.fit.words import fitted_records, rms_words
 from crosscheck.given import (
     GivenModel,
+    GivenNames,
     GivenRobot,
     basis_of,
     considered,
@@ -196,8 +197,8 @@ def calibrate(
     model: GivenModel = (),
     progress: Progress = silent,
     *,
-    only: Iterable[str] = (),
-    exclude: Iterable[str] = (),
+    only: GivenNames = (),
+    exclude: GivenNames = (),
 ) -> Calibrated:
     """Fit every effect that the data can see, with plausible sizes as priors.
 
@@ -206,8 +207,9 @@ def calibrate(
         data: measurements, or their file.
         model: effects to start from, or their file; by default the plain model.
         progress: called with what is being done and the fraction that is done.
-        only: names of the effects to fit beside the model's own; by default all.
-        exclude: names of effects that are not fitted, unless the model has them.
+        only: the effects to fit beside the model's own, by their names or classes; by default
+            the whole catalogue. Effects of one's own are among them.
+        exclude: effects that are not fitted, unless the model has them.
 
     Raises:
         InputError: there is no effect of a name.
@@ -272,4 +274,4 @@ def _absent(every: Catalogue, kept: set[str]) -> dict[str, Reason]:
     """The effects of the catalogue that a model of all effects does not have, with the reasons."""
     nothing = dict.fromkeys((n for n in every.effects if n not in kept), Reason(Why.GAINS_NOTHING))
     absent = {**every.reasons, **nothing}
-    return {name: absent[name] for name in catalogue() if name in absent}
+    return {name: absent[name] for name in (*catalogue(), *absent) if name in absent}

@@ -14,14 +14,15 @@ from crosscheck.errors import CrosscheckError
 from seecr.arguments import finite
 from seecr.description.mjcf import GivenRobot, load_robot, robot_file, robot_of
 from seecr.description.robot import Robot
-from seecr.effects import Term, Terms, catalogue, effect_named
+from seecr.effects import Effect, GivenEffect, Term, Terms, catalogue, class_of
 from seecr.errors import InputError, RobotError
 from seecr.folders import check_ours
 from seecr.pose import Array
-from seecr.prediction.model import Model, effects_given, model_given, new_model, no_effects
+from seecr.prediction.model import Model, effects_given, model_given, new_model
 
 __all__ = [
     "GivenModel",
+    "GivenNames",
     "GivenRobot",
     "basis_of",
     "check_above_zero",
@@ -30,15 +31,19 @@ __all__ = [
     "copy_robot",
     "file_of",
     "model_of",
+    "names_of",
     "opened",
     "robot_of",
 ]
 
-GivenModel: TypeAlias = Model | Iterable[Term] | str | Path
+GivenModel: TypeAlias = Model | Iterable[Term | Effect] | str | Path
 """A model, its effects alone, or the path of its TOML; ``()`` is the plain model."""
 
+GivenNames: TypeAlias = Iterable[GivenEffect] | GivenEffect
+"""Effects by their names, their classes or instances; or one."""
 
-def considered(only: Iterable[str] = (), exclude: Iterable[str] = ()) -> frozenset[str]:
+
+def considered(only: GivenNames = (), exclude: GivenNames = ()) -> frozenset[str]:
     """Names of the effects that may be missing.
 
     Args:
@@ -46,12 +51,11 @@ def considered(only: Iterable[str] = (), exclude: Iterable[str] = ()) -> frozens
         exclude: and not these.
 
     Raises:
-        InputError: no effect of a name; the known ones are listed, nearest first.
+        InputError: no effect of a name; the known ones are listed, nearest first. Or two of one
+            name.
         CrosscheckError: none is left.
     """
-    chosen, left_out = _names(only, "only"), _names(exclude, "exclude")
-    for name in (*chosen, *left_out):
-        effect_named(name)
+    chosen, left_out = names_of(only, "only"), names_of(exclude, "exclude")
     names = frozenset(chosen or catalogue()) - frozenset(left_out)
     if not names:
         raise CrosscheckError(
@@ -61,13 +65,24 @@ def considered(only: Iterable[str] = (), exclude: Iterable[str] = ()) -> frozens
     return names
 
 
-def _names(given: Iterable[str], argument: str) -> list[str]:
-    """A list of names; one name stands for itself."""
-    if isinstance(given, str):
-        return [given]
+def names_of(given: GivenNames, argument: str) -> list[str]:
+    """A list of names of effects, each once; one effect stands for itself.
+
+    Raises:
+        InputError: something else than effects, or two of one name.
+    """
+    if isinstance(given, str | type | Effect):
+        given = [given]
     if not isinstance(given, Iterable):
         raise InputError(f"{argument}: expected names of effects, got {given!r}")
-    return list(given)
+    found: dict[str, type[Effect]] = {}
+    for effect in map(class_of, given):
+        if found.setdefault(effect.name, effect) is not effect:
+            raise InputError(
+                f"{argument}: two effects are called {effect.name}: {found[effect.name].__name__} "
+                f"and {effect.__name__}; expected a name of its own for each"
+            )
+    return list(found)
 
 
 def copy_robot(source: Path, copy: Path) -> None:
@@ -148,10 +163,7 @@ def model_of(given: GivenModel, robot: Robot) -> tuple[Terms, tuple[str, ...]]:
         InputError: something else than effects with values.
     """
     effects, notes = effects_given(given, robot)
-    terms = [one for one in effects if isinstance(one, Term)]
-    if len(terms) < len(effects):
-        raise no_effects(next(one for one in effects if not isinstance(one, Term)))
-    return Terms(terms), notes
+    return Terms(one if isinstance(one, Term) else Term.of(robot, one) for one in effects), notes
 
 
 def check_above_zero(sizes: Any) -> None:

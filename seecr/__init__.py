@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         Terms,
         catalogue,
         effect_named,
+        introduce,
         layout_of,
         parameter,
     )
@@ -81,7 +82,7 @@ _MODULES = {
     "commands": ("Commands", "Loads",),
     "effects": (
         "Effect", "Knowledge", "Readings", "Term", "Terms", "catalogue", "effect_named",
-        "layout_of", "parameter",
+        "introduce", "layout_of", "parameter",
     ),
     "equilibrium.solving": ("solve",),
     "errors": (
@@ -119,10 +120,11 @@ __all__ = [
     "RobotError", "SeecrError", "Setup", "SlackSpan", "Solution", "Spread", "Status", "Term",
     "Terms", "Workspace", "Zone", "bar_balances", "bar_equilibria", "bar_manifold", "bar_tilt",
     "barriers", "boundary", "catalogue", "correct", "default_axes", "effect_named", "equilibria",
-    "export", "feasible", "held_chance", "kept_chance", "layout_of", "load_model", "load_robot",
-    "midline_point", "midline_points", "model_names", "model_path", "new_model", "parameter",
-    "placed", "predict", "sensitivities", "slack_spans", "slack_zones", "solution_manifold",
-    "solve", "spread_of", "tension_margin", "tracked", "with_history", "workspace_map",
+    "export", "feasible", "held_chance", "introduce", "kept_chance", "layout_of", "load_model",
+    "load_robot", "midline_point", "midline_points", "model_names", "model_path", "new_model",
+    "parameter", "placed", "predict", "sensitivities", "slack_spans", "slack_zones",
+    "solution_manifold", "solve", "spread_of", "tension_margin", "tracked", "with_history",
+    "workspace_map",
 ]  # fmt: skip
 
 

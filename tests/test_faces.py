@@ -100,6 +100,7 @@ seecr.description.mjcf: CABLES
 seecr.description.robot: ITS_A_POINT
 seecr.effects.base: unfed
 seecr.errors: printable
+seecr.effects.loaded: load_effect
 seecr.equilibrium.search: elsewhere on_their_way
 seecr.equilibrium.solving: strained strained_rows
 seecr.exported.export: wrote

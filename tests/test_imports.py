@@ -149,7 +149,11 @@ PHYSICS = rooms_of(
     "seecr: effects.setup effects.edits commands.Path commands.waypoints_of commands.turning"
 )
 # A trajectory is poses that the robot's joints can reach: what is commanded, no physics.
-OF_ITS_OWN = {"crosscheck.twin.lab": ["seecr.description.joints"]}
+# Of an effect of a user's own nobody has written the mathematics a second time.
+OF_ITS_OWN = {
+    "crosscheck.twin.lab": ["seecr.description.joints"],
+    "crosscheck.twin.own": ["seecr.prediction.experiment"],
+}
 
 
 def physics_taken(name: str, targets: Iterable[str]) -> set[str]:

@@ -19,7 +19,17 @@ from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.preparation.prepare import Progress, prepare
 from seecr.arguments import silent
 from seecr.description.robot import Robot
-from seecr.effects import ApartLayout, Own, Term, Terms, layout_of
+from seecr.effects import (
+    ApartLayout,
+    Effect,
+    GivenEffect,
+    Own,
+    Term,
+    Terms,
+    catalogue,
+    class_of,
+    layout_of,
+)
 from seecr.effects.base import Layout
 from seecr.errors import InputError
 
@@ -36,14 +46,14 @@ class HasTerms(Protocol):
         """The effects."""
 
 
-GivenSeveral: TypeAlias = Iterable[Term | str] | str | HasTerms
-"""Names of effects, effects with their values, or a result that has some."""
+GivenSeveral: TypeAlias = Iterable[Term | GivenEffect] | Term | GivenEffect | HasTerms
+"""Names or classes of effects, effects with their values, or a result that has some."""
 
 
 def add_effect(
     robot: GivenRobot,
     data: GivenData,
-    name: str,
+    name: GivenEffect,
     model: GivenModel = (),
     progress: Progress = silent,
     *,
@@ -54,7 +64,7 @@ def add_effect(
     Args:
         robot: a robot, or its MJCF file.
         data: measurements, or their file.
-        name: name of the effect.
+        name: the effect, by its name, its class or an instance, whose values the fit starts from.
         model: effects of the model, or their file; by default the plain model. If the named effect
             is among them, it is fitted again.
         progress: called with what is being done and the fraction that is done.
@@ -67,7 +77,8 @@ def add_effect(
         UnsolvedError: rows have no equilibrium, or the fit does not converge.
     """
     robot = robot_of(robot)
-    return _added(robot, data, [], [layout_of(name, robot)], model, progress, per)
+    valued, named = _several(name, robot)
+    return _added(robot, data, valued, named, model, progress, per)
 
 
 def add_effects(
@@ -85,7 +96,8 @@ def add_effects(
     Args:
         robot: a robot, or its MJCF file.
         data: measurements, or their file.
-        effects: names of effects, or effects with their values, or a result such as a diagnosis.
+        effects: names or classes of effects, or effects with their values, or a result such as a
+            diagnosis.
         model: effects of the model, or their file; by default the plain model.
         progress: called with what is being done and the fraction that is done.
 
@@ -102,8 +114,8 @@ def add_effects(
 def _several(effects: GivenSeveral, robot: Robot) -> tuple[list[Term], list[Layout]]:
     """Effects with values, and parameters of those that are only named."""
     given = effects.terms if isinstance(effects, HasTerms) else effects
-    some = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
-    wrong = [one for one in some if not isinstance(one, Term | str)]
+    some = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
+    wrong = [one for one in some if not isinstance(one, Term | str | type | Effect)]
     if wrong:
         raise InputError(
             "expected names of effects, effects with their values, or a result such as a "
@@ -111,10 +123,11 @@ def _several(effects: GivenSeveral, robot: Robot) -> tuple[list[Term], list[Layo
         )
     if not some:
         raise CrosscheckError("expected at least one effect to add, got none")
-    valued = [one for one in some if isinstance(one, Term)]
+    terms = [Term.of(robot, one) if isinstance(one, Effect) else one for one in some]
+    valued = [one for one in terms if isinstance(one, Term)]
     has = {term.name for term in valued}
-    names = dict.fromkeys(one for one in some if isinstance(one, str) and one not in has)
-    return valued, [layout_of(name, robot) for name in names]
+    classes = dict.fromkeys(class_of(one) for one in terms if not isinstance(one, Term))
+    return valued, [layout_of(one, robot) for one in classes if one.name not in has]
 
 
 def _added(
@@ -125,8 +138,9 @@ def _added(
     terms, said = model_of(model, robot)
     names, had = [*(t.name for t in valued), *(one.name for one in named)], terms.names
     if per is not None:
+        named, valued = [*(t.layout for t in valued), *named], []
         terms = Terms([*terms.without(names[0]), _apart(terms, named[0], per)])
-    ready = prepare(robot, data, terms)
+    ready = prepare(robot, data, terms, frozenset({*catalogue(), *names}))
     what = " + ".join(names)
     if ready.refusal is not None:
         raise ready.refusal.error(data.path, f"{what} was not fitted")

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 @options.option("--refit", "Refit an effect that the model already has.")
 @options.option("--per [file|run]", "Give EFFECT separate values for each file or run.")
 @options.option("--force", "Add it even if it does not predict held-out runs better.")
+@options.own_effects
 @choices.sigma
 @options.out_file("add.json")
 @options.as_json

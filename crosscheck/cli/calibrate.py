@@ -19,6 +19,7 @@ from seecr.cli import options
 @choices.grown_model
 @choices.only
 @choices.exclude
+@options.own_effects
 @choices.sigma
 @options.option("--force", "Write it even if it does not predict held-out runs better.")
 @options.out_file("calibration.json")

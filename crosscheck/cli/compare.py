@@ -29,6 +29,7 @@ from seecr.cli import options
     'Limits from a file: max_position = "0.5mm" and so on; options override it.',
     name="limits_file",
 )
+@options.own_effects
 @choices.sigma
 @choices.figures
 @options.no_recording

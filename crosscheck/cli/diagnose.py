@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 @options.option("--model M.toml", "Effects that the model already has.")
 @choices.only
 @choices.exclude
+@options.own_effects
 @choices.sigma
 @choices.tolerance
 @options.option("--model-out M.toml", "Write the model with the missing effects added.")

@@ -13,6 +13,7 @@ from seecr.cli.following import following
 @options.command("crosscheck effects", "crosscheck effects pulley_radius --robot robot.xml")
 @click.argument("name", required=False)
 @options.option("--robot ROBOT.xml", "Show plausible sizes for this robot.")
+@options.own_effects
 @options.out_file("effects.json")
 @options.as_json
 def command(name: str | None, robot: Path | None, out: Path | None, as_json: bool) -> int:

@@ -27,6 +27,7 @@ from seecr.cli import options
     "What will be measured: position, orientation, tension.  [default: position,orientation, and "
     "tension if its noise is stated]",
 )
+@options.own_effects
 @choices.sigma
 @options.option(
     "--lowest N",

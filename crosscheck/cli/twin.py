@@ -40,7 +40,8 @@ if TYPE_CHECKING:
 )
 @options.option(
     "--effect NAME",
-    "Hide this effect; only its size is drawn. May be repeated.",
+    "Hide this effect; only its size is drawn. FILE.py:CLASS is one of your own, which acts by its "
+    "own law. May be repeated.",
     name="names",
     multiple=True,
 )
@@ -93,7 +94,11 @@ def command(
             "--effect already sets how many effects are hidden; leave out --effects"
         )
     from crosscheck import Sigma, load_commands, make_twin
+    from seecr.cli.own_effects import introduce_all
 
+    files = list(dict.fromkeys(name for name in names if ".py" in name))
+    own = dict(zip(files, introduce_all(files), strict=True))
+    names = tuple(own.get(name, name) for name in names)
     noise = Sigma.parsed(sigmas)
     commands = load_commands(poses, robot, sigma=noise) if poses is not None else None
     # whatever is hidden, the bar shows the same: rows of one kind, done or not

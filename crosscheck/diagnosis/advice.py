@@ -18,7 +18,7 @@ from crosscheck.planning.planned import Extension, Planned, Reads
 from crosscheck.planning.proposer import Gain, Suggestion, telling_apart
 from crosscheck.planning.result import signal_words
 from seecr.description.robot import Robot
-from seecr.effects import Term, catalogue
+from seecr.effects import Term, effect_named
 from seecr.pose import Array, rotvec_from_quat
 from seecr.units import in_unit, parameter_name, with_error
 
@@ -167,7 +167,7 @@ def measure_next(
 
 def measured_directly(effect: str) -> str:
     """How to measure an effect without the robot's poses, in a few words."""
-    return catalogue()[effect].by_hand()
+    return effect_named(effect).by_hand()
 
 
 def _to_separate(plan: Planned, options: Sequence[Extension], effect: MissingEffect) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from crosscheck.fit.problem import Problem, Rms, kinds_stated, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Refusal, Unfit
 from crosscheck.fit.state import State
 from crosscheck.fit.words import rms_words
-from crosscheck.given import GivenModel, GivenRobot, considered
+from crosscheck.given import GivenModel, GivenNames, GivenRobot, considered
 from crosscheck.inference.catalogue import Catalogue, candidates
 from crosscheck.inference.fit import Data
 from crosscheck.inference.priors import LIMITED, MOST_OF_IT, WIDTHS
@@ -40,8 +40,8 @@ def diagnose(
     model: GivenModel = (),
     progress: Progress = silent,
     *,
-    only: Iterable[str] = (),
-    exclude: Iterable[str] = (),
+    only: GivenNames = (),
+    exclude: GivenNames = (),
     tolerance: Tolerance = HALF_THE_NOISE,
 ) -> Diagnosis:
     """Find the effects that a model misses.
@@ -51,8 +51,9 @@ def diagnose(
         data: its measurements, or their file.
         model: effects that the model has already, or their file; by default the plain model.
         progress: called with what is being done and the fraction that is done.
-        only: names of the effects that may be missing, or one; by default the whole catalogue.
-        exclude: names of effects that are not considered.
+        only: the effects that may be missing, by their names or classes, or one; by default the
+            whole catalogue. Effects of one's own are among them.
+        exclude: effects that are not considered.
         tolerance: from which size on a remainder beyond noise counts as missing.
 
     Raises:

@@ -26,7 +26,7 @@ from crosscheck.inference.fields import Varying, fields_about
 from crosscheck.inference.fit import FLAT, TRACKER, Data, Fit
 from crosscheck.inference.priors import ANEW, FIELD_WIDTHS, UNKNOWN, WIDTHS
 from crosscheck.measurements.data import Measurements
-from seecr.effects import ApartLayout, Term, Terms, apart, catalogue, layout_of
+from seecr.effects import ApartLayout, Term, Terms, apart, considered_of, layout_of
 from seecr.effects.base import Layout
 from seecr.effects.setup import Setup
 from seecr.pose import Array
@@ -126,7 +126,7 @@ def candidates(problem: Problem) -> list[tuple[Layout, Reason | None]]:
     """All effects of the catalogue, each with the reason why these data cannot show it, if any."""
     rows = int(problem.use.sum())
     out = list[tuple[Layout, Reason | None]]()
-    for effect in catalogue().values():
+    for effect in considered_of(problem.considered):
         layout = layout_of(effect, problem.robot)
         why = lacking(problem, layout)
         is_long = len(layout) > min(problem.n_readings, rows) or rows < 2
@@ -169,7 +169,7 @@ class Catalogue:
     def of(cls, data: Data, stood: Terms) -> Catalogue:
         """The catalogue of some data, without fields yet."""
         members, reasons = dict[str, Member](), dict[str, Reason]()
-        for effect in catalogue().values():
+        for effect in considered_of(data.problem.considered):
             layout = layout_of(effect, data.problem.robot)
             if layout.name in stood:
                 continue

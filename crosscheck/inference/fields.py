@@ -22,7 +22,7 @@ from crosscheck.fit.problem import KINDS, POSITION, Rms, rms_by_kind
 from crosscheck.fit.state import derivatives
 from crosscheck.inference.fit import Data, Fit
 from crosscheck.inference.priors import FIELD_WIDTHS, UNKNOWN
-from seecr.effects import Term, Terms, catalogue, layout_of
+from seecr.effects import Term, Terms, layout_of
 from seecr.pose import Array
 
 # Prior width of each degree of a smooth field over that of the degree before.
@@ -127,7 +127,7 @@ class _FieldColumns:
 
     def rates_by(self, name: str) -> Array:
         """(N, k) derivatives of the readings by the parameters of an effect at null."""
-        layout = layout_of(catalogue()[name], self.problem.robot)
+        layout = layout_of(name, self.problem.robot)
         terms = Terms([*self.state.terms.without(name), Term(layout, layout.null)])
         wanted = np.flatnonzero(terms.own(name)).tolist()
         return np.asarray(derivatives(self.problem, self.state.of(terms), wanted, frozen=True))

@@ -38,7 +38,7 @@ from seecr.columns.poses import (
 )
 from seecr.commands import Commands, Loads
 from seecr.counted import counted
-from seecr.effects import catalogue
+from seecr.effects import known
 from seecr.errors import InputError, InputFileError
 from seecr.files import Toml, path_of, read_toml
 from seecr.folders import check_together
@@ -121,7 +121,7 @@ def _source(toml: Toml, table: dict[str, object]) -> str:
 
 def _free(toml: Toml) -> tuple[str, ...]:
     names = toml.content.get("free", [])
-    sensing = [name for name, effect in catalogue().items() if effect.place == "sensing"]
+    sensing = [name for name, effect in known().items() if effect.place == "sensing"]
     if not isinstance(names, list) or not all(name in sensing for name in names):
         text = f'free must be a list of some of {", ".join(sensing)}, such as ["tracker_frame"]'
         raise toml.error(f"{text}, got {names!r}", "free")

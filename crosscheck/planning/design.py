@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.algebra import imitated
-from crosscheck.given import GivenRobot, robot_of
+from crosscheck.given import GivenNames, GivenRobot, names_of, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import GivenCommands, commands_of
 from crosscheck.planning.places import (
@@ -50,7 +50,7 @@ from seecr.arguments import finite, numbers, silent, whole
 from seecr.counted import counted, some
 from seecr.description.joints import pose_of_values
 from seecr.description.robot import ITS_A_POINT, Robot
-from seecr.effects import Term, Terms, layout_of
+from seecr.effects import Term, Terms, catalogue, layout_of
 from seecr.equilibrium.solving import strained
 from seecr.errors import InputError
 from seecr.pose import Array
@@ -111,6 +111,7 @@ def make_plan(
     reads: Collection[str] | str = (),
     limits: Limits = NO_LIMITS,
     box: Array | None = None,
+    effects: GivenNames = (),
 ) -> Plan:
     """Predict what planned commands will show of each effect.
 
@@ -124,6 +125,7 @@ def make_plan(
             of them; by default the pose, and tensions if their noise is stated.
         limits: lowest and highest tension [N] of poses that are proposed.
         box: (2, 3) [m] lowest and highest position of these.
+        effects: of one's own, to be considered beside those of the catalogue.
 
     Raises:
         CrosscheckError: there is an unknown kind of reading.
@@ -137,7 +139,8 @@ def make_plan(
     read = Reads.of_kinds(robot.n_cables, kinds)
     full, assumed = expected_sigma(robot, stated, kinds)
     free = [layout_of(name, robot) for name in commands.free]
-    plan = planned(robot, commands, full, read, Terms(Term(one, one.null) for one in free))
+    model, names = Terms(Term(one, one.null) for one in free), _beside_catalogue(effects)
+    plan = planned(robot, commands, full, read, model, names)
     notes = [*robot.notes, *strained(robot), *commands.notes, *assumed]
     if plan.unsolved.any():
         status = plan.base.prediction.solution().status[int(np.argmax(plan.unsolved))].value
@@ -168,6 +171,11 @@ def make_plan(
         notes=tuple(dict.fromkeys(notes)),
         loose=loose,
     )
+
+
+def _beside_catalogue(effects: GivenNames) -> frozenset[str]:
+    """Names of the catalogue's effects and of further ones."""
+    return frozenset({*catalogue(), *names_of(effects, "effects")})
 
 
 def _loose(plan: Planned) -> tuple[tuple[int, tuple[str, ...]], ...]:
@@ -238,6 +246,7 @@ def choose_poses(
     limits: Limits = NO_LIMITS,
     box: Array | None = None,
     progress: Progress = silent,
+    effects: GivenNames = (),
 ) -> Measurements:
     """Choose poses to measure: those that together show and tell apart most effects.
 
@@ -249,6 +258,7 @@ def choose_poses(
         limits: lowest and highest tension [N].
         box: (2, 3) [m] lowest and highest position; by default inside the exit points.
         progress: called with what is being done and the fraction that is done.
+        effects: of one's own, to be shown too.
 
     Returns:
         Commands, in runs that go from each pose to one nearby.
@@ -264,12 +274,14 @@ def choose_poses(
     kinds = kinds_of(reads, sigma or Sigma())
     full, _assumed = expected_sigma(robot, sigma or Sigma(), kinds)
     tried, channels = candidate_poses(robot, box), Reads.of_kinds(robot.n_cables, kinds)
+    there_are = _beside_catalogue(effects)
     plan, found = None, 0
     if robot.n_cables >= robot.n_dof:
-        plan = _usable(robot, held_within(robot, tried, limits), rows, full, channels, limits)
+        held = held_within(robot, tried, limits)
+        plan = _usable(robot, held, rows, full, channels, limits, there_are)
         found = 0 if plan is None else plan.problem.data.n_rows
     if robot.n_cables <= robot.n_dof and found < rows:  # few cables hold little, but rest nearby
-        plan = _usable(robot, tried, rows, full, channels, limits)
+        plan = _usable(robot, tried, rows, full, channels, limits, there_are)
         found = 0 if plan is None else plan.problem.data.n_rows
     if plan is None or found < rows:
         cure = "ask for fewer rows, a wider range of tensions, or another box"
@@ -325,8 +337,9 @@ def _room(robot: Robot, frame: Array) -> tuple[Array, Array]:
 
 
 def _usable(
-    robot: Robot, poses: Array, rows: int, sigma: Sigma, reads: Reads, limits: Limits
-) -> Planned | None:
+    robot: Robot, poses: Array, rows: int, sigma: Sigma, reads: Reads, limits: Limits,
+    considered: frozenset[str] = frozenset(),
+) -> Planned | None:  # fmt: skip
     """The plan of those poses at which the plain robot rests, stiff and within the limits.
 
     Where a lowest tension is asked for, those with slack cables are left out, if there are ``rows``
@@ -334,7 +347,7 @@ def _usable(
     """
     if len(poses) == 0:
         return None
-    every = _plan(robot, poses, sigma, reads)
+    every = _plan(robot, poses, sigma, reads, considered)
     tensions = every.base.prediction.tensions
     good = trustworthy(every, every) if every.problem.use.any() else every.problem.use
     good = good & (tensions <= limits[1]).all(axis=1) & (tensions >= limits[0]).all(axis=1)
@@ -343,13 +356,15 @@ def _usable(
         return None
     # a selection spread over all of them, as they are in the order of the grid
     kept = kept[np.unique(np.linspace(0, len(kept) - 1, min(_MOST, len(kept))).astype(int))]
-    return _plan(robot, poses[kept], sigma, reads)
+    return _plan(robot, poses[kept], sigma, reads, considered)
 
 
-def _plan(robot: Robot, poses: Array, sigma: Sigma, reads: Reads) -> Planned:
+def _plan(
+    robot: Robot, poses: Array, sigma: Sigma, reads: Reads, considered: frozenset[str]
+) -> Planned:
     run = np.array([f"pose {k + 1}" for k in range(len(poses))])
     data = Measurements(Path("poses.csv"), robot.n_cables, run, command_pose=poses)
-    return planned(robot, data, sigma, reads)
+    return planned(robot, data, sigma, reads, considered=considered)
 
 
 def _wanted_of_each(there: dict[str, Signal]) -> list[Wanted]:

@@ -16,7 +16,7 @@ from crosscheck.fit.state import State, evaluate
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.compiled.columns import REST, STRAIN, TENSION
 from seecr.description.robot import Robot
-from seecr.effects import Terms
+from seecr.effects import Terms, catalogue
 from seecr.effects.base import Readings
 from seecr.pose import Array, rxyz_from_quat
 from seecr.prediction.experiment import Experiment
@@ -145,13 +145,15 @@ def expected_sigma(
 
 
 def planned(
-    robot: Robot, commands: Measurements, sigma: Sigma, reads: Reads, terms: Terms | None = None
-) -> Planned:
+    robot: Robot, commands: Measurements, sigma: Sigma, reads: Reads, terms: Terms | None = None,
+    considered: frozenset[str] = frozenset(),
+) -> Planned:  # fmt: skip
     """The problem of commands as they would be measured, whatever readings they have.
 
     Args:
         robot, commands: what is planned. sigma: noise of every kind that is read.
         reads: what will be read. terms: effects of the model; by default none.
+        considered: names of effects; by default those of the catalogue.
 
     Raises:
         CrosscheckError: the robot's joints lock all that will be read.
@@ -159,7 +161,8 @@ def planned(
     model = Terms() if terms is None else terms
     prediction = Experiment(robot, commands.as_commands(robot)).predict(model.effects)
     full = _as_read(commands, prediction.readings, reads)
-    problem = Problem(robot, full, sigma, np.asarray(prediction.solved))
+    asked = considered or frozenset(catalogue())
+    problem = Problem(robot, full, sigma, np.asarray(prediction.solved), considered=asked)
     if prediction.solved.any() and not problem.measured.any():
         raise CrosscheckError(
             f"robot {robot.name}: its joints lock all that would be read "
@@ -253,5 +256,5 @@ def like(
     """A plan with other rows or sensors, everything else unchanged."""
     return planned(
         plan.problem.robot, data, sigma or plan.problem.sigma, reads or plan.reads,
-        plan.base.terms,
+        plan.base.terms, plan.problem.considered,
     )  # fmt: skip

@@ -13,7 +13,7 @@ from crosscheck.fit.words import belongs, shown
 from crosscheck.show.blocks import Block, Items, Line, TextTable
 from crosscheck.show.terminal import show
 from seecr.description.robot import Robot
-from seecr.effects import BUILT_IN, PLACES, Effect, effect_named, layout_of
+from seecr.effects import BUILT_IN, PLACES, Effect, known, layout_of
 from seecr.result import Record
 from seecr.units import in_unit, parameter_name
 
@@ -76,7 +76,10 @@ def size_words(metadata: Mapping[str, Any]) -> str:
 
 def parameter_lines(name: str, values: Mapping[str, float]) -> list[str]:
     """An effect's values by its parameters' names, SI, in the units that people read."""
-    own = [(f.name, f.metadata["unit"]) for f in fields(effect_named(name))]
+    effect = known().get(name)
+    if effect is None:  # of a file that was not named
+        return [f"{key} = {shown(value, '')}" for key, value in values.items()]
+    own = [(f.name, f.metadata["unit"]) for f in fields(effect)]
     out = []
     for key, value in values.items():
         unit = next(unit for field, unit in own if belongs(key, field, unit))

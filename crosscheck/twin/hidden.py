@@ -11,7 +11,7 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from crosscheck.twin.measure import Truth
 from crosscheck.twin.robot import TRUE_EFFECTS
 from seecr.counted import counted
 from seecr.description.robot import Robot
-from seecr.effects import Layout, Term, effect_named, layout_of
+from seecr.effects import Effect, GivenEffect, Layout, Term, class_of, effect_named, layout_of
 from seecr.errors import InputFileError
 from seecr.files import path_of, plain, read_text
 from seecr.pose import pose_difference, transform_points
@@ -45,6 +45,9 @@ gains.
 
 Generator = np.random.Generator
 
+GivenHidden: TypeAlias = Sequence[GivenEffect | Term] | GivenEffect | Term
+"""Effects that a twin is to hide: those with values have these, of the others they are drawn."""
+
 
 def values_of(term: Term) -> dict[str, float]:
     """Values by the parameters' names."""
@@ -52,17 +55,17 @@ def values_of(term: Term) -> dict[str, float]:
 
 
 def times(term: Term, factor: float) -> Term:
-    """An effect ``factor`` times as large, within its bounds; shapes are kept."""
+    """An effect ``factor`` times as large, within its bounds; shapes and what is fixed are kept."""
     layout = term.layout
     grown = layout.null + factor * (term.vector - layout.null)
-    vector = np.where(layout.shape, term.vector, np.clip(grown, layout.lower, layout.upper))
-    return Term(layout, vector)
+    kept = layout.shape | term.knowledge.fixed
+    return term.with_vector(np.where(kept, term.vector, np.clip(grown, layout.lower, layout.upper)))
 
 
 def choose(
     robot: Robot,
     random: Generator,
-    names: Sequence[str] | None = None,
+    given: GivenHidden | None = None,
     count: int | None = None,
     tensions: bool = False,
     lacking: Mapping[str, str] | None = None,
@@ -74,18 +77,25 @@ def choose(
     Args:
         robot: for its plausible sizes.
         random: of the twin's seed.
-        names: these effects; None draws them.
+        given: these effects, with the sizes that they have if any; None draws them.
         count: how many to draw; None draws that too.
-        tensions: whether tensions are recorded: then their scale may be hidden too, if ``names``
+        tensions: whether tensions are recorded: then their scale may be hidden too, if ``given``
             and ``count`` are not given. All else is drawn as without tensions.
         lacking: data needed by effects that the commands do not have, in words.
 
     Raises:
-        CrosscheckError: an effect that MuJoCo has no truth for, more effects than there are, or
-            effects that need data which the commands lack; those chosen by the seed are not named.
+        InputError: something else than effects.
+        CrosscheckError: more effects than there are, or effects that need data which the commands
+            lack; those chosen by the seed are not named.
     """
-    lacking, free = lacking or {}, names is None and count is None
-    if names is None:
+    lacking, free = lacking or {}, given is None and count is None
+    sized: dict[str, Term] = {}
+    if given is not None:
+        every = [given] if isinstance(given, str | type | Effect | Term) else list(given)
+        terms = [Term.of(robot, one) if isinstance(one, Effect) else one for one in every]
+        sized = {one.name: Term(one.layout, one.vector) for one in terms if isinstance(one, Term)}
+        names = [one.name if isinstance(one, Term) else class_of(one).name for one in terms]
+    else:
         names = _drawn(robot, random, count)
         if want := _wanted(names, lacking):
             raise CrosscheckError(
@@ -95,15 +105,16 @@ def choose(
     for name in names:
         if want := _wanted([name], lacking):  # its error lists known effects
             raise CrosscheckError(f"effect {name}: needs {want}; expected commands that have them")
-        if name not in TRUE_EFFECTS:
-            raise CrosscheckError(
-                f"effect {name}: MuJoCo cannot simulate it, so no twin can hide it"
-            )
     if len(set(names)) != len(names):
         raise CrosscheckError(f"effects {', '.join(names)}: expected each at most once")
-    drawn = [_with_numbers(layout_of(effect_named(name), robot), robot, random) for name in names]
+    drawn = [
+        sized[name].fixed()
+        if name in sized
+        else _with_numbers(layout_of(name, robot), robot, random)
+        for name in names
+    ]
     if tensions and free and random.random() < _ALSO:
-        drawn.append(_with_numbers(layout_of(effect_named(_OF_TENSIONS), robot), robot, random))
+        drawn.append(_with_numbers(layout_of(_OF_TENSIONS, robot), robot, random))
     return [_alike_both_ways(one) if "pulley_radius" in names else one for one in drawn]
 
 

@@ -15,6 +15,7 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.data import Measurements, Names, Sigma
 from crosscheck.twin.hidden import Moves, times
 from crosscheck.twin.measure import Truth, measure
+from crosscheck.twin.own import simulated, with_laws
 from seecr.commands import Loads
 from seecr.description.robot import Robot
 from seecr.effects import Effect, Term
@@ -175,10 +176,12 @@ class Lab:
                 (case.n_rows, case.n_cables)
             )
             errors = self.stated.length_m * noise
-        return measure(
-            self.robot, case.as_commands(self.robot), effects, length_errors=errors,
+        commands, (known, own) = case.as_commands(self.robot), simulated(effects)
+        truth = measure(
+            self.robot, commands, known, length_errors=errors,
             progress=lambda rows: self.tell(rows, now),
         )  # fmt: skip
+        return with_laws(truth, self.robot, commands, known, own) if own else truth
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from crosscheck.given import GivenRobot, check_case, copy_robot, file_of, robot_
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import GivenCommands, commands_of
 from crosscheck.measurements.write import write_measurements
-from crosscheck.twin.hidden import NAME, Answer, Moves, choose, seal, values_of
+from crosscheck.twin.hidden import NAME, Answer, GivenHidden, Moves, choose, seal, values_of
 from crosscheck.twin.lab import (
     EXTENTS,
     Lab,
@@ -33,6 +33,7 @@ from crosscheck.twin.lab import (
     sweeps,
 )
 from crosscheck.twin.measure import Truth
+from crosscheck.twin.robot import TRUE_EFFECTS
 from seecr.arguments import whole
 from seecr.description.mjcf import quiet_mujoco
 from seecr.description.robot import Robot
@@ -93,7 +94,7 @@ def make_twin(
     robot: GivenRobot,
     seed: int,
     *,
-    effects: Sequence[str] | None = None,
+    effects: GivenHidden | None = None,
     n_effects: int | None = None,
     out: str | Path | None = None,
     tensions: bool = False,
@@ -107,7 +108,8 @@ def make_twin(
     Args:
         robot: without effects: its MJCF, the name of a shipped one, or as read from its file.
         seed: of effects, their sizes and the noise.
-        effects: names of the effects; None lets the seed choose, ``()`` hides none.
+        effects: the effects, by names or classes, whose sizes are drawn, or with values; None lets
+            the seed choose, ``()`` hides none. Effects of one's own act by their own law.
         n_effects: how many the seed chooses; None lets it choose that too.
         out: folder for the case; None writes nothing.
         tensions: record tensions too.
@@ -122,8 +124,8 @@ def make_twin(
         the measurements, and what was hidden in them.
 
     Raises:
-        CrosscheckError: an effect that no twin can hide, or a robot that MuJoCo cannot bring to
-            rest.
+        CrosscheckError: an effect that needs what the commands lack, or a robot that MuJoCo cannot
+            bring to rest.
         InputFileError: poses that cannot be read, or files in ``out`` that are not from an older
             twin.
         InputError: a robot without a file, or with numbers other than its file's.
@@ -153,7 +155,7 @@ def make_twin(
         measured=measured if given is not None else measured.rows(made.at_rest),
         truth=made.truth,
         kept=made.at_rest,
-        hidden=tuple(one for one, _ in made.alone),
+        hidden=tuple(Term(one.layout, one.vector) for one, _ in made.alone),
         answer=_answer(made, robot, seed),
         notes=(*robot.notes, *(() if given is None else given.notes)),
     )
@@ -175,8 +177,14 @@ def _answer(made: Measured, robot: Robot, seed: int) -> Answer:
         all_move_over_noise=Moves.of(made.truth, made.plain, made.sigma),
         sigma={kind: value for kind, value in asdict(made.sigma).items() if value is not None},
         poses=int(np.sum(made.at_rest)),
-        truth=f"MuJoCo {mujoco.__version__}",
+        truth=_truth(f"MuJoCo {mujoco.__version__}", [one.name for one, _ in made.alone]),
     )
+
+
+def _truth(mujoco: str, hidden: Sequence[str]) -> str:
+    """What measured a twin: MuJoCo, and the laws of effects that it has no means for."""
+    own = [name for name in hidden if name not in TRUE_EFFECTS]
+    return f"{mujoco}; {', '.join(own)} by its own law in SEECR" if own else mujoco
 
 
 def _write(twin: Twin, robot_path: Path, out: Path, commands: Path | None) -> None:

@@ -19,8 +19,13 @@ _SAVED = "INPUT"  # stands for a file that came through a pipe
 def following(*words: object) -> str:
     """The line that names a command, as a shell takes it.
 
-    What came through a pipe is gone: a file stands in its place.
+    What came through a pipe is gone: a file stands in its place. Effects of the user's own files
+    are named again.
     """
+    if words[0] in ("seecr", "crosscheck"):
+        from seecr.cli.own_effects import given_effects
+
+        words = (*words, *given_effects())
     if not any(_piped(word) for word in words):
         return f"next: {typed(*words)}"
     line = typed(*(_SAVED if _piped(word) else word for word in words))

@@ -161,6 +161,23 @@ no_recording = option("--no-recording", "Do not write a recording (.rrd).")
 pictures = together(
     option("--figure [png|svg|none]", "File type of the figure.", default="png"), no_recording
 )
+
+
+def _introduced(_ctx: click.Context, _param: click.Parameter, texts: tuple[str, ...]) -> None:
+    """Effects of the user's own files, made part of the catalogue; the option's callback."""
+    from seecr.cli.own_effects import introduce_all
+
+    introduce_all(texts)
+
+
+own_effects = option(
+    "--effect FILE.py:CLASS",
+    "An effect of your own: a class in a file, which is run; may be repeated. It is then one of "
+    "the catalogue.",
+    multiple=True,
+    expose_value=False,
+    callback=_introduced,
+)
 robot = together(
     click.argument("robot", type=FILE, metavar="ROBOT"),
     option(
@@ -169,6 +186,7 @@ robot = together(
         "such as 'steel 7x19 3mm', or a number [N].",
     ),
     option("--model M.toml", "Model file with the robot's effects.  [default: plain SEECR]"),
+    own_effects,
 )
 limits = together(
     option("--lowest N", "Lowest allowed tension of every cable [N].", Number(), default=0.0),

@@ -22,7 +22,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.arguments import numbers
 from seecr.commands import Commands
+from seecr.counted import counted
 from seecr.description.robot import Robot
 from seecr.effects.setup import Setup
 from seecr.errors import InputError
@@ -297,6 +299,26 @@ class Layout:
             values[name] = float(part[0]) if size == "one" else part.copy()
             first += count
         return self.effect(**values)
+
+    def vector_of(self, effect: Effect) -> Array:
+        """Parameters (p,) of an instance of the effect; null where it has none.
+
+        Raises:
+            InputError: something else than numbers, or another number of them.
+        """
+        vector, first = self.null.copy(), 0
+        for name, count, _size in self._parts:
+            value = getattr(effect, name)
+            if value is not None:
+                array = numbers(value, f"effect {self.name}: {name}").ravel()
+                if len(array) != count:
+                    raise InputError(
+                        f"effect {self.name}: {name}: expected {counted(count, 'number')}, got "
+                        f"{len(array)}"
+                    )
+                vector[first : first + count] = array
+            first += count
+        return vector
 
     def start(self, shape: dict[str, float]) -> Array:
         """Null values, with the shape parameters set."""

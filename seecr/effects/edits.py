@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import fields
 from operator import is_
 from threading import Lock
@@ -13,12 +15,25 @@ from seecr.commands import Commands
 from seecr.description.robot import Robot
 from seecr.effects.base import PLACES, Effect, Readings
 from seecr.effects.setup import QUANTITIES, Setup, plain_setup
-from seecr.errors import InputError
+from seecr.errors import InputError, SeecrError
 from seecr.pose import Array
 
 
-def check_class(effect: type[Effect], where: str) -> None:
-    """Raise an InputError if a class does not declare an effect as it should."""
+def check_class(effect: object, where: str) -> type[Effect]:
+    """The class, if it declares an effect as it should.
+
+    Raises:
+        InputError: it does not; ``where`` says of which the error speaks.
+    """
+    if not (isinstance(effect, type) and issubclass(effect, Effect)):
+        raise InputError(
+            f"{where} is no effect; expected a subclass of seecr.effects.Effect with a name"
+        )
+    if not isinstance(effect.name, str) or not effect.name.isidentifier():
+        raise InputError(
+            f"{where} has the name {effect.name!r}; expected letters, digits and underscores, as "
+            'in name: ClassVar[str] = "hose"'
+        )
     if effect.place not in PLACES:
         raise InputError(
             f"{where}: effect {effect.name} has place {effect.place!r}; expected one of "
@@ -40,6 +55,7 @@ def check_class(effect: type[Effect], where: str) -> None:
             f"{where}: effect {effect.name} changes nothing; expected it to define edit_setup or "
             "edit_readings"
         )
+    return effect
 
 
 def edit_setup(effect: Effect, setup: Setup) -> None:
@@ -49,7 +65,8 @@ def edit_setup(effect: Effect, setup: Setup) -> None:
         effect.edit_setup(setup)
         return
     setup.own()  # ours put arrays anew; nothing says that others do
-    effect.edit_setup(setup)
+    with _told(effect, "edit_setup"):
+        effect.edit_setup(setup)
     for name, item in QUANTITIES.items():
         value = _finite(getattr(setup, name), f"effect {effect.name} leaves setup.{name}")
         shape = item.shape_of(setup.robot, len(setup.commands))
@@ -68,7 +85,8 @@ def edit_readings(effect: Effect, readings: Readings, setup: Setup) -> None:
     names = [item.name for item in fields(Readings)]
     before = {name: getattr(readings, name) for name in names}
     unsolved = ~np.isfinite(readings.position).all(axis=1)
-    effect.edit_readings(readings, setup)
+    with _told(effect, "edit_readings"):
+        effect.edit_readings(readings, setup)
     for name in names:
         value = getattr(readings, name)
         if np.shape(value) != before[name].shape:
@@ -77,6 +95,21 @@ def edit_readings(effect: Effect, readings: Readings, setup: Setup) -> None:
                 f"{before[name].shape}"
             )
         _finite(value[~unsolved], f"effect {effect.name} leaves readings.{name}")
+
+
+@contextmanager
+def _told(effect: Effect, method: str) -> Iterator[None]:
+    """An error in a program of the user's is told in the effect's name, with its line."""
+    try:
+        yield
+    except SeecrError:
+        raise
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        raise InputError(
+            f"effect {effect.name}: {method} raises {type(error).__name__}: {error} "
+            f"({last.filename}, line {last.lineno})"
+        ) from error
 
 
 def _checked_law(law: Callable[[Array], Array], name: str) -> Callable[[Array], Array]:

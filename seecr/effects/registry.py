@@ -1,10 +1,17 @@
-"""The effects there are: our own, and those that other packages declare as entry points."""
+"""The effects there are: our own, those of entry points, and those that a user's program gives.
+
+The catalogue is what a diagnosis considers: our own effects, those that installed packages declare,
+and those that were introduced. A class that a function was given, or an instance of it, is known by
+its name from then on, as in a model's file, but is considered only where it is given again.
+"""
 
 from __future__ import annotations
 
 import difflib
+from collections.abc import Collection
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
+from typing import TypeAlias
 
 from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.effects.actuation import (
@@ -41,6 +48,13 @@ BUILT_IN: tuple[type[Effect], ...] = (
     TrackerTarget, TrackerScale, TensionScale,
 )  # fmt: skip
 
+GivenEffect: TypeAlias = str | type[Effect] | Effect
+"""An effect by its name, its class or an instance of it."""
+
+# Effects that a user's program introduced to the catalogue, and those that it gave to a function.
+_introduced: dict[str, type[Effect]] = {}
+_given: dict[str, type[Effect]] = {}
+
 
 def _load(entry: EntryPoint) -> object:
     """What an entry point names, or one line about why it cannot be had."""
@@ -55,23 +69,87 @@ def _load(entry: EntryPoint) -> object:
 
 @lru_cache(maxsize=1)
 def catalogue() -> dict[str, type[Effect]]:
-    """All effects by name: the built-in ones, then those of entry points ``seecr.effects``."""
+    """All effects by name: the built-in ones, those of entry points ``seecr.effects``, and those
+    that were introduced.
+    """
     found = {effect.name: effect for effect in BUILT_IN}
     for entry in entry_points(group="seecr.effects"):
-        effect = _load(entry)
-        if not (isinstance(effect, type) and issubclass(effect, Effect) and effect.name):
-            raise InputError(
-                f"entry point {entry.name} ({entry.value}) is no effect; expected a subclass of "
-                "seecr.effects.Effect with a name"
-            )
+        where = f"entry point {entry.name} ({entry.value})"
+        effect = check_class(_load(entry), where)
         if effect.name in found:
-            raise InputError(
-                f"entry point {entry.name} ({entry.value}) names its effect {effect.name}, which "
-                "exists already; expected a name of its own"
-            )
-        check_class(effect, f"entry point {entry.name} ({entry.value})")
+            raise _taken(effect, where)
         found[effect.name] = effect
-    return found
+    return {**found, **_introduced}
+
+
+def _taken(effect: type[Effect], where: str) -> InputError:
+    return InputError(
+        f"{where} names its effect {effect.name}, which exists already; expected a name of its own"
+    )
+
+
+def introduce(effect: type[Effect]) -> type[Effect]:
+    """Make an effect of one's own part of the catalogue, as an installed package does.
+
+    It holds for this process; in a program of one's own it may stand above the class, over
+    ``@dataclass``. A class of the same name that was introduced before is replaced.
+
+    Args:
+        effect: a subclass of :class:`seecr.Effect`.
+
+    Returns:
+        the same class.
+
+    Raises:
+        InputError: no effect, or one with the name of an effect that is built in or installed.
+    """
+    kind = check_class(effect, _named(effect))
+    there = catalogue().get(kind.name)
+    if there is not None and there is not kind and kind.name not in _introduced:
+        raise _taken(kind, _named(kind))
+    _introduced[kind.name] = _given[kind.name] = kind
+    catalogue.cache_clear()
+    return kind
+
+
+def _named(given: object) -> str:
+    """A class in words."""
+    return f"class {getattr(given, '__name__', None) or repr(given)}"
+
+
+def class_of(given: GivenEffect) -> type[Effect]:
+    """The class of an effect, which is known by its name from now on.
+
+    Raises:
+        InputError: no effect of that name, something else than an effect, or a class of one's own
+            with the name of an effect of the catalogue.
+    """
+    if isinstance(given, str):
+        return effect_named(given)
+    kind = given if isinstance(given, type) else type(given)
+    there = catalogue().get(kind.name) if issubclass(kind, Effect) else None
+    if kind is there:
+        return kind
+    if not isinstance(given, type) and not isinstance(given, Effect):
+        raise InputError(
+            f"expected the name of an effect, got {given!r:.60}; its class or an instance will do"
+        )
+    kind = check_class(kind, _named(kind))
+    if there is not None and kind.name not in _introduced:
+        raise _taken(kind, _named(kind))
+    _given[kind.name] = kind
+    return kind
+
+
+def known() -> dict[str, type[Effect]]:
+    """The catalogue, and further effects that functions were given, by name."""
+    return {**_given, **catalogue()}
+
+
+def considered_of(names: Collection[str]) -> list[type[Effect]]:
+    """The effects of the catalogue, and those of one's own that are among names."""
+    every = catalogue()
+    return [*every.values(), *(e for n, e in _given.items() if n in names and n not in every)]
 
 
 def effect_named(name: str) -> type[Effect]:
@@ -82,29 +160,33 @@ def effect_named(name: str) -> type[Effect]:
     """
     if not isinstance(name, str):
         raise InputError(f"expected the name of an effect, got {name!r}")
-    known = catalogue()
-    if name in known:
-        return known[name]
+    every = known()
+    if name in every:
+        return every[name]
     if any(mark in name for mark in "./\\"):
         raise InputError(
             f"expected the name of an effect, such as pulley_radius, got {name!r}, which looks "
-            "like a file's name"
+            "like a file's name" + ("; --effect names it" if ".py" in name else "")
         )
-    near = difflib.get_close_matches(name, known, n=len(known), cutoff=0.0)
-    raise InputError(f"no effect {name!r}; known, nearest first: {', '.join(near)}")
+    near = difflib.get_close_matches(name, every, n=len(every), cutoff=0.0)
+    own = "; one of your own is known by --effect FILE.py:CLASS, or in Python by seecr.introduce"
+    is_misspelt = bool(difflib.get_close_matches(name, every))
+    raise InputError(
+        f"no effect {name!r}; known, nearest first: {', '.join(near)}{'' if is_misspelt else own}"
+    )
 
 
-def layout_of(effect: type[Effect] | str, robot: GivenRobot) -> Layout:
+def layout_of(effect: GivenEffect, robot: GivenRobot) -> Layout:
     """The flat parameters of an effect for a robot.
 
     Args:
-        effect: its name, or its class.
+        effect: its name, its class, or an instance of it.
         robot: as described, or its MJCF.
 
     Raises:
-        InputError: neither the name of an effect nor an effect's class.
+        InputError: neither the name of an effect nor an effect.
     """
-    kind = effect if isinstance(effect, type) else effect_named(effect)
+    kind = effect if isinstance(effect, type) else class_of(effect)
     if not issubclass(kind, Effect):
         raise InputError(f"expected the name of an effect, or its class, got {effect!r}")
     return Layout.of(kind, robot_of(robot))

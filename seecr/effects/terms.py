@@ -15,7 +15,7 @@ from seecr.arguments import finite
 from seecr.description.mjcf import GivenRobot
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect, Knowledge, Layout, Readings, Total, beyond
-from seecr.effects.registry import catalogue, layout_of
+from seecr.effects.registry import GivenEffect, catalogue, class_of, layout_of
 from seecr.effects.setup import Setup
 from seecr.errors import InputError
 from seecr.pose import Array
@@ -172,19 +172,24 @@ class Term:
             object.__setattr__(self, "knowledge", Knowledge.nothing(len(self.layout)))
 
     @classmethod
-    def of(cls, robot: GivenRobot, name: str, **values: float) -> Term:
+    def of(cls, robot: GivenRobot, name: GivenEffect, **values: float) -> Term:
         """An effect by its name, with some parameters; the others are at null.
 
         Args:
             robot: that it is for, or its MJCF.
-            name: of the effect, such as ``"pulley_radius"``.
+            name: of the effect, such as ``"pulley_radius"``; also its class, or an instance, whose
+                parameters it then has.
             values: by the parameters' names, such as ``radius_m=0.01`` or ``gain_3=0.002``.
 
         Raises:
             InputError: no such effect, no such parameter, or a value that no robot has.
         """
-        layout = layout_of(name, robot)
+        layout = layout_of(class_of(name), robot)
         vector = layout.null.copy()
+        if isinstance(name, Effect):
+            vector = layout.vector_of(name)
+            for k, value in enumerate(vector):
+                _within(layout, k, value)
         for key, value in values.items():
             k = _place_of(layout, key)
             vector[k] = _within(layout, k, value)

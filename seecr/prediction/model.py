@@ -46,7 +46,7 @@ from seecr.counted import between, counted
 from seecr.description.fingerprint import check_robot, fingerprint
 from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
-from seecr.effects import Effect, Term, Terms, catalogue
+from seecr.effects import Effect, Term, Terms, known
 from seecr.errors import InputError
 from seecr.files import Toml, path_of, read_toml
 from seecr.pose import Array
@@ -325,6 +325,8 @@ def effects_given(
 def no_effects(got: object) -> InputError:
     """The error about an argument that is not effects with values."""
     what = repr(got) if isinstance(got, str) else type(got).__name__
+    if isinstance(got, type):
+        what = f"the class {got.__name__}, which has none; {got.__name__}(...) makes an instance"
     return InputError(
         "expected a model, its path, or a list of effects with their values, as "
         f"seecr.Term.of(robot, name, ...) gives each, got {what}{its_model(got)}"
@@ -446,9 +448,9 @@ def _migrate(where: Where, document: Mapping[str, Any]) -> list[str]:
         given, name = table.get("parameters"), table.get("name")
         if not isinstance(given, MutableMapping) or not isinstance(name, str):
             continue
-        if name not in catalogue():
+        if name not in (every := known()):
             continue
-        for old, now in catalogue()[name].renamed.items():
+        for old, now in every[name].renamed.items():
             if old in given:
                 cell = given.pop(old)
                 for key in now:
