@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from crosscheck.add import Addition, add_effect, add_effects
     from crosscheck.calibration import Calibrated, calibrate
     from crosscheck.comparison.limits import Limits, exceeded, load_limits
+    from crosscheck.comparison.models import ComparedValue, ModelComparison, compare_models
     from crosscheck.comparison.residuals import compare
     from crosscheck.comparison.result import Comparison
     from crosscheck.diagnosis.diagnose import diagnose
@@ -49,6 +50,7 @@ _MODULES = {
     "add": ("Addition", "add_effect", "add_effects"),
     "calibration": ("Calibrated", "calibrate"),
     "comparison.limits": ("Limits", "exceeded", "load_limits"),
+    "comparison.models": ("ComparedValue", "ModelComparison", "compare_models"),
     "comparison.residuals": ("compare",),
     "comparison.result": ("Comparison",),
     "diagnosis.result": ("Diagnosis", "MissingEffect"),
@@ -81,6 +83,7 @@ __all__ = [
     "Calibrated",
     "Case",
     "CaseResult",
+    "ComparedValue",
     "Comparison",
     "CrosscheckError",
     "Diagnosis",
@@ -90,6 +93,7 @@ __all__ = [
     "Limits",
     "Measurements",
     "MissingEffect",
+    "ModelComparison",
     "Plan",
     "Run",
     "Sigma",
@@ -102,6 +106,7 @@ __all__ = [
     "calibrate",
     "choose_poses",
     "compare",
+    "compare_models",
     "diagnose",
     "exceeded",
     "import_case",

@@ -15,6 +15,7 @@ from seecr.cli import options
     "crosscheck compare robot.xml measured.csv",
     "crosscheck compare robot.xml measured.csv --model model.toml --max-position 0.5mm",
     "crosscheck compare robot.xml measured.csv --limits limits.toml --json",
+    "crosscheck compare monday.toml friday.toml --fail-on moved",
 )
 @choices.robot_and_data
 @options.option("--model M.toml", "The model.  [default: plain SEECR]")
@@ -31,16 +32,22 @@ from seecr.cli import options
 )
 @options.own_effects
 @choices.sigma
+@options.option("--model-out M.toml", "Of two models: write the pooled one.")
+@choices.listed("--fail-on moved", "Of two models: exit with status 1 if a value moved.")
 @choices.figures
 @options.no_recording
 @options.out("crosscheck-comparison")
 @options.as_json
 def command(
     robot: Path, data: tuple[Path, ...], model: Path | None, limits_file: Path | None,
-    sigmas: tuple[str, ...], figures: Path | None, no_recording: bool, out: Path, as_json: bool,
-    **errors: str | None,
+    sigmas: tuple[str, ...], model_out: Path | None, fail_on: tuple[str, ...],
+    figures: Path | None, no_recording: bool, out: Path, as_json: bool, **errors: str | None,
 ) -> int:  # fmt: skip
     """Show where a model is off, by how much, and whether the residuals are noise.
+
+    Given two models (A.toml B.toml) or two diagnosis.json of one robot instead, it tells which
+    values moved beyond their errors from the first to the second, which neither settles, and with
+    --model-out writes one pooled model; it writes models.json.
 
     ROBOT.xml is the robot's MJCF, DATA.csv its measurements; a TOML file beside it states the
     noise. The model's values are used as they are; nothing is fitted but what the data leave free,
@@ -53,6 +60,10 @@ def command(
     components, as in the tables, or on the worst row (the length of its error vector).
     Exit status: 0 all well, 1 a limit exceeded, 2 bad input, 3 rows without an equilibrium.
     """
+    from crosscheck.cli.two_models import are_models, compare_two
+
+    if are_models(robot, data):
+        return compare_two(robot, data[0], out, model_out, fail_on, as_json)
     from crosscheck import Limits, Sigma, compare, exceeded, load_limits, load_measurements
     from crosscheck.show.page import write_page
     from seecr import load_model, load_robot, with_history

@@ -68,18 +68,37 @@ def load_diagnosed(path: str | Path, robot: GivenRobot) -> tuple[Terms, tuple[st
         InputError: no path.
     """
     path, robot = path_of(path, "a diagnosis"), robot_of(robot)
-    document = _document(path)
-    missing = document.get("missing")
-    if not isinstance(missing, list) or "verdict" not in document:
-        raise InputFileError.at(path, f"has no verdict and no list of missing effects; {_EXPECTED}")
+    document = diagnosis_document(path)
     notes = _check_robot(path, document, robot)
-    terms = [_term(path, item, robot) for item in missing]
+    terms = listed_in(path, document, robot)
     if not terms:
         raise InputFileError.at(
             path, f"lists no missing effect ({document['verdict']}); there is nothing to add"
         )
+    return terms, notes
+
+
+def diagnosis_document(path: Path) -> Mapping[str, Any]:
+    """The content of a ``diagnosis.json``.
+
+    Raises:
+        InputFileError: no such file, or not a diagnosis.
+    """
+    document = _document(path)
+    if not isinstance(document.get("missing"), list) or "verdict" not in document:
+        raise InputFileError.at(path, f"has no verdict and no list of missing effects; {_EXPECTED}")
+    return document
+
+
+def listed_in(path: Path, document: Mapping[str, Any], robot: Robot) -> Terms:
+    """The missing effects that a diagnosis lists, with its values.
+
+    Raises:
+        InputFileError: an effect or a value that is none.
+    """
+    terms = [_term(path, item, robot) for item in document["missing"]]
     try:
-        return Terms(terms), notes
+        return Terms(terms)
     except InputError as error:
         raise InputFileError.at(path, str(error)) from None
 

@@ -412,7 +412,7 @@ def _cell(layout: Layout, i: int, fitted: Fitted) -> dict[str, object]:
 
 def _describe(table: Any, provenance: Provenance, errors: Mapping[str, Rms]) -> None:
     table["provenance"] = with_remarks(tomlkit.item(vars(provenance)), table.get("provenance"))
-    for name in _ERRORS:
+    for name in (name for name in _ERRORS if name in errors):
         rms = {k: float(f"{v:.4g}") for k, v in errors[name].items() if v is not None}
         table[name] = with_remarks(tomlkit.item(rms), table.get(name))
 

@@ -11,7 +11,7 @@ import numpy as np
 import tomlkit
 
 from seecr.counted import counted
-from seecr.errors import InputFileError
+from seecr.errors import InputFileError, SeecrError
 from seecr.units import millimetres
 
 if TYPE_CHECKING:
@@ -108,6 +108,34 @@ def check_robot(
                 f"it is {_short(own[key])}: {changed}"
             )
     return tuple(notes)
+
+
+def described(path: Path, table: Any) -> Robot:
+    """A robot with the numbers of a table ``[robot]``: its sizes, without joints or gravity's turn.
+
+    Raises:
+        InputFileError: there is no such table, or its numbers describe no robot.
+    """
+    from seecr.description.robot import Robot
+
+    wanted = "expected a table [robot], as crosscheck writes it"
+    if not isinstance(table, Mapping):
+        raise InputFileError.at(path, f"does not say which robot it was made for; {wanted}")
+    said = _Said(path, table, lambda _key: None)
+    values: dict[str, Any] = {}
+    for key in (*_POINTS, *_NOTED):
+        values[key] = _numbers(table.get(key))
+        if values[key] is None:
+            raise said.error(key, f"expected numbers, got {_cut(repr(table.get(key)))}; {wanted}")
+    try:
+        return Robot(
+            name=str(table.get("name", "robot")),
+            cable_names=tuple(map(str, table.get("cables", ()))),
+            mass=float(values.pop("mass_kg")[0]),
+            **{key.removesuffix("_m").removesuffix("_N"): value for key, value in values.items()},
+        )
+    except SeecrError as error:
+        raise InputFileError.at(path, f"[robot]: {error}") from None
 
 
 def _check_cables(said: _Said, robot: Robot) -> None:
