@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from seecr import __version__ as __version__
-from seecr.lazy import lazily
+from seecr.lazy import lazily, pictured
 
 if TYPE_CHECKING:
     from crosscheck.add import Addition, add_effect, add_effects
@@ -127,6 +127,7 @@ __all__ = [
     "write_run",
 ]
 
+pictured(__name__, "show.pictures")
 __getattr__ = lazily(__name__, _WHERE)
 
 

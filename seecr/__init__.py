@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from seecr.lazy import lazily
+from seecr.lazy import lazily, pictured
 
 if TYPE_CHECKING:
     from seecr.commands import Commands, Loads
@@ -129,6 +129,7 @@ __all__ = [
 
 
 _FOLDERS = ("inverse", "workspace")
+pictured(__name__, "show.pictures")
 __getattr__ = lazily(__name__, _WHERE, modules=_FOLDERS)
 
 

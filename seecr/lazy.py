@@ -6,6 +6,26 @@ from collections.abc import Callable, Collection, Mapping
 from importlib import import_module
 from typing import Any
 
+_pictured: dict[str, str] = {}
+
+
+def pictured(package: str, module: str) -> None:
+    """Declare which module of a package has the ``PICTURES`` of its results, by their class.
+
+    Results stand on a low floor, and what draws them on the highest: a package's face, which stands
+    on all floors, brings them together.
+    """
+    _pictured[package] = f"{package}.{module}"
+
+
+def pictures_of(kind: type) -> Any:
+    """What draws results of a class; None if nothing does."""
+    for one in kind.__mro__:
+        module = _pictured.get(one.__module__.partition(".")[0])
+        if module is not None and one in (table := import_module(module).PICTURES):
+            return table[one]
+    return None
+
 
 def lazily(
     package: str, where: Mapping[str, str], modules: Collection[str] = ()

@@ -6,14 +6,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from html import escape
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seecr.counted import counted
-from seecr.errors import MissingPackageError
-from seecr.files import json_text
+from seecr.errors import InputError, MissingPackageError
+from seecr.files import json_text, path_of
+from seecr.lazy import pictures_of
 
 # Rows of the table in a notebook; the data frame has all of them.
 _MOST_ROWS = 20
@@ -72,6 +74,37 @@ class Result(ABC):
         words = "".join(f"<div>{escape(line)}</div>" for line in self.lines())
         return words + _table(self.records())
 
+    def plot(self, name: str = "") -> Any:
+        """The figure that the command draws of it, a ``matplotlib.figure.Figure``.
+
+        Args:
+            name: of a further figure of its page, as ``--figures`` names their files.
+
+        Raises:
+            InputError: it has no figure, or none of that name.
+        """
+        return _picture(self, "plot")(self, name)
+
+    def save_html(self, path: str | Path) -> None:
+        """Write it as one self-contained page, as the command does.
+
+        Raises:
+            InputError: it has no page, or the file's name does not end in .html.
+            InputFileError: the file cannot be written.
+        """
+        page = _picture(self, "page")
+        page(self, _named_as(path, ".html"))
+
+    def save_recording(self, path: str | Path) -> None:
+        """Write its recording for the Rerun viewer, as the command does.
+
+        Raises:
+            InputError: it has no recording, or the file's name does not end in .rrd.
+            InputFileError: the file cannot be written.
+        """
+        recording = _picture(self, "recording")
+        recording(self, _named_as(path, ".rrd"))
+
     def to_frame(self) -> Any:
         """All rows as a ``pyarrow.Table``; without pyarrow as a ``pandas.DataFrame``.
 
@@ -97,6 +130,27 @@ class Result(ABC):
                 "a data frame needs pyarrow or pandas, and neither is installed; "
                 "install one: pip install pyarrow"
             ) from None
+
+
+_PICTURES = {"plot": "figure", "page": "page", "recording": "recording"}
+
+
+def _picture(result: Result, what: str) -> Any:
+    """What draws a picture of a result."""
+    pictures = pictures_of(type(result))
+    has = [word for key, word in _PICTURES.items() if getattr(pictures, key, None) is not None]
+    if _PICTURES[what] not in has:
+        others = f"; it has a {' and a '.join(has)}" if has else ""
+        raise InputError(f"{type(result).__name__} has no {_PICTURES[what]}{others}")
+    return getattr(pictures, what)
+
+
+def _named_as(path: str | Path, suffix: str) -> Path:
+    """A path with the suffix of what will be written there."""
+    named = path_of(path, f"the {suffix} file to write")
+    if named.suffix.lower() != suffix:
+        raise InputError(f"{named}: expected a name that ends in {suffix}")
+    return named
 
 
 def _table(records: Sequence[Record]) -> str:

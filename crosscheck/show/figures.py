@@ -93,11 +93,27 @@ def keeping(folder: FilePath | None) -> Iterator[None]:
         _folder.reset(token)
 
 
+_collected: ContextVar[dict[str, Figure] | None] = ContextVar("collected", default=None)
+
+
+@contextmanager
+def collecting() -> Iterator[dict[str, Figure]]:
+    """The figures that are drawn meanwhile, by the names of the files they would be kept in."""
+    drawn: dict[str, Figure] = {}
+    token = _collected.set(drawn)
+    try:
+        yield drawn
+    finally:
+        _collected.reset(token)
+
+
 def _keep(figure: Figure, svg: bytes, words: str) -> None:
-    folder = _folder.get()
+    folder, drawn = _folder.get(), _collected.get()
+    name = re.sub(r"[^a-z0-9]+", "-", words.lower()).strip("-")
+    if drawn is not None:
+        drawn[name] = figure
     if folder is None:
         return
-    name = re.sub(r"[^a-z0-9]+", "-", words.lower()).strip("-")
     (folder / f"{name}.svg").write_bytes(svg)
     FigureCanvasAgg(figure)
     figure.savefig(folder / f"{name}.png", metadata={"Software": None})

@@ -54,12 +54,13 @@ def render(found: Comparison | Diagnosis | Plan, made: Made | None = None) -> st
     kind = attrgetter("__class__.__name__")
     environment.filters |= {"html": _html, "cell": _cell, "kind": kind}
     page = environment.get_template("page.html.jinja").render(
-        page=_page_of(found), version=full_version(), made="" if made is None else made.words
+        page=page_of(found), version=full_version(), made="" if made is None else made.words
     )
     return with_glossary(page.lstrip())
 
 
-def _page_of(found: Comparison | Diagnosis | Plan) -> Page:
+def page_of(found: Comparison | Diagnosis | Plan) -> Page:
+    """The page of a result, with its figures drawn."""
     if isinstance(found, Diagnosis):
         return diagnosis.page_of_diagnosis(found)
     if isinstance(found, Plan):

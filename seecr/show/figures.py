@@ -18,8 +18,11 @@ STYLE: Any = {
 
 
 @contextmanager
-def figure(path: Path, rows: int = 1, columns: int = 1, **options: Any) -> Iterator[Any]:
-    """Axes (rows, columns) of a figure that is written when the block ends, as png, svg or pdf."""
+def figure(path: Path | None, rows: int = 1, columns: int = 1, **options: Any) -> Iterator[Any]:
+    """Axes (rows, columns) of a figure that is written when the block ends, as png, svg or pdf.
+
+    Without a path it is not written.
+    """
     import matplotlib
 
     with matplotlib.rc_context(STYLE):
@@ -31,6 +34,8 @@ def figure(path: Path, rows: int = 1, columns: int = 1, **options: Any) -> Itera
         drawn = Figure(figsize=size, layout="constrained")
         FigureCanvasAgg(drawn)
         yield drawn.subplots(rows, columns, squeeze=False, **options)
+        if path is None:
+            return
         metadata = {"Date": None} if path.suffix == ".svg" else None
         with written(path) as (part,):
             drawn.savefig(part, format=path.suffix.removeprefix("."), metadata=metadata)

@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from seecr.pose import Array
 from seecr.show.colours import COLOURS
 from seecr.show.figures import figure
 from seecr.workspace.grid import Workspace, across_of, colour_end, directions_words
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Colour of the edge of the workspace.
 _EDGE = COLOURS[4]
@@ -47,9 +50,9 @@ _OUTSTANDING = 4.0
 
 
 def map_figure(
-    path: Path, found: Workspace, most: int = 4, edge: Array | None = None,
+    path: Path | None, found: Workspace, most: int = 4, edge: Array | None = None,
     at_least: float | None = None,
-) -> None:  # fmt: skip
+) -> Figure:  # fmt: skip
     """Slices of a workspace: margins, and in equilibrium slack cables, deviation, rotation, if the
     platform can turn, and the stiffness of the softest direction.
 
@@ -87,6 +90,8 @@ def map_figure(
         )
         title = [found.robot.name, *textwrap.wrap(words, int(_LETTERS * size[0]))]
         axes[0, 0].figure.suptitle("\n".join(title), fontsize=9)
+    drawn: Figure = axes[0, 0].figure
+    return drawn
 
 
 @dataclass(frozen=True, eq=False)

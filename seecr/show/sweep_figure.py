@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,9 @@ from seecr.show.figures import figure
 from seecr.statics.solution import Solution
 from seecr.workspace.bars import BarManifold, Midlines, midline_points
 from seecr.workspace.spans import SlackSpan
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Labels of the horizontal axis if no coordinate serves.
 _NUMBERS = ("line of the file", "pose, counted from 0")
@@ -34,10 +37,10 @@ _JUMP: dict[str, Any] = {"color": "black", "linestyle": (0, (1, 2)), "linewidth"
 
 
 def sweep_figure(
-    path: Path, solution: Solution, commanded: bool = True, wanted: bool = False,
+    path: Path | None, solution: Solution, commanded: bool = True, wanted: bool = False,
     runs: ArrayLike | None = None, spread: Spread | None = None, zones: Sequence[SlackSpan] = (),
     bar: BarManifold | None = None,
-) -> None:  # fmt: skip
+) -> Figure:  # fmt: skip
     """Deviation, rotation if it can turn, tensions and slack cables along a sweep.
 
     If it can turn and hangs on two pairs of parallel cables in a plane, also how far the paper's
@@ -72,6 +75,8 @@ def sweep_figure(
             handles, _names = axes[0, 0].get_legend_handles_labels()
             band = Patch(color="0.3", label="± one standard\ndeviation", **_BAND)
             _legend(axes[0, 0], handles=[*handles, band])
+    drawn: Figure = axes[0, 0].figure
+    return drawn
 
 
 def _along(solution: Solution, commanded: bool, word: str) -> tuple[Array, str]:
