@@ -177,3 +177,24 @@ def with_error(value: float, error: float, digits: int = 2) -> tuple[str, str]:
     # of errors of hundreds too, no more digits than so many are known
     value, error, decimals = round(value, decimals), round(error, decimals), max(decimals, 0)
     return figures(value, f".{decimals}f"), f"{error:.{decimals}f}"
+
+
+def shown(value: float, unit: str) -> str:
+    """A number with its unit, as people read it."""
+    factor, word = in_unit(unit)
+    return f"{factor * value:.4g} {word}".strip()
+
+
+def measured(value: float, error: float, unit: str) -> str:
+    """A value with its standard error, to the digits that are known: 8.369 ± 0.013 mm.
+
+    None of it is known without a finite error: the value is where the fit happened to begin.
+    """
+    if not np.isfinite(error):
+        return "not determined by these data"
+    factor, word = in_unit(unit)
+    number, spread = with_error(factor * value, factor * error)
+    known = 0.0 if number == "0" else value
+    if error == 0.0:
+        return f"{shown(known, unit)} (fixed)"
+    return f"{number} ± {spread} {word}".strip()

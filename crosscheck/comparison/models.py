@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, special
 
-from crosscheck.fit.words import measured
 from crosscheck.given import GivenRobot, robot_of
 from crosscheck.model.fitted import Fitted, diagnosis_document, listed_in
 from crosscheck.model.write import provenance_of, with_fit
@@ -29,7 +28,7 @@ from seecr.prediction.effect_tables import number_of
 from seecr.prediction.model import Model, load_model, new_model, read_document
 from seecr.prediction.uncertainty import covariance_of
 from seecr.result import Record, Result
-from seecr.units import parameter_name, significant
+from seecr.units import measured, parameter_name, significant
 
 GivenValues: TypeAlias = Model | str | Path | Any
 """A model, a result that has one, the path of a model's TOML, or of a ``diagnosis.json``."""

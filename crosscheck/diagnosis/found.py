@@ -25,7 +25,6 @@ from crosscheck.fit.problem import KINDS, Problem, Rms, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.residual_noise import overestimated, whiteness
 from crosscheck.fit.state import contradictions
-from crosscheck.fit.words import shown
 from crosscheck.inference.catalogue import name_of
 from crosscheck.inference.fields import detectable_size
 from crosscheck.inference.fit import Fit
@@ -40,7 +39,7 @@ from crosscheck.preparation.prepare import noise_floor
 from seecr.effects import Term, effect_named
 from seecr.pose import Array
 from seecr.prediction.model import Model
-from seecr.units import parameter_name
+from seecr.units import parameter_name, shown
 
 # Most quantities that the unexplained part is said to be associated with, and fields named.
 _MOST_WHERE, _MOST_FIELDS = 5, 3

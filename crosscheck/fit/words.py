@@ -13,7 +13,7 @@ from crosscheck.model.fitted import Fitted
 from seecr.effects.base import Layout
 from seecr.pose import Array
 from seecr.result import Record
-from seecr.units import in_unit, parameter_name, short, with_error
+from seecr.units import measured, parameter_name, short, shown
 
 
 def rms_words(rms: Rms) -> str:
@@ -24,12 +24,6 @@ def rms_words(rms: Rms) -> str:
         if (value := rms.get(kind.key)) is not None
     ]
     return ", ".join(parts)
-
-
-def shown(value: float, unit: str) -> str:
-    """A number with its unit, as people read it."""
-    factor, word = in_unit(unit)
-    return f"{factor * value:.4g} {word}".strip()
 
 
 def belongs(key: str, name: str, unit: str) -> bool:
@@ -48,21 +42,6 @@ def value_lines(
         # what is at its bound is known to be there, without an error
         known = shown(value, unit) if bound and np.isinf(error) else measured(value, error, unit)
         yield f"{parameter_name(name, unit)} = {known}{stop}"
-
-
-def measured(value: float, error: float, unit: str) -> str:
-    """A value with its standard error, to the digits that are known: 8.369 ± 0.013 mm.
-
-    None of it is known without a finite error: the value is where the fit happened to begin.
-    """
-    if not np.isfinite(error):
-        return "not determined by these data"
-    factor, word = in_unit(unit)
-    number, spread = with_error(factor * value, factor * error)
-    known = 0.0 if number == "0" else value
-    if error == 0.0:
-        return f"{shown(known, unit)} (fixed)"
-    return f"{number} ± {spread} {word}".strip()
 
 
 def value_records(

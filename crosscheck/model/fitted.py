@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.counted import some
 from seecr.description.fingerprint import check_robot
 from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
@@ -19,9 +20,10 @@ from seecr.errors import InputError, InputFileError
 from seecr.files import digits_of, path_of, read_text
 from seecr.pose import Array
 from seecr.prediction.effect_tables import number_of
+from seecr.units import measured, parameter_name
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fitted:
     """An effect as fitted.
 
@@ -32,6 +34,13 @@ class Fitted:
     term: Term
     stderr: Array
     at_bound: NDArray[np.bool_]
+
+    def __repr__(self) -> str:
+        """The effect with its first few values and their errors, in the units people read."""
+        layout = self.term.layout
+        rows = zip(layout.names, layout.units, self.term.vector, self.stderr, strict=True)
+        values = [f"{parameter_name(k, unit)} = {measured(v, e, unit)}" for k, unit, v, e in rows]
+        return f"{self.term.name}: {some(values)}"
 
     def as_json(self) -> dict[str, Any]:
         """Its parameters by name, in SI units."""

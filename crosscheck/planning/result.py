@@ -30,7 +30,7 @@ from seecr.result import Record, Result
 from seecr.units import in_unit, short
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Visible:
     """What a plan will show of an effect.
 
@@ -53,6 +53,9 @@ class Visible:
     imitator: str
     confused: tuple[tuple[str, float], ...]
     twins: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"{self.name}: from {short(self.factor)} plausible sizes on"
 
     @property
     def name(self) -> str:
@@ -219,7 +222,7 @@ class Plan(Result):
 _MOST = 8
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sight:
     """What data can show.
 
@@ -229,6 +232,9 @@ class Sight:
 
     effects: tuple[Visible, ...]
     missing: Mapping[str, Reason]
+
+    def __repr__(self) -> str:
+        return "\n".join(self.lines())
 
     @property
     def hidden(self) -> tuple[str, ...]:

@@ -17,14 +17,13 @@ from crosscheck.fit.problem import Problem
 from crosscheck.fit.registration import NAME as TRACKER
 from crosscheck.fit.registration import registered_each
 from crosscheck.fit.state import State, evaluate
-from crosscheck.fit.words import measured
 from crosscheck.inference.fit import FLAT, Data, Fit, fit, without_rows
 from crosscheck.inference.noise import outliers
 from crosscheck.measurements.data import Measurements
 from seecr.counted import some
 from seecr.effects import ApartLayout, Knowledge, Own, Term, Terms, Values, apart, layout_of
 from seecr.pose import Array
-from seecr.units import parameter_name
+from seecr.units import measured, parameter_name
 
 # Effects with separate values for each file or run, laid out for those of some data. A model keeps
 # the values of files or runs that it has seen; others start from the effect's common values.

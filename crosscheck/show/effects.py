@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.fit.words import belongs, shown
+from crosscheck.fit.words import belongs
 from crosscheck.show.blocks import Block, Items, Line, TextTable
 from crosscheck.show.terminal import show
 from seecr.description.robot import Robot
 from seecr.effects import BUILT_IN, PLACES, Effect, known, layout_of
 from seecr.result import Record
-from seecr.units import in_unit, parameter_name
+from seecr.units import in_unit, parameter_name, shown
 
 EACH = {"one": "", "cable": ", one per cable", "vector": ", x y z", "point": ", x y z per cable"}
 """What a parameter's size says in words."""

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from seecr.arguments import numbers
 from seecr.commands import Commands
-from seecr.counted import counted
+from seecr.counted import counted, some
 from seecr.description.robot import Robot
 from seecr.effects.setup import Setup
 from seecr.errors import InputError
@@ -213,7 +213,7 @@ class Effect:
         return [{}]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Layout:
     """An effect's parameters for one robot, as one flat vector.
 
@@ -258,6 +258,9 @@ class Layout:
 
     def __len__(self) -> int:
         return len(self.names)
+
+    def __repr__(self) -> str:
+        return f"Layout({self.effect.name}: {some(self.names)})"
 
     @property
     def name(self) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr.arguments import finite
+from seecr.counted import some
 from seecr.description.mjcf import GivenRobot
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect, Knowledge, Layout, Readings, Total, beyond
@@ -19,6 +20,7 @@ from seecr.effects.registry import GivenEffect, catalogue, class_of, layout_of
 from seecr.effects.setup import Setup
 from seecr.errors import InputError
 from seecr.pose import Array
+from seecr.units import parameter_name, shown
 
 # An effect with values of its own for each file or run.
 #
@@ -89,7 +91,7 @@ class Apart(Effect):
         }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ApartLayout(Layout):
     """The parameters of an effect for several files or runs, one after the other.
 
@@ -148,7 +150,7 @@ def apart(base: Layout, kind: str, parts: tuple[str, ...], rest: Array) -> Apart
 _FILLED_IN: Any = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Term:
     """An effect with values: ``layout`` says which, ``vector`` (p,) how much.
 
@@ -194,6 +196,15 @@ class Term:
             k = _place_of(layout, key)
             vector[k] = _within(layout, k, value)
         return cls(layout, vector)
+
+    def __repr__(self) -> str:
+        """The effect with its first few values, in the units that people read."""
+        layout = self.layout
+        rows = zip(layout.names, layout.units, self.vector, strict=True)
+        values = [
+            f"{parameter_name(key, unit)} = {shown(value, unit)}" for key, unit, value in rows
+        ]
+        return f"{self.name}: {some(values)}"
 
     def with_vector(self, values: Array) -> Term:
         """The same effect with other values (p,); what is known of them stays."""

@@ -52,7 +52,7 @@ from seecr.files import Toml, path_of, read_toml
 from seecr.pose import Array
 from seecr.prediction.effect_tables import Where, term_of
 from seecr.result import Record, Result
-from seecr.units import millimetres, with_error
+from seecr.units import in_unit, measured, millimetres, parameter_name
 
 if TYPE_CHECKING:
     from seecr.statics.solution import Solution
@@ -271,20 +271,21 @@ class Model(Result):
         return [("", term.vector, self.errors_of(name)), *tables]
 
 
-def _known(value: float, error: float) -> str:
+def _known(value: float, error: float, unit: str) -> str:
     """A value with its standard error, to the digits that are known; alone if there is none."""
-    if not (math.isfinite(error) and error > 0.0):
-        return f"{value:.6g}"
-    return " ± ".join(with_error(value, error))
+    if math.isfinite(error) and error > 0.0:
+        return measured(value, error, unit)
+    factor, word = in_unit(unit)
+    return f"{factor * value:.6g} {word}".rstrip()
 
 
 def _shown(term: Term, stderr: Array, most: int = 3) -> str:
     """The first few values of an effect, as text."""
+    layout, fixed = term.layout, term.knowledge.fixed
+    rows = zip(layout.names, layout.units, term.vector, stderr, fixed, strict=True)
     parts = [
-        f"{key} = {_known(value, error)}" + (" (fixed)" if fixed else "")
-        for key, value, error, fixed in zip(
-            term.layout.names, term.vector, stderr, term.knowledge.fixed, strict=True
-        )
+        f"{parameter_name(key, unit)} = {_known(value, error, unit)}{' (fixed)' if held else ''}"
+        for key, unit, value, error, held in rows
     ]
     more = [f"{len(parts) - most} more"] if len(parts) > most else []
     words = ", ".join([*parts[:most], *more])

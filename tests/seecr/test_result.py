@@ -124,8 +124,8 @@ def test_a_model_prints_its_effects(tmp_path: Path) -> None:
     model = seecr.load_model(path, robot)
     lines = str(model).splitlines()
     assert lines[0] == "model of a robot: plain SEECR and 2 effects"
-    assert lines[1] == "pulley_radius: radius_m = 0.00990 ± 0.00010"
-    assert lines[2] == "centre_of_mass: shift_x_m = 0.001, shift_y_m = 0, shift_z_m = 0"
+    assert lines[1] == "pulley_radius: radius = 9.90 ± 0.10 mm"
+    assert lines[2] == "centre_of_mass: shift_x = 1 mm, shift_y = 0 mm, shift_z = 0 mm"
     assert lines[3] == model.notes[0]
     table = model.to_frame().to_pydict()
     assert table["parameter"] == ["radius_m", "shift_x_m", "shift_y_m", "shift_z_m"]

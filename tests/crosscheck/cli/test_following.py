@@ -11,8 +11,8 @@ from made_data import case
 
 from crosscheck.cli.following import Given, after_comparison, after_diagnosis, after_fit
 from crosscheck.fit.reasons import DiagnosisVerdict
-from crosscheck.fit.words import measured
 from crosscheck.show.effects import parameter_lines
+from seecr.units import measured
 
 FOUND = DiagnosisVerdict.EFFECTS_FOUND
 OFF = SimpleNamespace(is_noise=False, refusal=None)

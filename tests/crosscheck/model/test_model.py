@@ -407,7 +407,7 @@ def test_known_and_fixed_values_are_read(robot, saved):
     changed(saved, "known = { value = 0.03, stderr = 0.0005 },", "value = 0.03, fixed = true,")
     model = load_model(saved, robot)
     assert model.terms["pulley_radius"].knowledge.fixed.all()
-    assert "radius_m = 0.03 (fixed)" in "\n".join(model.lines())
+    assert "radius = 30 mm (fixed)" in "\n".join(model.lines())
 
 
 def test_a_whole_effect_and_all_components_of_a_parameter_can_be_known(robot, tmp_path):
