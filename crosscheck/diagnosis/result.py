@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,6 @@ from seecr.effects import ApartLayout, Layout, Term, Terms
 from seecr.files import plain
 from seecr.pose import Array
 from seecr.prediction.model import Model
-from seecr.prediction.uncertainty import covariance_of
 from seecr.result import Record, Result
 
 PROBABLE = 0.5
@@ -275,18 +273,6 @@ class Diagnosis(Result):
         """
         return Terms(found.term for found in self.missing)
 
-    @cached_property
-    def covariance(self) -> Array | None:
-        """(p, p) of the values of ``model.terms``; None where the listed effects are not all."""
-        return None if self.model is None else covariance_of(self.model)
-
-    @property
-    def _fit(self) -> dict[str, Any]:
-        """The item ``fit``: how the errors of the values go together."""
-        assert self.model is not None
-        labels = [f"{effect}.{key}" for effect, key in self.model.terms.labels]
-        return {"parameters": labels, "covariance": self.covariance}
-
     @property
     def measure_further(self) -> tuple[str, ...]:
         """What to measure next beside the checks of the listed effects, which say it themselves."""
@@ -332,7 +318,6 @@ class Diagnosis(Result):
                 "residual": self.whiteness,
                 "where": self.where,
                 "notes": self.notes,
-                **({} if self.covariance is None else {"fit": self._fit}),
                 **(_NOT_WEIGHED if self.chances is None else self.chances.as_json()),
             }
         )

@@ -10,9 +10,6 @@ from rich.console import Console
 from crosscheck.comparison.models import ModelComparison
 from crosscheck.show.blocks import Block, Items, Line
 from crosscheck.show.terminal import show
-from seecr.counted import some
-
-_MOST = 12
 
 
 def print_models(
@@ -23,20 +20,11 @@ def print_models(
 
 
 def _on_terminal(found: ModelComparison, pooled: Path | None) -> Iterator[Block]:
-    yield Items(found.notes, "note: ", "dim")
     yield Line(f"{found.before} → {found.now}", "bold")
     yield Line(found.sentence, "bold yellow" if found.differs else "green" if found.values else "")
-    yield Items([one.words for one in found.moved], "  ")
-    for name, effects in ((found.before, found.only_before), (found.now, found.only_now)):
-        if effects:
-            yield Line(f"Only in {name}: {', '.join(effects)}")
-    if found.unsettled:
-        names = some([one.label for one in found.unsettled], _MOST)
-        yield Line(f"Neither settles: {names}; their errors are as large as what is plausible")
-    if pooled is None:
-        return
-    if found.pooled is None:
+    yield Items(found.details, "  ")
+    if pooled is not None and found.pooled is not None:
+        yield Line(f"Written to {pooled}: {', '.join(found.pooled.names)}, both together")
+    elif pooled is not None:
         why = "the values differ" if found.differs else "they have no value in common"
         yield Line(f"{pooled} was not written: {why}, so that no one model holds for both")
-    else:
-        yield Line(f"Written to {pooled}: {', '.join(found.pooled.names)}, both together")
