@@ -9,6 +9,7 @@ import click
 from crosscheck.cli import choices
 from crosscheck.cli.following import Given, after_fit
 from seecr.cli import options
+from seecr.cli.durations import say_duration
 
 
 @options.command(
@@ -51,6 +52,7 @@ def command(
     measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     check_place(model)
     with options.result_in(out, "calibration.json") as keep:
+        say_duration("calibrate", measured.n_rows, "rows", as_json)
         with options.progress_share("calibrating") as progress:
             found = calibrate(machine, measured, old, progress, only=only, exclude=exclude)
         written = found.pays or (force and found.settled)

@@ -10,6 +10,7 @@ import click
 from crosscheck.cli import choices
 from crosscheck.cli.following import Given, after_diagnosis
 from seecr.cli import options
+from seecr.cli.durations import say_duration
 
 if TYPE_CHECKING:
     from crosscheck import Diagnosis
@@ -67,6 +68,7 @@ def command(
     made = options.made_by(machine.source, *data, model)
     names, sometimes = ["diagnosis.json", "diagnosis.html"], ["diagnosis.rrd"]
     with staged(out, names=names, sometimes=sometimes, read=data, made=made) as folder:
+        say_duration("diagnose", measured.n_rows, "rows", as_json, ", longer if much is missing")
         with options.progress_share("diagnosing") as progress:
             found = diagnose(
                 machine, measured, own, progress, only=only, exclude=exclude,

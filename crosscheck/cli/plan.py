@@ -11,6 +11,7 @@ import click
 from crosscheck.cli import choices
 from crosscheck.cli.following import Given, after_plan
 from seecr.cli import options
+from seecr.cli.durations import say_duration
 
 
 @options.command(
@@ -100,6 +101,10 @@ def command(
     made = options.made_by(machine.source, poses)
     where = planned_files(out, poses)
     with staged(out, read=with_toml(poses), made=made, **where) as folder:
+        if given is None:
+            say_duration("choose", rows or 0, "poses to choose", as_json)
+        else:
+            say_duration("plan", given.n_rows, "rows", as_json)
         with options.progress_share("planning") as progress:
             asked: dict[str, Any] = {"reads": reads, "limits": (lowest, highest), "box": room}
             commands = given or choose_poses(

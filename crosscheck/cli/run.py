@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from seecr.cli import options
+from seecr.cli.durations import say_duration
 from seecr.cli.following import following
 
 if TYPE_CHECKING:
@@ -88,6 +89,7 @@ def command(
     from crosscheck import load_thresholds, user_cases
     from crosscheck.suite.cases import select
     from crosscheck.suite.run import every_shipped, shipped_like
+    from seecr.parallel import processors
 
     if mujoco_robot is not None and robot is None:
         raise click.UsageError("--mujoco-robot needs --robot: the MJCF that SEECR reads")
@@ -99,7 +101,9 @@ def command(
     if list_only:
         _list(chosen)
         return 0
-    run = _run(chosen, thresholds, seed, jobs, not no_recordings, out)
+    at_once = jobs or processors()
+    say_duration("run", sum(map(len, chosen)), "poses", as_json, at_once=at_once)
+    run = _run(chosen, thresholds, seed, at_once, not no_recordings, out)
     _tell(run, out, not no_recordings, as_json)
     return run.outcome.exit_status
 
@@ -115,13 +119,12 @@ def _list(chosen: list[Case | EffectCase]) -> None:
 
 
 def _run(
-    chosen: list[Case | EffectCase], thresholds: Thresholds, seed: int, jobs: int | None,
+    chosen: list[Case | EffectCase], thresholds: Thresholds, seed: int, jobs: int,
     recordings: bool, out: Path,
 ) -> Run:  # fmt: skip
     from crosscheck import run_suite, write_run
     from crosscheck.suite.write import FILE_NAME, RESULTS
     from seecr.folders import staged
-    from seecr.parallel import processors
 
     # effects alone have no worst pose
     every = {f"{case.name}.rrd" for case in chosen}
@@ -130,7 +133,7 @@ def _run(
     with staged(out, names=names, **where) as folder:
         with options.progress_bar("compiling", sum(map(len, chosen))) as advance:
             run = run_suite(
-                chosen, thresholds, seed=seed, jobs=jobs or processors(),
+                chosen, thresholds, seed=seed, jobs=jobs,
                 record=partial(_record, folder=folder) if recordings else None,
                 progress=lambda result: advance(len(result), result.case.name),
             )  # fmt: skip

@@ -212,7 +212,7 @@ def compare_models(
     if lacking := len(first.stderr) - len(values):
         notes.append(f"{counted(lacking, 'value')} without an error in either: not compared")
     found = ModelComparison(
-        *names, values,
+        names[0], names[1], values,
         tuple(n for n in one.terms.names if n not in other.terms),
         tuple(n for n in other.terms.names if n not in one.terms),
         together, notes=tuple(notes),

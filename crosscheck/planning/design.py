@@ -139,8 +139,8 @@ def make_plan(
     read = Reads.of_kinds(robot.n_cables, kinds)
     full, assumed = expected_sigma(robot, stated, kinds)
     free = [layout_of(name, robot) for name in commands.free]
-    model, names = Terms(Term(one, one.null) for one in free), _beside_catalogue(effects)
-    plan = planned(robot, commands, full, read, model, names)
+    model = Terms(Term(one, one.null) for one in free)
+    plan = planned(robot, commands, full, read, model, _beside_catalogue(effects))
     notes = [*robot.notes, *strained(robot), *commands.notes, *assumed]
     if plan.unsolved.any():
         status = plan.base.prediction.solution().status[int(np.argmax(plan.unsolved))].value

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from seecr.cli import options
+from seecr.cli.durations import say_duration
 from seecr.cli.following import following
 
 if TYPE_CHECKING:
@@ -116,6 +117,7 @@ def command(
     # a figure of few axes is not drawn
     names = {"map.json", "map.npz", *(pictures & {"map.rrd"})}
     with staged(out, names=names, sometimes=sometimes, made=made) as folder:
+        say_duration("map", total, "poses", as_json)
         with options.progress_bar("mapping", total) as tell:
             found = workspace_map(
                 machine, *axes, orientation=turned or None, elastic=not no_elastic,
