@@ -71,10 +71,16 @@ def add_effect(
         per: "file" or "run" gives the effect separate values for each; by default it has them if
             the model says so.
 
+    Returns:
+        the fit, with the new model and the errors before and after.
+
     Raises:
         InputError: there is no effect of that name, or ``per`` is neither.
         CrosscheckError: the data do not allow the fit.
         UnsolvedError: rows have no equilibrium, or the fit does not converge.
+
+    Example:
+        ``crosscheck.add_effect("robot.xml", "measured.csv", "pulley_radius").model``
     """
     robot = robot_of(robot)
     valued, named = _several(name, robot)
@@ -101,10 +107,16 @@ def add_effects(
         model: effects of the model, or their file; by default the plain model.
         progress: called with what is being done and the fraction that is done.
 
+    Returns:
+        the fit, with the new model and the errors before and after.
+
     Raises:
         InputError: there is no effect of a name, or something else than effects was given.
         CrosscheckError: no effects were given, or the data do not allow the fit.
         UnsolvedError: rows have no equilibrium, or the fit does not converge.
+
+    Example:
+        ``crosscheck.add_effects(robot, data, ["pulley_radius", "stiffness"])``
     """
     robot = robot_of(robot)
     valued, named = _several(effects, robot)

@@ -96,9 +96,18 @@ def option(name: str) -> str:
 def load_limits(path: str | Path) -> Limits:
     """Limits from a TOML file: ``max_position = "0.5mm"``, keys as on the command line.
 
+    Args:
+        path: of the TOML.
+
+    Returns:
+        the limits, SI.
+
     Raises:
         InputFileError: the file is no TOML or empty, has an unknown key or a value without a unit.
         InputError: no path.
+
+    Example:
+        ``crosscheck.load_limits("limits.toml")``
     """
     expected = 'expected a TOML file with lines such as max_position = "0.5mm"'
     toml = read_toml(path_of(path, "limits"), expected)
@@ -126,8 +135,17 @@ def load_limits(path: str | Path) -> Limits:
 def exceeded(limits: Limits, found: Comparison) -> list[Exceeded]:
     """The limits that a comparison exceeds: each with its ``name``, ``limit``, ``value`` and words.
 
+    Args:
+        limits: some or all. found: the comparison.
+
+    Returns:
+        those that are exceeded; none if all hold.
+
     Raises:
         CrosscheckError: a limit is on something that was not measured, or nothing can exceed it.
+
+    Example:
+        ``crosscheck.exceeded(crosscheck.load_limits("limits.toml"), found)``
     """
     out = []
     for name, rule in RULES.items():

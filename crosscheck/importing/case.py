@@ -204,6 +204,9 @@ def import_case(
     Raises:
         InputFileError, CrosscheckError: any mistake in the files.
         InputError: an unknown form, or a case of a robot without a file.
+
+    Example:
+        ``crosscheck.import_case("motive", "take.csv", robot, "commands.csv")``
     """
     if not isinstance(form, str) or form not in READERS:
         raise InputError(f"form must be one of {', '.join(READERS)}, got {form!r}")

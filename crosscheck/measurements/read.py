@@ -336,9 +336,15 @@ def load_measurements(
         sigma: noise, in place of the TOML's for the kinds that it states, in all files.
         sigma_path: the TOML, if its name is not the data file's with ``.toml``.
 
+    Returns:
+        the measurements, SI, with what was not read as NaN.
+
     Raises:
         InputFileError: any mistake in either file.
         InputError: no path, or ``sigma`` is something else than a :class:`crosscheck.Sigma`.
+
+    Example:
+        ``crosscheck.load_measurements("measured.csv", robot).n_rows``
     """
     robot = robot_of(robot)
     _check_sigma(sigma)
@@ -396,9 +402,15 @@ def load_commands(
         sigma: noise to expect, in place of the TOML's for the kinds that it states.
         sigma_path: the TOML, if its name is not the data file's with ``.toml``.
 
+    Returns:
+        the commands; readings may be missing.
+
     Raises:
         InputFileError: any mistake in either file.
         InputError: no path, or ``sigma`` is something else than a :class:`crosscheck.Sigma`.
+
+    Example:
+        ``crosscheck.load_commands("measured.csv", robot)``
     """
     robot = robot_of(robot)
     _check_sigma(sigma)

@@ -27,6 +27,9 @@ def write_measurements(path: str | Path, data: Measurements, remark: str = "") -
     Raises:
         InputFileError: the folder cannot be written.
         InputError: not measurements.
+
+    Example:
+        ``crosscheck.write_measurements("copy.csv", data)``
     """
     if not isinstance(data, Measurements):
         raise InputError(f"expected measurements, got {type(data).__name__}")

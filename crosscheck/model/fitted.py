@@ -75,6 +75,9 @@ def load_diagnosed(path: str | Path, robot: GivenRobot) -> tuple[Terms, tuple[st
     Raises:
         InputFileError: no such file, not a diagnosis, of another robot, or without missing effects.
         InputError: no path.
+
+    Example:
+        ``crosscheck.load_diagnosed("diagnosis.json", robot)``
     """
     path, robot = path_of(path, "a diagnosis"), robot_of(robot)
     document = diagnosis_document(path)

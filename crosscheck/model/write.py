@@ -453,6 +453,9 @@ def save_model(path: str | Path, model: Model, replaces: str | None = None) -> N
     Raises:
         InputFileError: the file cannot be written, is no model, or was changed since it was read.
         InputError: not a model.
+
+    Example:
+        ``crosscheck.save_model("new.toml", seecr.new_model(robot))``
     """
     if not isinstance(model, Model):
         raise InputError(

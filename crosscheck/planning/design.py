@@ -127,9 +127,15 @@ def make_plan(
         box: (2, 3) [m] lowest and highest position of these.
         effects: of one's own, to be considered beside those of the catalogue.
 
+    Returns:
+        what each effect's smallest visible size is, and what to add. About 1 s for 144 rows.
+
     Raises:
         CrosscheckError: there is an unknown kind of reading.
         InputError: there are no commands; limits or a box of another form, or reversed.
+
+    Example:
+        ``crosscheck.make_plan(robot, "measured.csv").effects``
     """
     robot = robot_of(robot)
     limits, box = limits_given(limits), box_given(box)
@@ -267,6 +273,9 @@ def choose_poses(
         CrosscheckError: the robot can hold too few poses within the limits.
         InputError: ``rows`` is not a whole number from 1 on; limits or a box of another form, or
             reversed.
+
+    Example:
+        ``crosscheck.choose_poses("robot.xml", 12).command_pose``
     """
     robot, rows = robot_of(robot), whole(rows, "rows", least=1)
     limits, box = limits_given(limits), box_given(box)

@@ -37,6 +37,9 @@ def write_plan(plan: Plan, folder: str | Path, own: bool = True) -> tuple[str, .
     Raises:
         InputFileError: the folder cannot be made or written to.
         InputError: not a plan.
+
+    Example:
+        ``crosscheck.write_plan(crosscheck.make_plan(robot, data), "plan")``
     """
     if not isinstance(plan, Plan):
         raise InputError(f"expected a plan, as make_plan returns it, got {type(plan).__name__}")

@@ -250,9 +250,15 @@ def load_thresholds(path: str | Path | None = None) -> Thresholds:
     Args:
         path: a TOML file; None for the shipped one.
 
+    Returns:
+        the thresholds.
+
     Raises:
         InputFileError: not TOML, an unknown table or key, or a value of another kind.
         InputError: no path.
+
+    Example:
+        ``crosscheck.load_thresholds()``
     """
     shipped = _merge(Thresholds(), SHIPPED)
     return shipped if path is None else _merge(shipped, path_of(path, "thresholds"))

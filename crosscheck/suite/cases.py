@@ -197,8 +197,14 @@ def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
         seed: of the random poses.
         n_random: number of random poses of each DemoBot and cable; other robots have fewer.
 
+    Returns:
+        the cases, as :func:`run_suite` takes them.
+
     Raises:
         InputError: either is not a whole number.
+
+    Example:
+        ``[case.name for case in crosscheck.shipped_cases()]``
     """
     seed, n_random = whole(seed, "seed"), whole(n_random, "n_random")
     cases = []
@@ -239,9 +245,15 @@ def user_cases(
         seed: of the random poses.
         n_random: number of random poses.
 
+    Returns:
+        the cases, as :func:`run_suite` takes them.
+
     Raises:
         InputError: a robot without a file, or with numbers other than its file's; a seed or number
             that is not whole.
+
+    Example:
+        ``crosscheck.run_suite(crosscheck.user_cases("robot.xml", n_random=4))``
     """
     seed, n_random = whole(seed, "seed"), whole(n_random, "n_random")
     model, robot = file_of(robot), robot_of(robot)

@@ -319,6 +319,9 @@ def run_suite(
     Raises:
         InputError: no case, something that is not one, or ``jobs`` not a whole number from 1 on.
         CrosscheckError: a name that no shipped case has, or a process that was killed.
+
+    Example:
+        ``crosscheck.run_suite(crosscheck.shipped_cases()[:1]).outcome``
     """
     began, jobs = time.perf_counter(), whole(jobs, "jobs", least=1)
     chosen = chosen_cases(cases, seed)

@@ -317,6 +317,9 @@ def write_run(run: Run, folder: str | Path) -> tuple[str, ...]:
 
     Raises:
         InputError: not a run, or not a folder's path.
+
+    Example:
+        ``crosscheck.write_run(crosscheck.run_suite(crosscheck.shipped_cases()[:1]), "run")``
     """
     if not isinstance(run, Run):
         raise InputError(f"expected a run, as run_suite returns it, got {type(run).__name__}")

@@ -301,9 +301,18 @@ def seal(answer: Answer) -> str:
 def unseal(path: str | Path) -> Answer:
     """The answer in a sealed file, or in the case folder that holds one.
 
+    Args:
+        path: of the sealed file, or of its case folder.
+
+    Returns:
+        the hidden effects with their values.
+
     Raises:
         InputFileError: there is no such file, or it is not a sealed answer.
         InputError: no path.
+
+    Example:
+        ``crosscheck.unseal("case/answer.sealed").hidden``
     """
     path = path_of(path, "a sealed answer")
     file = path / NAME if path.is_dir() else path

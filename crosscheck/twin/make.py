@@ -129,6 +129,9 @@ def make_twin(
         InputFileError: poses that cannot be read, or files in ``out`` that are not from an older
             twin.
         InputError: a robot without a file, or with numbers other than its file's.
+
+    Example:
+        ``crosscheck.make_twin(robot, 7, effects=["pulley_radius"], points=4)``
     """
     seed, points = whole(seed, "seed"), whole(points, "points", least=1)
     n_effects = None if n_effects is None else whole(n_effects, "n_effects")

@@ -6,8 +6,8 @@ import sys
 
 import click
 
-# Seconds at the start and for each row or pose, on one core of 2.5 GHz in 2026 (time.process_time):
-# of twins of demobot_cogiro with one hidden effect, 32 to 288 rows; of grids of 16 000 poses; of the
+# Seconds at the start and for each row or pose, on one core of 2.5 GHz (time.process_time): of
+# twins of demobot_cogiro with one hidden effect, 32 to 288 rows; of grids of 16 000 poses; of the
 # suite, which takes a quarter of a minute on two. More cables and missing effects take longer.
 _SECONDS = {
     "diagnose": (1.5, 0.027),

@@ -89,7 +89,14 @@ _PLACES = (_HERE / "models", _HERE.parent / "models")
 
 
 def model_names() -> tuple[str, ...]:
-    """Names of the shipped robots, in alphabetical order."""
+    """Names of the shipped robots, in alphabetical order.
+
+    Returns:
+        the names, as :func:`seecr.load_robot` takes them.
+
+    Example:
+        ``seecr.model_names()``
+    """
     files = (file for place in _PLACES for file in place.glob("*/*.xml"))
     return tuple(sorted({file.stem for file in files if file.stem == file.parent.name}))
 
@@ -100,8 +107,14 @@ def model_path(name: str) -> Path:
     Args:
         name: as in ``models/<name>/<name>.xml``, for example ``"demobot_cogiro"``.
 
+    Returns:
+        its path.
+
     Raises:
         InputError: there is no robot of that name; the message lists the names, nearest first.
+
+    Example:
+        ``seecr.model_path("demobot_cogiro")``
     """
     if str(name) in model_names():
         files = (place / name / f"{name}.xml" for place in _PLACES)
@@ -195,10 +208,16 @@ def load_robot(path: str | Path) -> Robot:
     Args:
         path: the MJCF file, or the name of a shipped robot.
 
+    Returns:
+        the robot as numbers, SI.
+
     Raises:
         InputError: neither a file nor a shipped robot.
         RobotError: the file is missing, MuJoCo cannot compile it, or it is not such a robot;
             the message names the file and the element.
+
+    Example:
+        ``seecr.load_robot("robot.xml")``
     """
     path = robot_file(path)
     if is_shipped(path):

@@ -133,6 +133,12 @@ def parameter(
             a cable has of its own acts on that cable alone.
         shape: the number only shapes the effect (a time constant, a period): it means nothing
             while the others are null, and the effect says with ``shapes`` where to look.
+
+    Returns:
+        the field, for a dataclass.
+
+    Example:
+        ``seecr.parameter("m", 0.01, bounds=(0.0, 0.1))``
     """
     _check_parameter(unit, scale, null, bounds, size)
     metadata = dict(unit=unit, scale=scale, null=null, bounds=bounds, size=size, shape=shape)

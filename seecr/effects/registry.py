@@ -102,6 +102,9 @@ def introduce(effect: type[Effect]) -> type[Effect]:
 
     Raises:
         InputError: no effect, or one with the name of an effect that is built in or installed.
+
+    Example:
+        ``seecr.introduce(Hose)``
     """
     kind = check_class(effect, _named(effect))
     there = catalogue().get(kind.name)
@@ -155,8 +158,17 @@ def considered_of(names: Collection[str]) -> list[type[Effect]]:
 def effect_named(name: str) -> type[Effect]:
     """The effect of that name.
 
+    Args:
+        name: such as ``"pulley_radius"``.
+
+    Returns:
+        its class.
+
     Raises:
         InputError: there is none; lists the known ones, nearest first, unless it is a file's name.
+
+    Example:
+        ``seecr.effect_named("pulley_radius").by_hand()``
     """
     if not isinstance(name, str):
         raise InputError(f"expected the name of an effect, got {name!r}")
@@ -183,8 +195,14 @@ def layout_of(effect: GivenEffect, robot: GivenRobot) -> Layout:
         effect: its name, its class, or an instance of it.
         robot: as described, or its MJCF.
 
+    Returns:
+        names, units, plausible sizes and bounds of its p parameters.
+
     Raises:
         InputError: neither the name of an effect nor an effect.
+
+    Example:
+        ``seecr.layout_of("pulley_radius", robot).scale``
     """
     kind = effect if isinstance(effect, type) else class_of(effect)
     if not issubclass(kind, Effect):

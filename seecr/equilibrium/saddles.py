@@ -211,8 +211,14 @@ def barriers(solution: Solution, others: Solution, i: int = 0) -> tuple[Barrier,
             ``solution`` is among them, its barrier is zero.
         i: which of the commands.
 
+    Returns:
+        one for each of the others, in their order.
+
     Raises:
         InputError: the equilibria belong to another command or robot, or a row is not at rest.
+
+    Example:
+        ``seecr.barriers(solution, seecr.equilibria(robot, poses[0]))``
     """
     for one in (solution, others):
         check_solution(one, "barriers: ")

@@ -200,6 +200,9 @@ def equilibria(
     Raises:
         InputError: more than one pose, effects with a history or a cable law of their own, or
             ``most`` is not a whole number from 1 on.
+
+    Example:
+        ``seecr.equilibria(robot, [0.4, 0.25, 0.15, 1, 0, 0, 0])``
     """
     robot, command = robot_of(robot), commanded_poses(pose)
     most = whole(most, "most", least=1)

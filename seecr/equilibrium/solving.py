@@ -81,6 +81,9 @@ def solve(
     Raises:
         InputError: wrong shapes or types, values that are not finite, an unknown method, or
             arguments that exclude each other.
+
+    Example:
+        ``seecr.solve("robot.xml", [[0.4, 0.25, 0.15, 1, 0, 0, 0]]).tensions``
     """
     if method not in METHODS:
         raise InputError(f"method must be one of {', '.join(METHODS)}, got {method!r}")

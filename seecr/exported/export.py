@@ -240,6 +240,9 @@ def export(robot: GivenRobot, effects: GivenEffects = (), at: ArrayLike | None =
     Raises:
         InputError: not one pose.
         NoRestError: the platform has no stable equilibrium there.
+
+    Example:
+        ``seecr.export(robot, "model.toml").text``
     """
     robot = robot_of(robot)
     place = robot.reference_pose[None] if at is None else commanded_poses(at, "at")

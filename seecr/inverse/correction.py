@@ -277,6 +277,9 @@ def correct(
 
     Raises:
         InputError: wrong shapes, limits that contradict each other, an unknown aim or preference.
+
+    Example:
+        ``seecr.correct(robot, poses, effects="model.toml").commands.lengths``
     """
     if prefer not in PREFERENCES:
         raise InputError(f"prefer must be one of {', '.join(PREFERENCES)}, got {prefer!r}")

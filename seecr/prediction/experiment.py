@@ -449,8 +449,14 @@ def tracked(robot: GivenRobot, commands: Commanded, effects: GivenEffects) -> Ar
         commands: poses (n, 7), or what has poses.
         effects: a model, its file, or effects with values.
 
+    Returns:
+        (n, 7) [m], quaternions scalar first.
+
     Raises:
         InputError: poses, robot or effects of a wrong type or shape.
+
+    Example:
+        ``seecr.tracked(robot, poses, "model.toml")``
     """
     robot = robot_of(robot)
     return _tracked(robot, commands_from(commands, robot), effects_of(effects, robot))
@@ -471,8 +477,14 @@ def placed(robot: GivenRobot, commands: Commanded, effects: GivenEffects) -> Com
         commands: poses (n, 7) to be read, or what has poses.
         effects: a model, its file, or effects with values.
 
+    Returns:
+        the commands, with other poses.
+
     Raises:
         InputError: poses, robot or effects of a wrong type or shape, or no pose is read so.
+
+    Example:
+        ``seecr.placed(robot, poses, "model.toml").pose``
     """
     robot = robot_of(robot)
     commands = commands_from(commands, robot)

@@ -355,7 +355,17 @@ def model_given(given: Model | str | Path, robot: Robot) -> Model:
 
 
 def new_model(robot: GivenRobot) -> Model:
-    """A model without effects for a robot, or for the robot in an MJCF: the paper's plain SEECR."""
+    """A model without effects for a robot, or for the robot in an MJCF: the paper's plain SEECR.
+
+    Args:
+        robot: as described, or its MJCF.
+
+    Returns:
+        the model; crosscheck.save_model keeps it.
+
+    Example:
+        ``seecr.new_model(robot)``
+    """
     robot = robot_of(robot)
     document = tomlkit.document()
     document.add(tomlkit.comment("Effects that this robot has beyond plain SEECR, in the order"))
@@ -372,9 +382,15 @@ def load_model(path: str | Path, robot: GivenRobot) -> Model:
         path: the TOML file.
         robot: the robot that the model must have been made for, or its MJCF.
 
+    Returns:
+        the model; it prints each effect with its values.
+
     Raises:
         InputFileError: there is no such file, it is not TOML, it was made for another robot, or an
             effect or parameter is unknown, missing, given twice, not a number or out of bounds.
+
+    Example:
+        ``seecr.load_model("model.toml", robot).terms``
     """
     path, robot = path_of(path, "a model"), robot_of(robot)
     toml, document = read_document(path)

@@ -219,6 +219,9 @@ def sensitivities(
 
     Returns:
         (n, 6 + m, p): position [m], rotation vector [rad] and tensions [N], by each parameter.
+
+    Example:
+        ``seecr.sensitivities(experiment, terms, experiment.predict(terms.effects))``
     """
     wanted = list(columns) if len(columns) else list(range(len(terms)))
     out = np.zeros((*_shape(at), len(wanted)))

@@ -219,8 +219,14 @@ def spread_of(robot: GivenRobot, commands: Commanded, model: Model | str | Path)
         commands: as in :func:`seecr.predict`.
         model: as ``crosscheck calibrate``, ``add`` or ``diagnose`` write it, or its file.
 
+    Returns:
+        (n, 3) [m], (n, 3) [rad] and (n, m) [N]; None without a covariance.
+
     Raises:
         InputFileError: the model holds no valid correlations.
+
+    Example:
+        ``seecr.spread_of(robot, poses, "model.toml")``
     """
     robot = robot_of(robot)
     model = model_given(model, robot)

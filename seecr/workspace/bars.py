@@ -97,6 +97,9 @@ def bar_balances(robot: GivenRobot, pose: ArrayLike) -> tuple[BarBalance, ...] |
 
     Raises:
         InputError: a wrong shape, or a quaternion that is no rotation.
+
+    Example:
+        ``seecr.bar_balances("planar_two_cable", solution.pose[0])``
     """
     robot = robot_of(robot)
     places = commanded_poses(pose)
@@ -169,6 +172,9 @@ def bar_manifold(solution: Solution, commanded: bool = True) -> BarManifold | No
 
     Raises:
         InputError: not a solution.
+
+    Example:
+        ``seecr.bar_manifold(seecr.solve("planar_two_cable", bars))``
     """
     check_solution(solution)
     robot = solution.robot
@@ -315,6 +321,9 @@ def midline_points(solution: Solution) -> Midlines | None:
 
     Raises:
         InputError: not a solution.
+
+    Example:
+        ``seecr.midline_points(solution)``
     """
     check_solution(solution)
     robot = solution.robot

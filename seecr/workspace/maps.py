@@ -65,6 +65,9 @@ def default_axes(
     Raises:
         InputError: ``values`` is not a whole number from 1 on, ``orientation`` no quaternion, or
             the joints let the platform move in no way without turning it.
+
+    Example:
+        ``seecr.workspace_map(robot, *seecr.default_axes(robot, 5))``
     """
     robot = robot_of(robot)
     if values is None:
@@ -139,6 +142,9 @@ def workspace_map(
     Raises:
         InputError: an axis without values, an orientation that the joints do not allow, effects
             with a history, or probabilities asked for without a covariance.
+
+    Example:
+        ``seecr.workspace_map(robot, [0.3, 0.4], [0.2, 0.3], [0.15]).margin``
     """
     robot = robot_of(robot)
     effects = read_once(effects, robot)
@@ -202,8 +208,17 @@ def with_history(robot: GivenRobot, effects: GivenEffects) -> list[str]:
 
     Maps know none of them, and what one is asked for with such effects is refused.
 
+    Args:
+        robot: as described, or its MJCF. effects: a model, its file, or effects with values.
+
+    Returns:
+        their names; none if every row stands alone.
+
     Raises:
         InputError: something other than a robot, or than effects with values.
+
+    Example:
+        ``seecr.with_history(robot, "model.toml")``
     """
     robot = robot_of(robot)
     at_home = Experiment(robot, Commands(robot.reference_pose[None]))

@@ -93,6 +93,9 @@ def kept_chance(
     Raises:
         InputError: wrong shapes, or limits that contradict each other.
         InputFileError: no such file, or no model of this robot in it.
+
+    Example:
+        ``seecr.kept_chance(robot, poses, "model.toml", highest=50.0)``
     """
     robot = robot_of(robot)
     known = moving_covariance(model_given(model, robot))
@@ -153,6 +156,9 @@ def held_chance(
         InputError: wrong shapes, quaternions that are no rotations, or limits that contradict each
             other.
         InputFileError: no such file, or no model of this robot in it.
+
+    Example:
+        ``seecr.held_chance(robot, poses, "model.toml", lowest=0.5)``
     """
     robot = robot_of(robot)
     known = moving_covariance(model_given(model, robot))
@@ -291,6 +297,9 @@ def boundary(
     Raises:
         InputError: a pose is on the wrong side, the tolerance is not positive, or a probability is
             asked for without a covariance.
+
+    Example:
+        ``seecr.boundary(robot, held, not_held, lowest=0.5)``
     """
     robot = robot_of(robot)
     if not 0.0 < tolerance < np.inf:

@@ -50,6 +50,9 @@ def bar_tilt(exit_points: ArrayLike, positions: ArrayLike, half_length: float = 
 
     Raises:
         InputError: wrong shapes, numbers that are not finite, or a negative half length.
+
+    Example:
+        ``seecr.bar_tilt([[0, 1], [1, 1]], [[0.4, 0.5]], 0.1)``
     """
     exits, places = _points(exit_points), finite(positions, "positions")
     if places.shape[-1:] != (2,):
@@ -113,9 +116,15 @@ def bar_equilibria(
         position: (2,) [m] of the bar's middle.
         half_length: h [m], above zero.
 
+    Returns:
+        the tilts [rad], each with whether it is stable.
+
     Raises:
         InputError: wrong shapes, numbers that are not finite, a length that is not above zero, or
             coinciding exit points.
+
+    Example:
+        ``seecr.bar_equilibria([[0, 1], [1, 1]], [0.4, 0.5], 0.1)``
     """
     half_length = _half_length(half_length)
     if half_length <= 0.0:
@@ -153,6 +162,9 @@ def solution_manifold(
 
     Raises:
         InputError: wrong shapes, numbers that are not finite, or a negative half length.
+
+    Example:
+        ``seecr.solution_manifold([[0, 1], [1, 1]], [0.3, 0.4], [0.5], 0.1)``
     """
     grid = np.stack(np.meshgrid(finite(x, "x"), finite(y, "y")), axis=-1)
     return bar_tilt(exit_points, grid, half_length)
@@ -174,6 +186,9 @@ def midline_point(exit_points: ArrayLike, anchor_points: ArrayLike) -> Array:
 
     Raises:
         InputError: wrong shapes.
+
+    Example:
+        ``seecr.midline_point(planar.exit_points[:, [0, 2]], planar.anchor_points[:, [0, 2]])``
     """
     exits, anchors = numbers(exit_points, "exit_points"), numbers(anchor_points, "anchor_points")
     if exits.shape[-2:] != (4, 2) or anchors.shape[-2:] != (4, 2):

@@ -128,9 +128,15 @@ def slack_spans(
         effects: those of the solution.
         tolerance: [m] within which changes are found, rotations times the robot's length.
 
+    Returns:
+        the stretches, in the order of the sweep.
+
     Raises:
         InputError: not a solution, other commands than its own, lengths, or a tolerance that is not
             above zero.
+
+    Example:
+        ``seecr.slack_spans(solution)``
     """
     check_solution(solution)
     near = finite(tolerance, "tolerance")

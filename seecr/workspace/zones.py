@@ -103,6 +103,9 @@ def feasible(
         InputError: wrong shapes, numbers that are not finite, quaternions that are no rotations,
             limits that contradict each other, or something other than effects with values.
         InputFileError: there is no such file, or it holds no model of this robot.
+
+    Example:
+        ``seecr.feasible(robot, poses, lowest=0.5, highest=50.0)``
     """
     robot = robot_of(robot)
     margin = tension_margin(
@@ -143,6 +146,9 @@ def tension_margin(
 
     Raises:
         InputError, InputFileError: as for :func:`feasible`.
+
+    Example:
+        ``seecr.tension_margin(robot, poses, lowest=0.5, highest=50.0)``
     """
     from seecr.compiled.tensions import margins_at  # takes a while to import
 
@@ -312,8 +318,14 @@ def slack_zones(solution: Solution) -> list[Zone]:
     Args:
         solution: of the trajectory's poses in their order.
 
+    Returns:
+        the zones, each with its rows.
+
     Raises:
         InputError: not a solution.
+
+    Example:
+        ``seecr.slack_zones(solution)``
     """
     check_solution(solution)
     counts = [
