@@ -29,6 +29,10 @@ from seecr.pose import Array
 from seecr.result import Record, Result
 from seecr.units import in_unit, short
 
+# Why effects do not show.
+_SMALL = "too small compared with the noise"
+_STILL = "whatever its size, it moves none of these readings, for instance as joints hold it"
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Visible:
@@ -259,8 +263,12 @@ class Sight:
         out = [f"In these data {effects} would be visible at a plausible size."]
         large = [n for n, why in self.missing.items() if why.why is Why.TOO_MANY_PARAMETERS]
         lacking = by_reason({n: why for n, why in self.missing.items() if n not in large})
-        if self.hidden:
-            lacking.append(f"{', '.join(self.hidden)} (too small compared with the noise)")
+        still = [one.name for one in self.effects if not np.isfinite(one.factor)]
+        for names, why in (
+            ([name for name in self.hidden if name not in still], _SMALL),
+            (still, _STILL),
+        ):
+            lacking += [f"{', '.join(names)} ({why})"] if names else []
         if lacking:
             out.append(f"Not visible: {'; '.join(lacking)}.")
         if large:
