@@ -98,7 +98,9 @@ class Scores:
         return self.solved[key][1].chosen
 
     def gain(self, key: Key, more: str) -> float:
-        """Approximate ln evidence that a member gains beside a hypothesis."""
+        """Approximate ln evidence that a member gains beside others; 0 where it moves nothing."""
+        if more not in self.about.linear.groups:
+            return 0.0
         self.score(key)
         return self.solved[key][1].gain(more)
 

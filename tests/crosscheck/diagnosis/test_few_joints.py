@@ -11,6 +11,10 @@ import pytest
 
 import crosscheck
 import seecr
+from crosscheck.inference.catalogue import Catalogue
+from crosscheck.inference.fit import Data
+from crosscheck.inference.search import Search
+from crosscheck.preparation.prepare import prepare
 from seecr.pose import Array
 
 EXITS = [(-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)]
@@ -63,6 +67,20 @@ def measured(robot: seecr.Robot, hidden: seecr.Term) -> crosscheck.Measurements:
         Path("m.csv"), robot.n_cables, np.array(["a", "b", "c"])[run], command_pose=pose,
         t_s=time, loads=loads, position=noisy, sigma=crosscheck.Sigma(position_m=2e-5),
     )  # fmt: skip
+
+
+def test_a_member_that_moves_nothing_gains_nothing(tmp_path: Path) -> None:
+    """It has no column in the linear model, where the sets about one with it are looked at."""
+    robot = robot_of("a point mass", tmp_path)
+    ready = prepare(
+        robot, measured(robot, seecr.Term.of(robot, "stiffness", factor=0.8)), seecr.Terms()
+    )
+    found = Data.of(ready.problem, ready.terms)
+    search = Search(found, Catalogue.of(found, ready.terms))
+    scores = search.scores_about(search.begin())
+    both = frozenset({"centre_of_mass", "stiffness"})
+    assert "centre_of_mass" not in scores.about.columns and scores.gain(both, "centre_of_mass") == 0
+    assert both - {"centre_of_mass"} in scores.neighbours(both)
 
 
 @pytest.mark.slow
