@@ -57,17 +57,19 @@ def compare_two(
     from crosscheck import compare_models, save_model
     from crosscheck.model.write import check_place
     from crosscheck.show.models import print_models
-    from seecr.files import json_text, staged, write_text
+    from seecr.files import json_text, write_text
+    from seecr.folders import staged
 
     if wrong := [word for word in fail_on if word != "moved"]:
         raise click.UsageError(f"--fail-on: expected moved, got {wrong[0]}")
     if model_out is not None:
         check_place(model_out)
-    with staged(out) as folder:
+    made = options.made_by(before, now)
+    with staged(out, names=["models.json"], read=[before, now], made=made) as folder:
         found = compare_models(before, now)
         status = 1 if (fail_on and found.differs) or _unwritten(found.pooled, model_out) else 0
         head: Mapping[str, Any] = {
-            "made": options.made_by(before, now), "exit_status": status,
+            "made": made, "exit_status": status,
         }  # fmt: skip
         text = json_text({**head, **found.as_json()})
         write_text(folder / "models.json", text + "\n")

@@ -10,7 +10,7 @@ import numpy as np
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.words import probability_name, removed
 from crosscheck.fit.reasons import probability_words
-from crosscheck.fit.words import measured, rms_words
+from crosscheck.fit.words import rms_words
 from crosscheck.show.blocks import (
     Bold,
     Cell,
@@ -26,7 +26,7 @@ from crosscheck.show.blocks import (
 )
 from seecr.counted import counted
 from seecr.effects import Terms
-from seecr.units import in_unit, parameter_name, short, with_error
+from seecr.units import in_unit, measured, parameter_name, short, with_error
 
 # Correlations above this are named; parameters beyond this many plausible sizes are doubtful.
 _CORRELATED, PLAUSIBLE = 0.9, 5.0

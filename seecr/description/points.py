@@ -102,7 +102,7 @@ def physical_inertia(inertia: Array, joints: Sequence[dict[str, Any]], pose: Arr
     return about * np.eye(3) if about > 0.0 else None
 
 
-def described(
+def robot_numbers(
     exit_points: ArrayLike, anchor_points: ArrayLike, mass: float, ea: ArrayLike,
     stiffness: ArrayLike, at: ArrayLike | None, plane: str | None,
     centre_of_mass: ArrayLike, inertia: ArrayLike | None,

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seecr.counted import between, counted
 from seecr.description.cables import EXAMPLE, rope_of
-from seecr.description.points import described
+from seecr.description.points import robot_numbers
 from seecr.description.scene import plain_text
 from seecr.errors import InputError, RobotError
 from seecr.files import path_of, write_text
@@ -162,7 +162,7 @@ class Robot:
                 f"and cable={EXAMPLE!r}, got none or several"
             )
         strength = rope_of(cable).ea if cable is not None else np.nan if ea is None else ea
-        numbers, replaced = described(
+        numbers, replaced = robot_numbers(
             exit_points, anchor_points, mass, strength, np.nan if stiffness is None else stiffness,
             at, plane, centre_of_mass, inertia,
         )  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 from seecr.counted import some
 from seecr.description.cables import EXAMPLE, ea_of
 from seecr.description.mjcf import load_robot
-from seecr.description.points import described, home_of, plane_of
+from seecr.description.points import home_of, plane_of, robot_numbers
 from seecr.description.robot import Joint, Robot
 from seecr.errors import InputError, InputFileError, SeecrError
 from seecr.files import written
@@ -139,7 +139,7 @@ class Draft:
         # nothing keeps a free platform on one point from turning about it: it is a point mass
         one_point = self.joints == () and bool(np.all(self.anchor_points == self.anchor_points[0]))
         try:
-            numbers, replaced = described(
+            numbers, replaced = robot_numbers(
                 self.exit_points, self.anchor_points, self.mass, self.ea, self.stiffness, self.pose,
                 None if one_point else self.plane, self.centre_of_mass, self.inertia,
                 None if one_point else self.joints,

@@ -79,7 +79,7 @@ def test_every_command_that_may_take_a_second_has_a_bar() -> None:
         for source in [Path(inspect.getfile(group)).with_name(f"{module}.py").read_text()]
         if not re.search(r"progress_(share|bar)\(", source)
     }
-    assert without == {"effects", "export"}
+    assert without == {"effects", "export", "new"}
 
 
 def test_short_work_says_nothing_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
