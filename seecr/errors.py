@@ -1,4 +1,7 @@
-"""Exceptions: each message is one line, for the person who can remedy the cause."""
+"""Exceptions: each message is for the person who can remedy the cause.
+
+It is one line, or one line for each of several faults of a file.
+"""
 
 from __future__ import annotations
 

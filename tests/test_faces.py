@@ -96,13 +96,15 @@ seecr.compiled.compile_notice: tell_compiling
 seecr.counted: counted
 seecr.description.cables: ea_of
 seecr.description.fingerprint: fingerprint
+seecr.description.fixing: told write_fixed
 seecr.description.mjcf: CABLES
 seecr.description.robot: ITS_A_POINT
 seecr.effects.base: unfed
 seecr.errors: printable
 seecr.effects.loaded: load_effect
 seecr.equilibrium.search: elsewhere on_their_way
-seecr.equilibrium.solving: strained strained_rows
+seecr.equilibrium.solving: strained_rows
+seecr.equilibrium.strange: strange
 seecr.exported.export: wrote
 seecr.folders: check_ours staged
 seecr.files: Made check_writable json_text with_toml write_text write_texts

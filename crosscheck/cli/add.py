@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     "--all-from diagnosis.json",
     "Instead of EFFECT: fit all effects that this diagnosis lists, together.",
 )
+@options.fix
 @choices.grown_model
 @options.option("--refit", "Refit an effect that the model already has.")
 @options.option("--per [file|run]", "Give EFFECT separate values for each file or run.")
@@ -56,14 +57,16 @@ def command(
     from crosscheck import Sigma, add_effect, add_effects, load_diagnosed, load_measurements
     from crosscheck.model.write import check_place, state_of
     from crosscheck.show.fits import print_addition
-    from seecr import effect_named, load_robot
+    from seecr import effect_named
 
     effect, robot, data = _arguments(words, all_from)
     if effect is not None:
         effect_named(effect)
     elif per is not None:
         raise click.UsageError("--per applies to a single EFFECT; leave out --all-from")
-    machine = load_robot(robot)
+    from seecr.cli.arguments import robot_at
+
+    machine = robot_at(robot)
     listed, said = load_diagnosed(all_from, machine) if all_from is not None else ((), ())
     names = [effect] if effect is not None else [term.name for term in listed]
     before = state_of(model)
@@ -87,7 +90,7 @@ def command(
     if as_json:
         click.echo(text)
     else:
-        print_addition(found, model, written)
+        print_addition(choices.untold(found), model, written)
         given = Given(robot, data, model, sigmas)
         click.echo(after_fit(found.is_noise, written, given))
     return 0 if written else 1

@@ -43,10 +43,11 @@ def command(
     from crosscheck import Sigma, calibrate, load_measurements
     from crosscheck.model.write import check_place, state_of
     from crosscheck.show.fits import print_calibration
-    from seecr import load_robot
 
     choices.check_effects(only, exclude)  # a wrong name is told before any file is read
-    machine = load_robot(robot)
+    from seecr.cli.arguments import robot_at
+
+    machine = robot_at(robot)
     before = state_of(model)
     old = choices.model_or_new(model, machine)
     measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
@@ -61,7 +62,7 @@ def command(
     if as_json:
         click.echo(text)
     else:
-        print_calibration(found, model, written)
+        print_calibration(choices.untold(found), model, written)
         given = Given(robot, data, model, sigmas)
         click.echo(after_fit(written, written, given))
     if not found.settled:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import copy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from seecr.cli.options import FILE, F, option, together
+from seecr.cli import notes
+from seecr.cli.options import FILE, F, fix, option, together
 
 if TYPE_CHECKING:
     from crosscheck import Addition, Calibrated
@@ -34,6 +36,7 @@ def listed(words: str, said: str) -> Callable[[F], F]:
 robot_and_data = together(
     click.argument("robot", type=FILE, metavar="ROBOT.xml"),
     click.argument("data", type=FILE, nargs=-1, required=True, metavar="DATA.csv..."),
+    fix,
 )
 sigma = option(
     "--sigma KIND=0.1mm",
@@ -88,6 +91,13 @@ def model_or_new(path: Path, robot: Robot) -> Model:
     from seecr import load_model, new_model
 
     return load_model(path, robot) if path.exists() else new_model(robot)
+
+
+def untold(found: Any) -> Any:
+    """The same result without the notes about the robot, which were told before."""
+    out = copy(found)
+    object.__setattr__(out, "notes", type(found.notes)(notes.untold(found.notes)))
+    return out
 
 
 def keep_grown(

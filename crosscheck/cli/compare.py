@@ -66,12 +66,14 @@ def command(
         return compare_two(robot, data[0], out, model_out, fail_on, as_json)
     from crosscheck import Limits, Sigma, compare, exceeded, load_limits, load_measurements
     from crosscheck.show.page import write_page
-    from seecr import load_model, load_robot, with_history
+    from seecr import load_model, with_history
     from seecr.files import json_text, write_text
     from seecr.folders import staged
 
     limits = (load_limits(limits_file) if limits_file else Limits()).but(errors)
-    machine = load_robot(robot)
+    from seecr.cli.arguments import robot_at
+
+    machine = robot_at(robot)
     measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     own = load_model(model, machine) if model is not None else None
     made = options.made_by(machine.source, *data, model)
@@ -103,7 +105,7 @@ def command(
 
     for note in notes:
         click.echo(f"note: {note}")
-    print_comparison(found, beyond, limits != Limits(), out)
+    print_comparison(choices.untold(found), beyond, limits != Limits(), out)
     history = own is not None and bool(with_history(machine, own))
     lengths = measured.command_lengths is not None
     given = Given(robot, data, model, sigmas, lengths, history)

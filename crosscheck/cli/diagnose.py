@@ -52,7 +52,7 @@ def command(
     from crosscheck.model.write import check_place
     from crosscheck.show.diagnosis import print_diagnosis
     from crosscheck.show.page import write_page
-    from seecr import load_model, load_robot, new_model, with_history
+    from seecr import load_model, new_model, with_history
     from seecr.description.fingerprint import fingerprint
     from seecr.files import json_text, write_text
     from seecr.folders import staged
@@ -60,7 +60,9 @@ def command(
     gates = [DiagnosisVerdict.named(word) for word in fail_on]
     tolerance = Tolerance.parsed(tolerances)
     choices.check_effects(only, exclude)  # a wrong name is told before any file is read
-    machine = load_robot(robot)
+    from seecr.cli.arguments import robot_at
+
+    machine = robot_at(robot)
     measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     own = load_model(model, machine) if model is not None else new_model(machine)
     if model_out is not None:
@@ -86,7 +88,7 @@ def command(
     if as_json:
         click.echo(text)
     else:
-        print_diagnosis(found, out)
+        print_diagnosis(choices.untold(found), out)
     if note:
         click.echo(note, err=as_json)
     if not as_json:

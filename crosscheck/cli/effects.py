@@ -14,6 +14,7 @@ from seecr.cli.following import following
 @click.argument("name", required=False)
 @options.option("--robot ROBOT.xml", "Show plausible sizes for this robot.")
 @options.own_effects
+@options.fix
 @options.out_file("effects.json")
 @options.as_json
 def command(name: str | None, robot: Path | None, out: Path | None, as_json: bool) -> int:
@@ -25,10 +26,11 @@ def command(name: str | None, robot: Path | None, out: Path | None, as_json: boo
     deviation.
     """
     from crosscheck.show.effects import effect_record, print_effect, print_effects
-    from seecr import catalogue, effect_named, load_robot
+    from seecr import catalogue, effect_named
+    from seecr.cli.arguments import robot_at
     from seecr.files import json_text
 
-    machine = load_robot(robot) if robot is not None else None
+    machine = robot_at(robot) if robot is not None else None
     chosen = [effect_named(name)] if name is not None else list(catalogue().values())
     rows = [effect_record(effect, machine) for effect in chosen]
     told = rows[0] if name is not None else {"effects": rows}

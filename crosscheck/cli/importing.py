@@ -22,6 +22,7 @@ from seecr.cli.following import following
 @options.option(
     "--robot ROBOT.xml", "The recorded robot, as MJCF or the name of a shipped one.", required=True
 )
+@options.fix
 @options.option(
     "--commands COMMANDS.csv",
     "Log of commands, with a column t_s or one row per dwell; once for each FILE.",
@@ -92,10 +93,10 @@ def command(
     from crosscheck import ImportChoices, import_case
     from crosscheck.given import check_case
     from crosscheck.importing import FILES, write_case
-    from seecr import load_robot
+    from seecr.cli.arguments import robot_at
     from seecr.files import json_text
 
-    machine = load_robot(robot)
+    machine = robot_at(robot)
     choices = ImportChoices.said(machine, **said)
     check_case(out, FILES, robot)
     with options.progress_share("reading the recordings") as progress:

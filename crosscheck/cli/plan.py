@@ -20,6 +20,7 @@ from seecr.cli.durations import say_duration
 )
 @click.argument("robot", type=options.FILE, metavar="ROBOT.xml")
 @click.argument("poses", type=options.FILE, metavar="[POSES.csv]", required=False)
+@options.fix
 @options.option(
     "--rows N", "Choose this many poses instead of reading a file.", options.WholeNumber(min=6)
 )
@@ -86,12 +87,11 @@ def command(
     from crosscheck.planning.write import NAME, box_of, planned_files
     from crosscheck.show.page import write_page
     from crosscheck.show.plan import print_plan
-    from seecr import load_robot
-    from seecr.cli.arguments import check_places
+    from seecr.cli.arguments import check_places, robot_at
     from seecr.files import json_text, with_toml, write_text
     from seecr.folders import staged
 
-    machine = load_robot(robot)
+    machine = robot_at(robot)
     room = box_of(box) if box else None
     if room is not None:
         check_places(room, machine)
@@ -121,6 +121,6 @@ def command(
     if as_json:
         click.echo(text)
     else:
-        print_plan(plan, out, files)
+        print_plan(choices.untold(plan), out, files)
         click.echo(after_plan(Given(robot, [poses or out / "poses.csv"], sigmas=sigmas)))
     return status

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     "--robot FILE.xml",
     "Instead of the shipped robots: your own MJCF, along a sweep and at random poses.",
 )
+@options.fix
 @options.option(
     "--mujoco-robot FILE.xml",
     "With --robot: another MJCF for MuJoCo, to see what a difference between the two does.",
@@ -89,6 +90,7 @@ def command(
     from crosscheck import load_thresholds, user_cases
     from crosscheck.suite.cases import select
     from crosscheck.suite.run import every_shipped, shipped_like
+    from seecr.cli.arguments import robot_at
     from seecr.parallel import processors
 
     if mujoco_robot is not None and robot is None:
@@ -97,6 +99,7 @@ def command(
     if robot is None:
         chosen = shipped_like(every_shipped(seed), patterns, "--case")
     else:
+        robot_at(robot)  # what is odd about it is told before the work
         chosen = list(select(user_cases(robot, mujoco_robot, seed=seed), patterns, "--case"))
     if list_only:
         _list(chosen)

@@ -12,6 +12,7 @@ from click.core import ParameterSource
 from crosscheck.cli import choices
 from seecr.cli import options
 from seecr.cli.following import following, typed
+from seecr.cli.notes import untold
 
 if TYPE_CHECKING:
     from crosscheck import Twin
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     "crosscheck twin my_robot.xml --hide 8 --poses my_poses.csv --out case8",
 )
 @click.argument("robot", type=options.FILE, metavar="ROBOT.xml", required=False)
+@options.fix
 @options.option(
     "--hide SEED",
     "Seed from which the hidden effects, their sizes and the noise are drawn; the same seed gives "
@@ -100,6 +102,9 @@ def command(
     own = dict(zip(files, introduce_all(files), strict=True))
     names = tuple(own.get(name, name) for name in names)
     noise = Sigma.parsed(sigmas)
+    from seecr.cli.arguments import robot_at
+
+    robot_at(robot)  # what is odd about it is told before the work
     commands = load_commands(poses, robot, sigma=noise) if poses is not None else None
     # whatever is hidden, the bar shows the same: rows of one kind, done or not
     with options.progress_bar("measuring", 1) as advance:
@@ -120,7 +125,7 @@ def _tell(twin: Twin, out: Path, made: Made | None) -> None:
     from seecr.files import json_text
 
     files = list(FILES)
-    for note in twin.notes:
+    for note in untold(twin.notes):
         click.echo(f"note: {note}", err=True)
     if made is not None:
         document = {"made": made, **twin.as_json(), "folder": str(out), "files": files}

@@ -51,7 +51,7 @@ from seecr.counted import counted, some
 from seecr.description.joints import pose_of_values
 from seecr.description.robot import ITS_A_POINT, Robot
 from seecr.effects import Term, Terms, catalogue, layout_of
-from seecr.equilibrium.solving import strained
+from seecr.equilibrium.strange import strange
 from seecr.errors import InputError
 from seecr.pose import Array
 
@@ -147,7 +147,7 @@ def make_plan(
     free = [layout_of(name, robot) for name in commands.free]
     model = Terms(Term(one, one.null) for one in free)
     plan = planned(robot, commands, full, read, model, _beside_catalogue(effects))
-    notes = [*robot.notes, *strained(robot), *commands.notes, *assumed]
+    notes = [*robot.notes, *strange(robot), *commands.notes, *assumed]
     if plan.unsolved.any():
         status = plan.base.prediction.solution().status[int(np.argmax(plan.unsolved))].value
         notes.append(f"{commands.lines_of(plan.unsolved)} left out: {status}")

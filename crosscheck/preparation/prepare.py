@@ -19,7 +19,7 @@ from crosscheck.preparation.freed import freed, groups_of, laid_out
 from crosscheck.preparation.suspect import filled_in_note, suspicions, without_constants
 from seecr.description.robot import Robot
 from seecr.effects import Terms, catalogue
-from seecr.equilibrium.solving import strained
+from seecr.equilibrium.strange import strange
 from seecr.prediction.experiment import Prediction
 
 Progress = Callable[[str, float], None]
@@ -94,7 +94,7 @@ def prepare(
         problem = problem.with_sigma(others.sigma)
     asked, odd = suspicions(problem, plain)
     notes = (
-        *robot.notes, *strained(robot), *data.notes, *filled_in_note(problem), *constants, *asked,
+        *robot.notes, *strange(robot), *data.notes, *filled_in_note(problem), *constants, *asked,
         *oversized(problem, plain), *problem.left_out, *estimates, *said,
     )  # fmt: skip
     problem = problem.with_groups(groups_of(data, terms))

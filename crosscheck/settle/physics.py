@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
-from seecr.description.mjcf import not_mjcf, quiet_mujoco, unsupported_features
+from seecr.description.mjcf import not_mjcf, quiet_mujoco, read_model, unsupported_features
 from seecr.errors import InputFileError
 from seecr.pose import Array, pose_difference
 
@@ -38,6 +38,7 @@ _DISABLE = (
     mujoco.mjtDisableBit.mjDSBL_CONTACT,  # skips the search for contacts
     mujoco.mjtDisableBit.mjDSBL_DAMPER,
     mujoco.mjtDisableBit.mjDSBL_SENSOR,
+    mujoco.mjtDisableBit.mjDSBL_ACTUATION,
 )
 
 
@@ -53,10 +54,22 @@ def compile_model(source: str | Path | mujoco.MjModel) -> mujoco.MjModel:
     if other:
         raise InputFileError(f"{path}: {other}")
     try:
-        return mujoco.MjModel.from_xml_path(str(path))
+        model = mujoco.MjModel.from_xml_path(str(path))
+        return model if np.sum(model.body_jntnum > 0) < 2 else _without_loose(model, path)
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise InputFileError(f"{path}: MuJoCo cannot read this as MJCF: {reason}") from None
+
+
+def _without_loose(model: mujoco.MjModel, path: Path) -> mujoco.MjModel:
+    """The same without moving bodies that no cable touches, and what may be about them."""
+    loose = read_model(model, path).platform.loose
+    spec = mujoco.MjSpec.from_file(str(path))
+    beside = (spec.keys, spec.sensors, spec.equalities, spec.excludes, spec.pairs, spec.actuators)
+    gone = [spec.bodies[body] for body in loose]
+    for one in [each for some in beside for each in some] + gone:
+        spec.delete(one)
+    return spec.compile()
 
 
 def platform_of(model: mujoco.MjModel, name: str) -> int:
@@ -79,9 +92,12 @@ def check_cables(model: mujoco.MjModel, body: int, where: str) -> None:
         first = model.tendon_adr[i]
         kinds = model.wrap_type[first : first + model.tendon_num[i]]
         if list(kinds) != 2 * [int(mujoco.mjtWrap.mjWRAP_SITE)]:
-            raise InputFileError(f"{where}: tendon {name}: expected exactly two sites")
+            raise InputFileError(
+                f"{where}: tendon {name}: expected exactly two sites; MuJoCo's side takes no block "
+                "and tackle: write one cable of n^2 times its stiffness and l0/n"
+            )
         sites = model.wrap_objid[first : first + 2]
-        if np.sum(model.site_bodyid[sites] == body) != 1:
+        if np.sum(model.body_weldid[model.site_bodyid[sites]] == body) != 1:
             raise InputFileError(
                 f"{where}: tendon {name}: expected one site on the platform and one on the world"
             )
@@ -143,6 +159,7 @@ Together = tuple[Index, Index, Index]
 """Coordinates, and the (rows, columns) of the stiffness that shifting all of them together yields.
 """
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
+_BALL = int(mujoco.mjtJoint.mjJNT_BALL)
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 
@@ -199,7 +216,8 @@ class Physics:
         self.is_free = int(model.jnt_type[model.body_jntadr[parts.platform]]) == _FREE
         self.ignored = ignored_in(model, parts.platform)
         switch_off(model)
-        self.mass = float(model.body_mass[parts.platform])
+        own = float(model.body_mass[parts.platform])
+        self.mass = own or float(model.body_subtreemass[parts.platform])
         self.mass_unit = 2.0 ** round(float(np.log2(self.mass / _MASS_IN_MUJOCO)))
         change_mass_unit(model, self.mass_unit)
         self.data = mujoco.MjData(model)
@@ -228,7 +246,7 @@ class Physics:
         platform = platform_of(model, name)
         check_cables(model, platform, name)
         sites = model.wrap_objid[: 2 * model.ntendon]
-        on_platform = model.site_bodyid[sites] == platform
+        on_platform = model.body_weldid[model.site_bodyid[sites]] == platform
         return cls(model, Parts(platform, sites[~on_platform], sites[on_platform]))
 
     @property
@@ -471,17 +489,20 @@ class Physics:
             gap = weigh * pose_difference(pose, self.pose())
             mujoco.mj_jacBody(self.model, self.data, jacobian[:3], jacobian[3:], self.body)
             step = np.linalg.lstsq(weigh[:, None] * jacobian[:, :n], gap, rcond=None)[0]
-            self.data.qpos[:n] += step
+            whole = np.zeros(self.n_dof)
+            whole[:n] = step
+            self.move(whole)
             if np.linalg.norm(step * self.metre[:n]) < 1e-15 * self.length:
                 break
 
     def _which_rotate(self) -> Array:
         if self.is_free:
             return np.array([False] * 3 + [True] * 3)
-        return np.asarray(self.model.jnt_type == _HINGE)
+        kind = self.model.jnt_type[self.model.dof_jntid]
+        return np.asarray((kind == _HINGE) | (kind == _BALL))
 
     def _characteristic_length(self) -> float:
-        anchors = self.model.site_pos[self.parts.anchors]
+        anchors = self.data.site_xpos[self.parts.anchors]
         reach = np.max(np.linalg.norm(anchors[:, None] - anchors[None], axis=-1)) / 2.0
         exits = self.exit_points() - self.data.xpos[self.body]
         return float(max(reach, 0.01 * np.max(np.linalg.norm(exits, axis=-1))))

@@ -325,7 +325,7 @@ def measure(
     if true.cable_weight > 0 and len(segments) > 1:
         coarse = settle(World(true, segments[0]), path, rest, loads, lambda rows: None)
         rows = _extrapolated(coarse, rows, (segments[-1] / segments[0]) ** 2)
-    reading = (rows.pose[:, :3], rows.pose[:, 3:], rows.tensions)
+    reading = (rows.pose[:, :3], rows.pose[:, 3:], rows.tensions / true.robot.falls)
     for sensor in true.sensors:
         reading = sensor(reading)
     position, quat, tensions = reading

@@ -15,13 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr import Commands, InputError, Model, Robot, Solution, load_model, load_robot
+from seecr.cli.notes import tell
 from seecr.columns.commands import read_commands
 from seecr.columns.plausible import ABSURD, scalar_last
 from seecr.counted import counted
 from seecr.description.cables import ea_of
 from seecr.description.mjcf import CABLES
 from seecr.effects.base import unfed
-from seecr.equilibrium.solving import strained, strained_rows
+from seecr.equilibrium.solving import strained_rows
+from seecr.equilibrium.strange import strange
 from seecr.pose import NORM_TOLERANCE
 from seecr.statics.starts import commanded_poses
 from seecr.workspace.maps import evenly
@@ -33,18 +35,23 @@ _COUNT = 24  # poses of --line
 def robot_at(given: Path, cable: str | None = None) -> Robot:
     """The robot of a file, or the shipped one of that name, with another cable if one is named.
 
+    What is strange about it, or read otherwise than written, is told at once.
+
     Raises:
         RobotError, InputError: no such file and no such name, no such cable.
     """
     robot = load_robot(given)
     if cable is None:
+        tell((*robot.notes, *strange(robot)))
         return robot
     try:
         ea = CABLES[cable] if cable in CABLES else ea_of(cable, "--cable")[0]
     except InputError as error:
         known = f"expected {', '.join(CABLES)}, E S"
         raise InputError(str(error).replace("expected E S", known, 1)) from None
-    return replace(robot, ea=np.full(robot.n_cables, ea))
+    other = replace(robot, ea=np.full(robot.n_cables, ea))
+    tell((*other.notes, *strange(other)))
+    return other
 
 
 def model_at(given: Path | None, robot: Robot) -> Model | None:
@@ -70,7 +77,7 @@ def notes_of(
         commands: as given; None for poses without times and temperatures.
     """
     robot = solution.robot
-    much = (*strained(robot), *strained_rows(solution))
+    much = (*strange(robot), *strained_rows(solution))
     slips = (*_outside(robot, solution.command), *scalar_last(robot, solution.command[:, 3:]))
     said = (*robot.notes, *much, *slips)
     if model is None:

@@ -10,6 +10,7 @@ import click
 
 from seecr.cli import options
 from seecr.cli.following import following, given_with, mapping
+from seecr.cli.notes import untold
 
 if TYPE_CHECKING:
     from seecr import Model, Robot
@@ -131,7 +132,7 @@ def command(
         given = given_with(cable, model)
         then = following("seecr", "sweep", robot, out / "corrected.csv", *given)
     chances = chance_lines(found, kept, aim == "minimum", highest is not None)
-    lines = [*notes, *found.lines(), *chances, f"Results in {out}/", then]
+    lines = [*untold(notes), *found.lines(), *chances, f"Results in {out}/", then]
     click.echo(text if as_json else "\n".join(lines))
     return status
 

@@ -8,6 +8,7 @@ import click
 
 from seecr.cli import options
 from seecr.cli.following import following
+from seecr.cli.notes import untold
 
 
 @options.command(
@@ -69,7 +70,7 @@ def command(
     }  # fmt: skip
     place = [f"{value + 0.0:g}" for value in coordinates or machine.reference_pose[:3]]
     then = following("seecr", "pose", out, *place)
-    lines = [*notes, *found.lines(out.name, beside.name), then]
+    lines = [*untold(notes), *found.lines(out.name, beside.name), then]
     click.echo(json_text(document) if as_json else "\n".join(lines))
     return 0
 

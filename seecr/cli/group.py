@@ -132,7 +132,9 @@ class LazyGroup(click.Group):
         click.echo(f"{self.name}: {text}", err=True)
 
     def _refuse(self, text: str, status: int = BAD_INPUT) -> int:
-        click.echo(f"{self.name}: {printable(' '.join(text.split()))}", err=True)
+        # several faults of one file are a line each
+        lines = [printable(" ".join(line.split())) for line in text.splitlines()]
+        click.echo(f"{self.name}: " + "\n  ".join(line for line in lines if line), err=True)
         return status
 
     def _run(self, *args: Any, **extra: Any) -> Any:

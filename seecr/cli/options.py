@@ -154,6 +154,29 @@ def together(*declared: Callable[[Any], Any]) -> Callable[[F], F]:
     return declare
 
 
+def _fix(ctx: click.Context, _option: click.Parameter, out: Path | None) -> None:
+    """Write the robot mended and end; whatever else the command needs is not asked for."""
+    if out is None or ctx.resilient_parsing:
+        return
+    from seecr.description.fixing import told, write_fixed
+
+    words = ctx.meta.get(ARGUMENTS, [])[1:]
+    values, _rest, _order = ctx.command.make_parser(ctx).parse_args(list(words))
+    given = values.get("robot")
+    others = [one for one in words if one.endswith(".xml") and Path(one) != out]
+    robot = Path(given) if given else next(map(Path, others), None)
+    if robot is None:
+        raise click.UsageError("--fix: expected ROBOT.xml, the robot to mend, got none", ctx)
+    click.echo("\n".join(told(robot, out, write_fixed(robot, out))))
+    ctx.exit(0)
+
+
+fix = option(
+    "--fix OUT.xml",
+    "Write ROBOT into a new file, with what keeps it from being read mended where possible, tell "
+    "what changed, and end.",
+    is_eager=True, expose_value=False, callback=_fix,
+)  # fmt: skip
 as_json = option(
     "--json", "Print the result as JSON on standard output, and nothing else there.", name="as_json"
 )
@@ -187,6 +210,7 @@ robot = together(
     ),
     option("--model M.toml", "Model file with the robot's effects.  [default: plain SEECR]"),
     own_effects,
+    fix,
 )
 limits = together(
     option("--lowest N", "Lowest allowed tension of every cable [N].", Number(), default=0.0),

@@ -9,6 +9,7 @@ import click
 
 from seecr.cli import options
 from seecr.cli.following import after_pose
+from seecr.cli.notes import untold
 
 if TYPE_CHECKING:
     from seecr import Barrier
@@ -97,7 +98,8 @@ def command(
     with options.result_in(out, "pose.json") as keep:
         keep(text)
     lines = [
-        *notes, *pose_lines(solution, spread=spread), *cable_lines(solution, spread=spread),
+        *untold(notes), *pose_lines(solution, spread=spread),
+        *cable_lines(solution, spread=spread),
         *midline_lines(solution), *bar_lines(*bars), *other_lines(solution, others, passes),
         *unsought, after_pose(solution, robot, coordinates[3:], cable, own),
     ]  # fmt: skip

@@ -12,6 +12,7 @@ import click
 
 from seecr.cli import options
 from seecr.cli.following import after_sweep
+from seecr.cli.notes import untold
 
 if TYPE_CHECKING:
     from seecr import BarManifold, Commands, Model, Robot, SlackSpan, Solution
@@ -133,7 +134,7 @@ def command(
 
             write_sweep_recording(solution, folder / "sweep.rrd", commanded)
     lines = [
-        *notes, *sweep_lines(solution, commanded, spread), *span_lines(spans or ()),
+        *untold(notes), *sweep_lines(solution, commanded, spread), *span_lines(spans or ()),
         *jump_lines(solution), *(() if met is None else met.lines()),
         *(() if bar is None else bar.lines()), *(() if search is None else [search.words]),
         f"Results in {out}/", after_sweep(solution, commands, robot, poses, cable, own),

@@ -11,6 +11,7 @@ import click
 from seecr.cli import options
 from seecr.cli.durations import say_duration
 from seecr.cli.following import following
+from seecr.cli.notes import untold
 
 if TYPE_CHECKING:
     from seecr import Workspace
@@ -86,7 +87,7 @@ def command(
     from seecr import boundary, default_axes, workspace_map
     from seecr.cli.arguments import axes_of, model_at, robot_at
     from seecr.columns.plausible import scalar_last
-    from seecr.equilibrium.solving import strained
+    from seecr.equilibrium.strange import strange
     from seecr.files import json_text, write_text
     from seecr.folders import staged
     from seecr.show.batch_words import (
@@ -130,7 +131,7 @@ def command(
             inside = found.feasible if at_least is None else found.likely(at_least)
             pairs = found.crossings(inside)
             places = boundary(machine, *pairs, tolerance=edge, at_least=at_least, **asked)
-        notes = [*machine.notes, *strained(machine), *scalar_last(machine, turned or ())]
+        notes = [*machine.notes, *strange(machine), *scalar_last(machine, turned or ())]
         if own is not None:
             notes += [*own.notes, *beyond_line(found, own.reach)]
         status = 3 if found.elastic and not np.any(found.rests) else 0
@@ -150,8 +151,8 @@ def command(
             write_map_recording(found, folder / "map.rrd", places)
     where = [] if grid else [found.region]  # of their own grids people know it
     lines = [
-        *notes, *where, *found.lines(), *softest_line(found), *likely_lines(found, at_least),
-        *sag_lines_of(found, own.names if own else ()),
+        *untold(notes), *where, *found.lines(), *softest_line(found),
+        *likely_lines(found, at_least), *sag_lines_of(found, own.names if own else ()),
     ]  # fmt: skip
     if places is not None and edge is not None:
         lines.append(edge_line(found, places, edge, at_least))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from threading import Lock
@@ -13,11 +14,22 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from seecr.counted import counted
+from seecr.description.bodies import (
+    Platform,
+    body_name,
+    check_other_forces,
+    joints_of,
+    load_of,
+    platform_of,
+    reference_of,
+)
+from seecr.description.findings import Findings
+from seecr.description.mjcf_text import MjcfText
 from seecr.description.robot import ABSURD, Joint, Robot
+from seecr.description.tendons import TendonCable, cables_of
 from seecr.errors import InputError, RobotError, SeecrError, printable
 from seecr.files import no_text, path_of, read_bytes
-from seecr.pose import Array, quat_rotate, quat_to_matrix
+from seecr.pose import Array
 
 if TYPE_CHECKING:
     import mujoco
@@ -27,27 +39,33 @@ if TYPE_CHECKING:
 #
 # Damping is none of it: it delays a rest, and shifts none.
 
-# MuJoCo's mjtDisableBit: all constraints, dry friction, limits, contacts.
-_CONSTRAINT, _FRICTIONLOSS, _LIMIT, _CONTACT = 1, 4, 8, 16
+# MuJoCo's mjtDisableBit: all constraints, dry friction, limits, contacts, springs.
+_CONSTRAINT, _FRICTIONLOSS, _LIMIT, _CONTACT, _SPRING = 1, 4, 8, 16, 32
 # A pair of excluded bodies is one number, the first body's in its upper half.
 _UPPER = 16
 
 
-def unsupported_features(model: mujoco.MjModel, platform: int) -> tuple[str, ...]:
+def unsupported_features(
+    model: mujoco.MjModel, platform: int, loose: Iterable[int] = ()
+) -> tuple[str, ...]:
     """Names of what may hold or stop the platform beside its cables, such as "contacts".
 
     Args:
         model: as compiled; what its flags switch off does not count.
-        platform: index of the platform's body.
+        platform: index of the platform's body; what is welded to it is a part of it.
+        loose: indices of moving bodies that are no part of the robot, and whose joints do not
+            count.
     """
     off = int(model.opt.disableflags)
     if off & _CONSTRAINT:
         return ()
+    joints = ~np.isin(model.body_rootid[model.jnt_bodyid], list(loose))
+    freedoms = joints[model.dof_jntid]
     found = {
-        "joint limits": not off & _LIMIT and model.jnt_limited.any(),
+        "joint limits": not off & _LIMIT and model.jnt_limited[joints].any(),
         "tendon limits": not off & _LIMIT and model.tendon_limited.any(),
         "dry friction": not off & _FRICTIONLOSS
-        and (model.dof_frictionloss.any() or model.tendon_frictionloss.any()),
+        and (model.dof_frictionloss[freedoms].any() or model.tendon_frictionloss.any()),
         "contacts": not off & _CONTACT and _may_touch(model, platform),
     }
     return tuple(what for what, there in found.items() if there)
@@ -55,7 +73,7 @@ def unsupported_features(model: mujoco.MjModel, platform: int) -> tuple[str, ...
 
 def _may_touch(model: mujoco.MjModel, platform: int) -> bool:
     """Whether a geom of the platform may touch one of its surroundings."""
-    own = model.geom_bodyid == platform
+    own = model.body_weldid[model.geom_bodyid] == platform
     # pairs that are listed touch, whatever their geoms and bodies say otherwise
     if np.any(own[model.pair_geom1] != own[model.pair_geom2]):
         return True
@@ -199,11 +217,11 @@ def _ignore(message: str) -> None:
 def load_robot(path: str | Path) -> Robot:
     """Read the cable robot in an MJCF file.
 
-    The file has one moving body with a free joint or with slide and hinge joints. Each cable is a
-    spatial tendon through two sites, one fixed to the world (the exit point A_i) and one on the
-    body (the anchor point B_i), with ``springlength="0 l0"`` and a stiffness. Mass, centre of mass
-    and gravity are those of the compiled model. Limits of joints and tendons, dry friction and
-    contacts are left out, as ``Robot.notes`` tells; so is damping, which shifts no equilibrium.
+    Cables hold one moving body, free or on slides, hinges and balls, with all that is welded to it.
+    Each cable is a spatial tendon through two sites, one fixed to the world (the exit point A_i)
+    and one on the body (the anchor point B_i), with ``springlength="0 l0"`` and a stiffness. Mass,
+    centre of mass and gravity are those of the compiled model. ``Robot.notes`` tells what is left
+    out or read otherwise than written, see docs/formats.md.
 
     Args:
         path: the MJCF file, or the name of a shipped robot.
@@ -214,7 +232,7 @@ def load_robot(path: str | Path) -> Robot:
     Raises:
         InputError: neither a file nor a shipped robot.
         RobotError: the file is missing, MuJoCo cannot compile it, or it is not such a robot;
-            the message names the file and the element.
+            the message names the file and each element that is to be changed.
 
     Example:
         ``seecr.load_robot("robot.xml")``
@@ -235,40 +253,95 @@ def _read_once(path: Path, _written: int) -> Robot:
 
 
 def _read(path: Path) -> Robot:
-    model = _compile(path)
-    body = _moving_body(model, path)
-    _refuse_other_forces(model, body, path)
-    cables = [_read_cable(model, body, i, path) for i in range(model.ntendon)]
-    if not cables:
-        raise RobotError(
-            f"{path}: no cables; expected one <spatial> tendon per cable, through two sites"
+    return read_file(path).robot()
+
+
+def read_file(given: str | Path) -> Reading:
+    """What of a robot's file is a robot, with objections and notes; see :func:`read_model`.
+
+    Raises:
+        InputError: neither a file nor a shipped robot.
+        RobotError: the file is missing, or MuJoCo cannot compile it.
+    """
+    path = robot_file(given)
+    return read_model(_compile(path), path)
+
+
+@dataclass
+class Reading:
+    """What was found in a file: a robot if there are no objections to it.
+
+    Attributes:
+        model: as MuJoCo compiled it. path: of the file.
+        found: objections and notes.
+        platform: its bodies. cables: without those that are objected to.
+        text: the XML.
+    """
+
+    model: mujoco.MjModel
+    path: Path
+    found: Findings
+    platform: Platform
+    cables: list[TendonCable]
+    joints: tuple[Joint, ...]
+    text: MjcfText
+
+    def robot(self) -> Robot:
+        """The robot.
+
+        Raises:
+            RobotError: with all objections to the file.
+        """
+        self.found.check()
+        model, cables = self.model, self.cables
+        mass, centre, inertia = load_of(model, self.platform)
+        reference_pose = reference_of(model, self.platform)
+        robot = _robot(
+            self.path,
+            name=_model_name(model, self.path),
+            exit_points=np.array([cable.exit for cable in cables]),
+            anchor_points=np.array([cable.anchor for cable in cables]),
+            ea=np.array([cable.ea for cable in cables]),
+            rest_lengths=np.array([cable.rest for cable in cables]),
+            mass=mass,
+            centre_of_mass=centre,
+            gravity=_gravity(model),
+            reference_pose=reference_pose,
+            inertia=inertia,
+            joints=self.joints,
+            cable_names=tuple(cable.name for cable in cables),
+            source=self.path,
+            left_out=unsupported_features(model, self.platform.body, self.platform.loose),
+            falls=np.array([cable.falls for cable in cables]),
+            floor=_floor(model, reference_pose[2]),
         )
-    exit_points, anchor_points, ea, rest_lengths, names = zip(*cables, strict=True)
-    reference_pose = np.concatenate([model.body_pos[body], model.body_quat[body]])
-    joints = _read_joints(model, body, path)
-    if not joints:
-        first = model.jnt_qposadr[model.body_jntadr[body]]
-        reference_pose = model.qpos0[first : first + 7].copy()
-    robot = _robot(
-        path,
-        name=_model_name(model, path),
-        exit_points=np.array(exit_points),
-        anchor_points=np.array(anchor_points),
-        ea=np.array(ea),
-        rest_lengths=np.array(rest_lengths),
-        mass=float(model.body_mass[body]),
-        centre_of_mass=model.body_ipos[body].copy(),
-        gravity=_gravity(model),
-        reference_pose=reference_pose,
-        inertia=_inertia(model, body),
-        joints=joints,
-        cable_names=tuple(names),
-        source=path,
-        left_out=unsupported_features(model, body),
-        floor=_floor(model, reference_pose[2]),
-    )
-    _check_sizes(robot, _body_name(model, body), path)
-    return robot
+        _check_sizes(robot, body_name(model, self.platform.body), self.found)
+        self.found.check()
+        return replace(robot, read=self.found.notes)
+
+
+@quiet_mujoco()
+def read_model(model: mujoco.MjModel, path: Path) -> Reading:
+    """What of a compiled model is a robot, with objections and notes.
+
+    Raises:
+        RobotError: nothing moves, so that there is nothing else to look at.
+    """
+    found, text = Findings(path), MjcfText(path)
+    if model.opt.disableflags & _SPRING:
+        found.refuse(
+            "", "", "the flag spring is disabled; expected springs, the cables are springs",
+            fixable=True,
+        )  # fmt: skip
+    platform = platform_of(model, found)
+    check_other_forces(model, platform, found)
+    joints = joints_of(model, platform, found)
+    cables = cables_of(model, platform, text, found)
+    if not cables and not found.objections:
+        found.refuse(
+            "", "", "no cables; expected one <spatial> tendon per cable, through two sites"
+        )
+    return Reading(model, path, found, platform, cables, joints, text)
 
 
 def _robot(path: Path, **numbers: Any) -> Robot:
@@ -279,30 +352,29 @@ def _robot(path: Path, **numbers: Any) -> Robot:
         raise RobotError(f"{path}: {error}") from None
 
 
-def _check_sizes(robot: Robot, body: str, path: Path) -> None:
-    """Check that neither rest lengths nor the platform are of another order than the frame."""
+def _check_sizes(robot: Robot, body: str, found: Findings) -> None:
+    """Object to rest lengths and a platform of another order than the frame."""
     most = ABSURD * robot.reach
     frame = f"expected metres, of the size of the frame, {robot.reach:.3g} m across"
     cables = zip(robot.cable_names, robot.rest_lengths, robot.reference_lengths, strict=True)
     for name, length, straight in cables:
         if length > most:
-            raise RobotError(f"{path}: tendon {name} has rest length {length:g} m; {frame}")
+            found.refuse("tendon", name, f"has rest length {{}} m; {frame}", f"{length:g}")
         if length < _LEAST * straight:
-            raise RobotError(
-                f"{path}: tendon {name} has rest length {length:g} m, but its sites are "
-                f"{straight:.3g} m apart at the reference pose; expected both in metres"
-            )
+            found.refuse(
+                "tendon", name, f"has rest length {length:g} m, but its sites are "
+                f"{straight:.3g} m apart at the reference pose; expected both in metres",
+            )  # fmt: skip
     for name, anchor in zip(robot.cable_names, robot.anchor_points, strict=True):
         away = float(np.linalg.norm(anchor))
         if away > most:
-            raise RobotError(
-                f"{path}: tendon {name} is anchored {away:g} m from the origin of body {body}; "
-                f"{frame}"
+            found.refuse(
+                "tendon", name, f"is anchored {away:g} m from the origin of body {body}; {frame}"
             )
     away = float(np.linalg.norm(robot.centre_of_mass - robot.anchor_points, axis=1).min())
     if away > most:
-        raise RobotError(
-            f"{path}: body {body} has its centre of mass {away:g} m from its anchor points; {frame}"
+        found.refuse(
+            "body", body, f"has its centre of mass {away:g} m from its anchor points; {frame}"
         )
 
 
@@ -367,76 +439,12 @@ def _model_name(model: mujoco.MjModel, path: Path) -> str:
     return path.stem if name in ("", "MuJoCo Model") else name
 
 
-def _body_name(model: mujoco.MjModel, body: int) -> str:
-    return model.body(body).name or f"number {body}"
-
-
-def _moving_body(model: mujoco.MjModel, path: Path) -> int:
-    moving = np.flatnonzero(model.body_jntnum > 0)
-    if len(moving) == 0:
-        raise RobotError(
-            f"{path}: no moving body; expected one body with a free joint or with slide and "
-            "hinge joints"
-        )
-    if len(moving) > 1:
-        names = " and ".join(_body_name(model, int(b)) for b in moving)
-        raise RobotError(f"{path}: {len(moving)} moving bodies ({names}); expected one platform")
-    body = int(moving[0])
-    if model.body_parentid[body] != 0:
-        raise RobotError(
-            f"{path}: the platform {_body_name(model, body)} is inside another body; expected it "
-            "directly in the worldbody"
-        )
-    welded = [b for b in range(model.nbody) if b != body and model.body_weldid[b] == body]
-    if welded:
-        raise RobotError(
-            f"{path}: body {_body_name(model, welded[0])} is fixed to the platform; expected its "
-            "sites and mass in the platform's own body"
-        )
-    if model.nu or model.neq:
-        kind = "actuator" if model.nu else "equality constraint"
-        raise RobotError(f"{path}: has an {kind}; expected passive cables and one platform only")
-    return body
-
-
-def _refuse_other_forces(model: mujoco.MjModel, body: int, path: Path) -> None:
-    """Refuse what would change the equilibrium but is not read here."""
-    import mujoco
-
-    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_SPRING:
-        raise RobotError(
-            f"{path}: the flag spring is disabled; expected springs, the cables are springs"
-        )
-    if model.body_gravcomp[body] != 0:
-        raise RobotError(
-            f"{path}: body {_body_name(model, body)} has gravcomp "
-            f"{model.body_gravcomp[body]:g}; expected none, the cables carry the weight"
-        )
-    if np.any(model.opt.wind) and (model.opt.density > 0 or model.opt.viscosity > 0):
-        raise RobotError(
-            f"{path}: the option wind pushes the platform; expected none, and the push as an "
-            "effect: external_wrench"
-        )
-    curved = np.flatnonzero(np.any(model.tendon_stiffnesspoly, axis=1))
-    if len(curved):
-        name = model.tendon(int(curved[0])).name or f"cable{curved[0] + 1}"
-        raise RobotError(
-            f"{path}: tendon {name} has a polynomial stiffness; expected one number [N/m]"
-        )
-
-
 def _gravity(model: mujoco.MjModel) -> Array:
     import mujoco
 
     if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
         return np.zeros(3)
     return np.array(model.opt.gravity)
-
-
-def _inertia(model: mujoco.MjModel, body: int) -> Array:
-    """Inertia (3, 3) [kg m^2] about the centre of mass, in the body's frame."""
-    axes = quat_to_matrix(model.body_iquat[body])
-    return np.asarray(axes @ np.diag(model.body_inertia[body]) @ axes.T)
 
 
 def _floor(model: mujoco.MjModel, below: float) -> float | None:
@@ -450,93 +458,6 @@ def _floor(model: mujoco.MjModel, below: float) -> float | None:
     level = data.geom_xmat[planes, 8] > 1.0 - _LEVEL  # z of the plane's normal
     heights = data.geom_xpos[planes[level], 2]
     return max((float(z) for z in heights if z <= below), default=None)
-
-
-def _read_joints(model: mujoco.MjModel, body: int, path: Path) -> tuple[Joint, ...]:
-    first, count = model.body_jntadr[body], model.body_jntnum[body]
-    kinds = {2: "slide", 3: "hinge"}
-    joints = []
-    position, quat = model.body_pos[body], model.body_quat[body]
-    for j in range(first, first + count):
-        name = model.joint(j).name or f"joint{j - first + 1}"
-        # a free joint may have a spring, too, and a spring may have no linear part
-        if model.jnt_stiffness[j] != 0 or np.any(model.jnt_stiffnesspoly[j]):
-            raise RobotError(
-                f"{path}: joint {name} has a spring; expected cables to carry the load"
-            )
-        kind = kinds.get(int(model.jnt_type[j]))
-        if kind is None:
-            if count == 1 and model.jnt_type[j] == 0:
-                return ()
-            raise RobotError(
-                f"{path}: joint {name} is a ball joint or a free joint beside others; expected "
-                "one free joint, or slide and hinge joints"
-            )
-        joints.append(
-            Joint(
-                kind=kind,
-                name=name,
-                axis=quat_rotate(quat, model.jnt_axis[j]),
-                point=position + quat_rotate(quat, model.jnt_pos[j]),
-            )
-        )
-    return tuple(joints)
-
-
-def _read_cable(
-    model: mujoco.MjModel, body: int, i: int, path: Path
-) -> tuple[Array, Array, float, float, str]:
-    tendon = model.tendon(i)
-    name = tendon.name or f"cable{i + 1}"
-    exit_site, anchor_site = _cable_sites(model, body, i, name, path)
-    low, high = model.tendon_lengthspring[i]
-    if low != 0 or high <= 0:
-        raise RobotError(
-            f'{path}: tendon {name} has springlength "{low:g} {high:g}"; expected two values, '
-            '"0 l0" with the rest length l0 [m], so that the cable pulls and never pushes'
-        )
-    stiffness = float(model.tendon_stiffness[i])
-    if not stiffness > 0:
-        raise RobotError(
-            f"{path}: tendon {name} has stiffness {stiffness:g}; expected a positive number [N/m]"
-        )
-    exit_point = _site_in_world(model, exit_site)
-    anchor_point = model.site_pos[anchor_site].copy()
-    return exit_point, anchor_point, stiffness * float(high), float(high), name
-
-
-def _cable_sites(
-    model: mujoco.MjModel, body: int, i: int, name: str, path: Path
-) -> tuple[int, int]:
-    import mujoco
-
-    first, count = int(model.tendon_adr[i]), int(model.tendon_num[i])
-    wraps = slice(first, first + count)
-    if count != 2 or np.any(model.wrap_type[wraps] != int(mujoco.mjtWrap.mjWRAP_SITE)):
-        raise RobotError(
-            f"{path}: tendon {name} has {counted(count, 'path element')} or something other "
-            "than sites; expected exactly two sites, exit point and anchor point"
-        )
-    sites = [int(s) for s in model.wrap_objid[wraps]]
-    on_body = [int(model.site_bodyid[s]) == body for s in sites]
-    if on_body == [False, True]:
-        return sites[0], sites[1]
-    if on_body == [True, False]:
-        return sites[1], sites[0]
-    where = "the platform" if on_body[0] else "the world"
-    raise RobotError(
-        f"{path}: tendon {name} has both sites on {where}; expected one on the world (exit point) "
-        "and one on the platform (anchor point)"
-    )
-
-
-def _site_in_world(model: mujoco.MjModel, site: int) -> Array:
-    position = model.site_pos[site].copy()
-    body = int(model.site_bodyid[site])
-    while body != 0:
-        position = model.body_pos[body] + quat_rotate(model.body_quat[body], position)
-        body = int(model.body_parentid[body])
-    return np.asarray(position)
 
 
 # Robots as callers give them: loaded, or as a path or name to load from.

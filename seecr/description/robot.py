@@ -45,12 +45,16 @@ class Joint:
         name: as in the MJCF.
         axis: (3,) unit vector in the base frame at the reference pose.
         point: (3,) [m] a point on the axis, base frame at the reference pose.
+        ball: whether it is one of three hinges in a row, about axes at right angles through one
+            point, that stand for a ball joint. Rests, tensions, stiffness and frequencies are those
+            of the motion, whatever its coordinates.
     """
 
     kind: str
     name: str
     axis: Array
     point: Array
+    ball: bool = False
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,6 +78,10 @@ class Robot:
             unknown. It affects no equilibrium.
         left_out: what the file has that may hold or stop the platform beside its cables, such as
             "contacts"; statics leave it out.
+        falls: how often the line of each cable runs to and fro between its two points (m,), as in a
+            block and tackle. ``ea`` and ``rest_lengths`` are those of one straight cable that pulls
+            as all together; the line's own tension is that part of its tension. One without.
+        read: sentences about what its file says otherwise than it was read.
         floor: [m] z of the level floor below the platform, a static plane of the file; None without
             one. Statics leave it out; maps end there.
     """
@@ -93,9 +101,13 @@ class Robot:
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
     left_out: tuple[str, ...] = ()
     floor: float | None = None
+    falls: Array = field(default_factory=lambda: np.ones(0))
+    read: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         m = np.shape(self.exit_points)[0]
+        if np.all(np.asarray(self.falls) == 1.0):  # also where cables were left out
+            object.__setattr__(self, "falls", np.ones(m))
         shapes = {
             "exit_points": (m, 3),
             "anchor_points": (m, 3),
@@ -105,6 +117,7 @@ class Robot:
             "gravity": (3,),
             "reference_pose": (7,),
             "inertia": (3, 3),
+            "falls": (m,),
         }
         for name, shape in shapes.items():
             value = np.array(getattr(self, name), dtype=float)
@@ -188,7 +201,8 @@ class Robot:
 
     def __repr__(self) -> str:
         """The robot in a few lines, for people."""
-        held = ", ".join(f"{joint.kind} {joint.name}" for joint in self.joints)
+        words = [f"ball {j.name[:-2]}" if j.ball else f"{j.kind} {j.name}" for j in self.joints]
+        held = ", ".join(dict.fromkeys(words))
         platform = f"a platform on joints ({held})" if self.joints else "a free platform"
         ends = zip("xyz", self.exit_points.min(axis=0), self.exit_points.max(axis=0), strict=True)
         frame = ", ".join(f"{axis} {between(*ends_)}" for axis, *ends_ in ends)
@@ -244,9 +258,9 @@ class Robot:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a user of the robot's file should know: on :attr:`left_out`, :attr:`is_point`."""
+        """What a user of the robot's file should know: :attr:`read`, :attr:`left_out` and such."""
         point = (f"{self.source or self.name}: {ITS_A_POINT}",) if self.is_point else ()
-        return (*point, *self._left_out_words())
+        return (*self.read, *point, *self._left_out_words())
 
     def _left_out_words(self) -> tuple[str, ...]:
         if not self.left_out:

@@ -56,11 +56,14 @@ def _platform(world: ET.Element, robot: Robot) -> ET.Element:
         ET.SubElement(body, "freejoint")
     back = quat_conjugate(quat)
     for joint in robot.joints:
-        ET.SubElement(
-            body, "joint", name=joint.name, type=joint.kind,
-            axis=numbers_text(quat_rotate(back, joint.axis)),
-            pos=numbers_text(quat_rotate(back, joint.point - place)),
-        )  # fmt: skip
+        pos = numbers_text(quat_rotate(back, joint.point - place))
+        if not joint.ball:
+            ET.SubElement(
+                body, "joint", name=joint.name, type=joint.kind, pos=pos,
+                axis=numbers_text(quat_rotate(back, joint.axis)),
+            )  # fmt: skip
+        elif joint.name.endswith("_x"):  # the first of three that are one
+            ET.SubElement(body, "joint", name=joint.name[:-2], type="ball", pos=pos)
     turning = robot.inertia
     if not np.any(turning):  # unknown, but MuJoCo needs one
         turning = robot.mass * robot.length**2 * np.eye(3)
@@ -122,5 +125,9 @@ def plain_text(robot: Robot, comment: str) -> str:
     for i, name in enumerate(robot.cable_names):
         rest = float(robot.rest_lengths[i])
         path = [("site", {"site": f"{end}{i + 1}"}) for end in ("exit", "anchor")]
-        cable(tendons, name, path, rest, [float(robot.ea[i]) / rest], 0.01 * robot.length)
+        stiffness, falls = float(robot.ea[i]) / rest, float(robot.falls[i])
+        if falls != 1.0:
+            path = [("pulley", {"divisor": numbers_text(1.0 / falls)}), *path]
+            rest, stiffness = falls * rest, stiffness / falls**2
+        cable(tendons, name, path, rest, [stiffness], 0.01 * robot.length)
     return text_of(root)

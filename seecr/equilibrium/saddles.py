@@ -392,7 +392,8 @@ def _saddle(one: Solution, tables: Tables, pose: Array, longest: float) -> tuple
             return pose, False
         values, vectors = np.linalg.eigh(at.hessian[0])
         if at.residual[0] < TOLERANCE:
-            return pose, bool(values[0] < 0.0 < values[1])
+            # of a platform on one joint there is no other direction
+            return pose, bool(values[0] < 0.0 and np.all(values[1:] > 0.0))
         parts = vectors.T @ at.gradient[0] / np.maximum(np.abs(values), 1e-6 * softest)
         parts[0] = -parts[0]
         size = np.linalg.norm(parts)

@@ -241,4 +241,4 @@ def _strains(robot: Robot) -> Array:
     home = solve(robot, robot.reference_pose)
     if not home.converged[0]:
         return np.asarray(drawn)
-    return np.asarray(np.maximum(drawn, home.tensions[0] / robot.ea))
+    return np.asarray(np.maximum(drawn, home.tensions[0] * robot.falls / robot.ea))

@@ -249,7 +249,7 @@ class _Cable:
         self.small = _SMALL * setup.mass
         self.at_rest: list[float] = []
         along = (end - self.exit) / np.linalg.norm(end - self.exit)
-        self.tension = float(solution.tensions[0, i])
+        self.tension = float(solution.tensions[0, i] * setup.robot.falls[i])
         self.pull, self.weight = self.tension * along, 0.0
         self.chain: HangingChain | None = None
         if setup.cable_weight[i] > 0.0:

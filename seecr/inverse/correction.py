@@ -312,7 +312,8 @@ def _search_of(
     if given.lengths is not None:
         raise InputError("correct needs wanted poses (n, 7); got lengths")
     low, high = tension_limits(robot, lowest, highest)
-    target = wanted_tensions(aim, low, high)
+    # an aim is of the line, as limits are
+    target = robot.falls * wanted_tensions(aim, low / robot.falls, high / robot.falls)
     if target.ndim == 2 and len(target) != len(given):
         raise InputError(f"aim must have {counted(len(given), 'row')}, got {len(target)}")
     limits = _Limits(np.broadcast_to(target, (len(given), robot.n_cables)), low, high)

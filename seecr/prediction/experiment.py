@@ -93,7 +93,12 @@ class Prediction(Result):
 
     @property
     def tensions(self) -> Array:
-        """(n, m) [N]."""
+        """(n, m) [N]; of a block and tackle, of its line."""
+        return np.asarray(self.pulls / self.setup.robot.falls)
+
+    @property
+    def pulls(self) -> Array:
+        """(n, m) [N] how each cable pulls the platform, with all falls of its line."""
         return self.found.states[..., TENSION]
 
     def with_rows(self, other: Prediction, rows: NDArray[np.bool_]) -> Prediction:
@@ -355,8 +360,9 @@ def effects_of(given: GivenEffects, robot: Robot) -> list[Effect]:
 
 
 def read(effects: Sequence[Effect], setup: Setup, poses: Array, tensions: Array) -> Readings:
-    """What the sensors report of poses (n, 7) and tensions (n, m)."""
-    readings = Readings(poses[:, :3].copy(), poses[:, 3:].copy(), tensions.copy())
+    """What the sensors report of poses (n, 7) and tensions (n, m); a line's where it is reeved."""
+    line = tensions / setup.robot.falls
+    readings = Readings(poses[:, :3].copy(), poses[:, 3:].copy(), line)
     for effect in sensors_among(effects):
         edit_readings(effect, readings, setup)
     return readings

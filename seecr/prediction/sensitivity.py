@@ -256,8 +256,8 @@ def length_sensitivities(at: Prediction) -> Array:
     """Derivatives of pose and tensions with respect to each cable's rest length, (n, 6 + m, m)."""
 
     def change(at: Prediction) -> Array:
-        still = np.zeros((at.tensions.shape[1], 3))
-        longer = np.ones_like(at.tensions)
+        still = np.zeros((at.pulls.shape[1], 3))
+        longer = np.ones_like(at.pulls)
         by_cable = wrench_by_ends(cable_rates(at), at.pose, still, still, longer)
         return _response_to_wrench(at, *by_cable)
 
@@ -286,18 +286,23 @@ def _sliding(at: Prediction) -> Prediction:
 
 
 def _alters(at: Prediction) -> bool:
-    """Whether the sensors report anything other than the true pose and tensions."""
+    """Whether the sensors report anything other than the true pose and pulls of the cables."""
     read, pose = at.readings, at.pose
-    there = (pose[:, :3], pose[:, 3:], at.tensions)
+    there = (pose[:, :3], pose[:, 3:], at.pulls)
     seen = (read.position, read.quat_wxyz, read.tensions)
-    return bool(at.sensors) and not all(map(np.array_equal, seen, there))
+    return _reeved(at) or (bool(at.sensors) and not all(map(np.array_equal, seen, there)))
+
+
+def _reeved(at: Prediction) -> bool:
+    """Whether a line's tension is not that with which its cable pulls."""
+    return bool(np.any(at.setup.robot.falls != 1.0))
 
 
 def rates_of_reading(at: Prediction, sensors: Sequence[Effect]) -> Array:
     """Derivatives of the readings with respect to pose and tensions, (n, 6 + m, 6 + m)."""
     step = np.full(_shape(at)[1], _READ)
     step[:3] *= at.tables.length
-    step[6:] *= max(1.0, float(np.max(np.abs(at.tensions))))
+    step[6:] *= max(1.0, float(np.max(np.abs(at.pulls))))
     each = np.diag(step)
     # built-in sensor effects treat each row by itself, so all steps can be rows of one batch
     together = all(is_built_in(type(effect)) for effect in sensors)
@@ -311,7 +316,7 @@ def _read_apart(at: Prediction, sensors: Sequence[Effect], steps: Array) -> Arra
     n, width = _shape(at)
     k = len(steps)
     change = np.repeat(steps, n, axis=0)
-    pose, tensions = np.tile(at.pose, (k, 1)), np.tile(at.tensions, (k, 1))
+    pose, tensions = np.tile(at.pose, (k, 1)), np.tile(at.pulls, (k, 1))
     ahead, behind = (
         read(sensors, at.setup, moved_by(pose, s * change[:, :6]), tensions + s * change[:, 6:])
         for s in (1.0, -1.0)
@@ -336,6 +341,11 @@ class _ByWrench:
     def sensing(self) -> list[Effect]:
         """The effects that edit the readings."""
         return [t.effect() for t in self.terms if senses(t.layout.effect)]
+
+    @property
+    def reads_otherwise(self) -> bool:
+        """Whether readings are others than poses and pulls: through effects, or of reeved lines."""
+        return bool(self.sensing) or _reeved(self.at)
 
     @cached_property
     def read_rates(self) -> Array:
@@ -367,7 +377,7 @@ class _ByWrench:
                 change = self._physical(sides, shift.apart)
         if shift.sensing:
             return self._read(shift, change, shift.apart)
-        return (self.read_rates @ change[..., None])[..., 0] if self.sensing else change
+        return (self.read_rates @ change[..., None])[..., 0] if self.reads_otherwise else change
 
     def block(self, shift: Shift) -> Array | None:
         """Derivatives (n, 6 + m, m) by a per-cable parameter, shifted for all cables together."""
@@ -382,7 +392,7 @@ class _ByWrench:
             change = self._by_ends(sides, shift.apart[:, None])
         else:
             change = _response_by_cable(self.at, *self._tables(sides), shift.apart)
-        return np.asarray(self.read_rates @ change if self.sensing else change)
+        return np.asarray(self.read_rates @ change if self.reads_otherwise else change)
 
     def _by_ends(self, sides: Sides, apart: Array) -> Array:
         """Derivatives (n, 6 + m, m) by where each cable begins or ends, ``apart`` (m, 1)."""
@@ -412,10 +422,10 @@ class _ByWrench:
 
         def seen(side: Terms, sign: float) -> Readings:
             if not shift.physical:
-                return read(side.effects, at.setup, at.pose, at.tensions)
+                return read(side.effects, at.setup, at.pose, at.pulls)
             step = (0.5 * sign * apart) * change
             moved = moved_by(at.pose, step[:, :6])
-            return read(side.effects, at.setup, moved, at.tensions + step[:, 6:])
+            return read(side.effects, at.setup, moved, at.pulls + step[:, 6:])
 
         return readings_difference(seen(shift.plus, 1.0), seen(shift.minus, -1.0)) / apart
 

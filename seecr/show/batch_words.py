@@ -12,9 +12,16 @@ from seecr.inverse.correction import Correction
 from seecr.pose import Array, pose_difference, rotvec_from_quat
 from seecr.prediction.model import DataReach
 from seecr.prediction.uncertainty import Spread
-from seecr.show.pose_words import NO_TURN, SAGS, direction_words, sag_lines, three_figures
+from seecr.show.pose_words import (
+    NO_TURN,
+    SAGS,
+    direction_words,
+    sag_lines,
+    stiffness_words,
+    three_figures,
+)
 from seecr.statics.solution import Solution
-from seecr.units import millimetres, short, significant
+from seecr.units import millimetres, short
 from seecr.workspace.grid import Workspace
 from seecr.workspace.spans import SlackSpan
 
@@ -209,8 +216,8 @@ def softest_line(found: Workspace) -> Iterator[str]:
     at = found.softest_at
     if at is not None:
         direction = direction_words(found.robot, found.softest[at])
-        soft = significant(found.stiffness[at], 4)
-        yield f"softest of these at {found.place(at)}: {direction}, {soft} N/m"
+        soft = stiffness_words(found.robot, float(found.stiffness[at]), found.softest[at])
+        yield f"softest of these at {found.place(at)}: {direction}, {soft}"
 
 
 def sag_lines_of(found: Workspace, effects: Collection[str]) -> Iterator[str]:

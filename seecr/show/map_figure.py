@@ -16,6 +16,7 @@ from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.show.colours import COLOURS
 from seecr.show.figures import figure
+from seecr.show.pose_words import on_hinges
 from seecr.workspace.grid import Workspace, across_of, colour_end, directions_words
 
 if TYPE_CHECKING:
@@ -312,7 +313,8 @@ def _softest(found: Workspace) -> _Panel:
     ends = _soft_ends(found)
     numbers = FuncFormatter(lambda value, _: f"{value:.12g}")
     bar = {"extend": "both", "ticks": _ticks(*ends), "format": numbers}
-    label = "stiffness of the\nsoftest direction [N/m]"
+    unit = "N m/rad" if on_hinges(found.robot) else "N/m"
+    label = f"stiffness of the\nsoftest direction [{unit}]"
     return _Panel(label, _stiffness(found), {"norm": LogNorm(*ends)}, bar)
 
 
@@ -325,8 +327,14 @@ def _top_margin(found: Workspace) -> float:
 
 
 def _stiffness(found: Workspace) -> Array:
-    """The stiffness of the softest direction (nx, ny, nz) [N/m], NaN where it is not positive."""
-    return np.where(found.rests & (found.stiffness > 0.0), found.stiffness, np.nan).astype(float)
+    """The stiffness of the softest direction (nx, ny, nz), NaN where it is not positive.
+
+    It is in N/m, on hinges alone in N m/rad (:func:`seecr.show.pose_words.stiffness_words`).
+    """
+    stiffness = np.where(found.rests & (found.stiffness > 0.0), found.stiffness, np.nan)
+    if on_hinges(found.robot):
+        stiffness = stiffness / np.sum(np.asarray(found.softest)[..., 3:] ** 2, axis=-1)
+    return stiffness.astype(float)
 
 
 def _soft_ends(found: Workspace) -> tuple[float, float]:

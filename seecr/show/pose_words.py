@@ -145,7 +145,8 @@ def stiffness_lines(solution: Solution) -> Iterator[str]:
     elif solution.status[0] is Status.UNSTABLE:
         yield f"leaves this pose: {direction}"
     else:
-        yield f"softest direction: {direction}, {significant(soft, 4)} N/m{_nudged(solution)}"
+        stiff = stiffness_words(solution.robot, soft, solution.softest_direction[0])
+        yield f"softest direction: {direction}, {stiff}{_nudged(solution)}"
     frequencies, shapes = (part[0] for part in solution.modes)
     known = [significant(value, 4) for value in frequencies if np.isfinite(value)]
     if known:
@@ -181,6 +182,24 @@ def _nudged(solution: Solution) -> str:
     return f"; 1 % of the weight moves it by {' and '.join(parts)}"
 
 
+def on_hinges(robot: Robot) -> bool:
+    """Whether every motion of the platform is a turn."""
+    return bool(robot.joints) and bool(robot.hinges.all())
+
+
+def stiffness_words(robot: Robot, value: float, direction: Array) -> str:
+    """The stiffness along a motion (6,) [m, rad]: in N m/rad if that is a turn, else in N/m.
+
+    ``value`` is that of the motion with turns times the robot's length [N/m]. The same energy as a
+    turn by an angle has the stiffness value / angle^2, with the angle of the unit motion. On hinges
+    alone every motion is a turn, also where the platform's origin moves along.
+    """
+    moved, turned = float(np.linalg.norm(direction[:3])), float(np.linalg.norm(direction[3:]))
+    if turned > 0.0 and (on_hinges(robot) or moved <= _PART * turned * robot.length):
+        return f"{significant(value / turned**2, 4)} N m/rad"
+    return f"{significant(value, 4)} N/m"
+
+
 def softest_words(solution: Solution) -> str:
     """The softest direction of the first pose, such as "turn about y"."""
     return direction_words(solution.robot, solution.softest_direction[0])
@@ -196,7 +215,9 @@ def direction_words(robot: Robot, direction: Array) -> str:
     if not np.isfinite(scaled).all():
         return "no direction"
     words = []
-    parts = (("move along", "slide", scaled[:3]), ("turn about", "hinge", scaled[3:]))
+    parts = [("move along", "slide", scaled[:3]), ("turn about", "hinge", scaled[3:])]
+    if on_hinges(robot):
+        parts = [("turn about", "hinge", scaled[3:] / np.linalg.norm(scaled[3:]))]
     for verb, kind, part in parts:
         size = float(np.linalg.norm(part))
         if size > _PART:

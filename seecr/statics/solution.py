@@ -185,7 +185,7 @@ class Solution(Result):
         pose: (n, 7) equilibrium poses.
         deviation: (n, 6) [m, rad] pose minus command: displacement and rotation vector, base
             frame. It carries more digits than the difference of the two poses.
-        tensions: (n, m) [N] at the exit point.
+        tensions: (n, m) [N] at the exit point; of a block and tackle, of its line.
         slack: (n, m) bool, as :func:`seecr.statics.batch.is_slack` defines it.
         rest_lengths: (n, m) [m].
         iterations: (n,) evaluations of the wrench.
@@ -461,7 +461,8 @@ def certify(robot: Robot, tables: Tables, found: batch.Evaluation) -> Solution:
         robot=robot, tables=tables, evaluation=check, command=tables.poses,
         pose=_blank(batch.platform_poses(tables, moved), lost),
         deviation=_blank(np.concatenate([moved[:, :3], rotation_vectors(turn)], axis=1), lost),
-        tensions=_blank(check.states[..., TENSION], lost), slack=batch.is_slack(tables, check),
+        tensions=_blank(check.states[..., TENSION] / robot.falls, lost),
+        slack=batch.is_slack(tables, check),
         rest_lengths=tables.cables[..., REST], iterations=found.count,
         residual=np.where(lost, np.inf, check.residual),
         energy=_energies(robot, tables, check, status), status=status,

@@ -23,7 +23,7 @@ AIMS = ("minimum", "middle")
 
 
 def tension_limits(robot: Robot, lowest: ArrayLike, highest: ArrayLike) -> tuple[Array, Array]:
-    """Limits of each cable's tension, (m,) [N] each.
+    """Limits of each cable's tension, (m,) [N] each; they are given for the line that is reeved.
 
     Raises:
         InputError: a wrong shape, or limits that contradict each other.
@@ -44,7 +44,7 @@ def tension_limits(robot: Robot, lowest: ArrayLike, highest: ArrayLike) -> tuple
             f"at most {LARGEST:g}, got "
             f"lowest {got[0]} and highest {got[1]}"
         )
-    return low, high
+    return low * robot.falls, high * robot.falls
 
 
 def wanted_tensions(aim: str | ArrayLike, low: Array, high: Array) -> Array:

@@ -121,7 +121,8 @@ def kept_chance(
     for first in range(0, len(out), _PART):
         rows = slice(first, first + _PART)
         tensions = at.tensions[rows, None] + np.einsum("nmp,kp->nkm", slopes[rows], drawn)
-        kept = (tensions >= low - room) & (tensions <= high + room)
+        line = robot.falls
+        kept = (tensions >= low / line - room) & (tensions <= high / line + room)
         out[rows] = kept.all(axis=2).mean(axis=1)
     out[lost | ~at.solved] = np.nan
     return out

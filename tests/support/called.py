@@ -34,11 +34,13 @@ def as_json(words: str, status: int = 0) -> dict[str, Any]:
 
 
 def refused_in_a_line(words: str) -> str:
-    """The one line with which bad input ends."""
+    """The one line with which bad input ends; notes about the robot may be before it."""
     result = ran(words, 2)
-    assert result.stdout == "" and result.stderr.count("\n") == 1, result.output
-    assert result.stderr.startswith(f"{words.split()[0]}: ")
-    return result.stderr
+    lines = result.stderr.splitlines(keepends=True)
+    said = [line for line in lines if not line.startswith("note: ")]
+    assert result.stdout == "" and len(said) == 1, result.output
+    assert said[0].startswith(f"{words.split()[0]}: ")
+    return said[0]
 
 
 def following(result: Result) -> str:

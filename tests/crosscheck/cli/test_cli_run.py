@@ -231,7 +231,7 @@ def test_bad_usage_is_one_line_and_2(tmp_path, monkeypatch, arguments, message):
     monkeypatch.chdir(tmp_path)
     Path("broken.xml").write_text("<mujoco><worldbody>")
     Path("empty.xml").write_text("<mujoco/>")
-    changed(PLANAR, tmp_path, 'springlength="0 ', 'springlength="')
+    changed(PLANAR, tmp_path, 'springlength="0 ', 'springlength="0.1 ')
     before = {path: path.read_text() for path in tmp_path.iterdir()}
     assert message in refused(*arguments)
     assert {path: path.read_text() for path in tmp_path.iterdir()} == before

@@ -247,7 +247,7 @@ def test_constant_commands_and_slack_rows(robot, commands):
     loose = replace(robot, gravity=np.zeros(3), rest_lengths=robot.rest_lengths + 1.0)
     found = make_plan(loose, commands)
     assert not found.converged and found.effects == ()
-    assert "left out" in found.notes[0]
+    assert any("left out" in note for note in found.notes)
     json_text(found.as_json())
 
 

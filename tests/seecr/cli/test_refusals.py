@@ -91,7 +91,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
          "told.csv: contains rest lengths; expected the wanted poses, such as cmd_x_m"),
         ("pose demobot_parallel 0.4 0.25 0.1 --model empty.xml",
          "empty.xml: is empty; expected a model as crosscheck add writes it"),
-        ("pose long.xml 0.4 0.25 0.1", "long.xml: tendon cable1 has rest length 1e+06 m; expected "
+        ("pose long.xml 0.4 0.25 0.1", "long.xml: each of the tendons cable1, cable2, cable3, "
+         "cable4, cable5, cable6, cable7 and cable8 has rest length 1e+06 m; expected "
          "metres, of the size of the frame, 0.834 m across"),
         ("pose stiff.xml 0.4 0.25 0.1",
          "stiffness x rest length of cable1 holds a number that is not finite, or beyond 1e+30"),

@@ -93,7 +93,7 @@ def test_it_is_told_where_notes_on_a_robot_are(tmp_path: Path) -> None:
     )
     said = "strained by up to "
     words = ["pose", str(tmp_path / "soft.xml"), "0.4", "0.25", "0.15", "--alone"]
-    assert said in CliRunner().invoke(main, words).stdout
+    assert said in CliRunner().invoke(main, words).stderr
     robot = load_robot(tmp_path / "soft.xml")
     poses = np.tile(robot.reference_pose, (7, 1))
     poses[:, 2] += np.linspace(0.0, 0.06, 7)
