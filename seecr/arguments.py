@@ -70,3 +70,16 @@ def whole(value: object, name: str, least: int = 0) -> int:
     if number < least:
         raise InputError(f"{name}: expected a whole number from {least} on, got {value!r}")
     return number
+
+
+def check_kind(value: object, kind: type, name: str, hint: str) -> None:
+    """Check that an argument is of a class; ``hint`` says where one comes from.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if not isinstance(value, kind):
+        package = kind.__module__.partition(".")[0]
+        raise InputError(
+            f"{name}: expected a {package}.{kind.__name__}, {hint}, got {type(value).__name__}"
+        )

@@ -82,6 +82,7 @@ SHOWING = ("crosscheck.show.", "seecr.show.")
 TRADE = {
     f"{module}.{name}"
     for line in """
+crosscheck.measurements.data: parse_quantity
 crosscheck.model.write: check_place state_of
 crosscheck.planning.write: NAME box_of planned_files
 crosscheck.suite.cases: select
@@ -90,7 +91,7 @@ crosscheck.suite.write: FILE_NAME RESULTS
 crosscheck.given: check_case
 crosscheck.importing: FILES write_case
 crosscheck.twin: FILES
-seecr.columns.commands: read_commands
+seecr.columns.commands: CommandFile read_commands
 seecr.columns.plausible: ABSURD scalar_last
 seecr.compiled.compile_notice: tell_compiling
 seecr.counted: counted

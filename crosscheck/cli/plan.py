@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -33,36 +32,42 @@ from seecr.cli.durations import say_duration
 @choices.sigma
 @options.option(
     "--lowest N",
-    "Lowest cable tension at proposed poses.",
+    "Lowest cable tension [N] of poses that are chosen or proposed.  [default: a tenth of the "
+    "usual, where enough poses have that]",
     options.Number(),
-    default=0.0,
-    show_default=False,
 )
 @options.option(
     "--highest N",
-    "Highest cable tension at proposed poses.",
+    "Highest cable tension [N] of these.  [default: twice the usual]",
     options.Number(),
-    default=math.inf,
-    show_default=False,
 )
 @options.option(
     "--box X0,Y0,Z0,X1,Y1,Z1",
-    "Where poses are chosen and proposed [m].  [default: inside the exit points]",
+    "Where these poses are [m].  [default: inside the frame, with a margin]",
+)
+@options.option("--tilt ANGLE", "Tilt of some of these poses, such as 10deg.  [default: all level]")
+@options.option(
+    "--floor Z",
+    "Height of the floor [m].  [default: that of the MJCF, or a little below the reference pose]",
+    options.Number(),
+    callback=options.check_finite,
 )
 @choices.figures
 @options.out("crosscheck-plan")
 @options.as_json
 def command(
     robot: Path, poses: Path | None, rows: int | None, reads: tuple[str, ...],
-    sigmas: tuple[str, ...], lowest: float, highest: float, box: str | None,
-    figures: Path | None, out: Path, as_json: bool,
+    sigmas: tuple[str, ...], lowest: float | None, highest: float | None, box: str | None,
+    tilt: str | None, floor: float | None, figures: Path | None, out: Path, as_json: bool,
 ) -> int:  # fmt: skip
     """Tell, before measuring, which effects the poses would reveal and distinguish.
 
     POSES.csv holds commands in the same format as a file of measurements; readings in it are
-    ignored. With --rows the poses are chosen: of those where the robot comes to rest within the
-    tension limits, those that together reveal and distinguish most effects. At some of them cables
-    may be slack, which is said; with --lowest there are none such where enough others are. The
+    ignored. With --rows the poses are chosen: of those where the robot may be sent, those that
+    together reveal and distinguish most effects. The robot may be sent where it rests inside the
+    frame of its exit points, above the floor, with a margin, level, with no cable pulling more than
+    twice what is usual (the median over the poses), and with all cables taut where enough poses are
+    so; else cables may be slack, which is said. Tilted poses, which reveal more, need --tilt. The
     noise comes from --sigma, or from [sigma] in the TOML beside POSES.csv, or else is that of good
     sensors.
 
@@ -84,6 +89,7 @@ def command(
         got = "neither" if poses is None else "both"
         raise click.UsageError(f"expected POSES.csv or --rows N, got {got}")
     from crosscheck import Sigma, choose_poses, load_commands, make_plan, write_plan
+    from crosscheck.measurements.data import parse_quantity
     from crosscheck.planning.write import NAME, box_of, planned_files
     from crosscheck.show.page import write_page
     from crosscheck.show.plan import print_plan
@@ -95,6 +101,7 @@ def command(
     room = box_of(box) if box else None
     if room is not None:
         check_places(room, machine)
+    turn = parse_quantity("--tilt", "orientation", tilt) if tilt else 0.0
     sigma = Sigma.parsed(sigmas)
     given = None if poses is None else load_commands(poses, machine, sigma=sigma)
     sigma = sigma if given is None else given.sigma
@@ -106,7 +113,10 @@ def command(
         else:
             say_duration("plan", given.n_rows, "rows", as_json)
         with options.progress_share("planning") as progress:
-            asked: dict[str, Any] = {"reads": reads, "limits": (lowest, highest), "box": room}
+            asked: dict[str, Any] = {
+                "reads": reads, "limits": (lowest, highest), "box": room, "tilt": turn,
+                "floor": floor,
+            }  # fmt: skip
             commands = given or choose_poses(
                 machine, rows or 0, sigma=sigma, progress=progress, **asked
             )

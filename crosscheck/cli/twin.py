@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 )
 @options.option(
     "--effects K",
-    "How many effects to hide.  [default: none, one or two, drawn from the seed]",
+    "How many effects to hide.  [default: one or two, drawn from the seed]",
     options.WholeNumber(min=0),
     "count",
 )
@@ -46,6 +46,10 @@ if TYPE_CHECKING:
     "own law. May be repeated.",
     name="names",
     multiple=True,
+)
+@options.option(
+    "--maybe-none",
+    "Some seeds may hide nothing, or what the poses hardly show; else other effects are drawn.",
 )
 @options.option("--tensions", "Also record tensions.")
 @options.option(
@@ -60,17 +64,18 @@ if TYPE_CHECKING:
 @click.pass_context
 def command(
     context: click.Context, robot: Path | None, seed: int | None, count: int | None,
-    names: tuple[str, ...], tensions: bool, poses: Path | None, sigmas: tuple[str, ...],
-    opened: Path | None, out: Path, as_json: bool,
+    names: tuple[str, ...], maybe_none: bool, tensions: bool, poses: Path | None,
+    sigmas: tuple[str, ...], opened: Path | None, out: Path, as_json: bool,
 ) -> int:  # fmt: skip
     """Simulate measurements of a robot with hidden effects, with MuJoCo as the truth.
 
     The platform is commanded along sweeps to and fro, at two heights and across, and around a
     tilted loop, 144 rows in all, scaled to the robot. MuJoCo brings it to rest at each row; a
-    tracker with noise reads its pose. With --poses it follows your own commands: rows of POSES.csv
-    without a reading are way points if other rows have one; the noise level is that of the TOML
-    beside it, or of --sigma, and other poses get other noise. With the same seed and noise level
-    it is the same robot, whatever is commanded: measure again what seecr correct has written.
+    tracker with noise reads its pose, angles only about axes that it can turn about. With --poses
+    it follows your own commands: rows of POSES.csv without a reading are way points if other rows
+    have one; the noise level is that of the TOML beside it, or of --sigma, and other poses get
+    other noise. With the same seed and noise level it is the same robot, whatever is commanded, as
+    long as that shows what it hides: measure again what seecr correct has written.
 
     \b
     Writes into --out:
@@ -110,7 +115,7 @@ def command(
     with options.progress_bar("measuring", 1) as advance:
         twin = make_twin(
             robot, seed, effects=names or None, n_effects=count, out=out, tensions=tensions,
-            poses=commands, sigma=commands.sigma if commands else noise,
+            poses=commands, sigma=commands.sigma if commands else noise, maybe_none=maybe_none,
             progress=lambda rows, now: advance(0, "measuring"),
         )  # fmt: skip
         advance(1, "measured")
@@ -132,7 +137,9 @@ def _tell(twin: Twin, out: Path, made: Made | None) -> None:
         click.echo(json_text(document, indent=2))
         return
     sigma = twin.answer.sigma
-    noise = f"{1e3 * sigma['position_m']:.3g} mm, {math.degrees(sigma['orientation_rad']):.2g} deg"
+    noise = f"{1e3 * sigma['position_m']:.3g} mm"
+    if "orientation_rad" in sigma:
+        noise += f", {math.degrees(sigma['orientation_rad']):.2g} deg"
     if "tension_N" in sigma:
         noise += f", {sigma['tension_N']:.2g} N"
     rows, runs = counted(twin.measured.n_rows, "row"), counted(len(twin.measured.runs), "run")

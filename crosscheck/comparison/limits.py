@@ -13,6 +13,8 @@ from crosscheck.comparison.result import Comparison
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.problem import KINDS, Kind
 from crosscheck.measurements.data import EXAMPLE, parse_quantity
+from seecr.arguments import check_kind, finite
+from seecr.errors import InputError
 from seecr.files import path_of, read_toml
 
 
@@ -143,15 +145,20 @@ def exceeded(limits: Limits, found: Comparison) -> list[Exceeded]:
 
     Raises:
         CrosscheckError: a limit is on something that was not measured, or nothing can exceed it.
+        InputError: other arguments.
 
     Example:
         ``crosscheck.exceeded(crosscheck.load_limits("limits.toml"), found)``
     """
+    check_kind(limits, Limits, "limits", "such as Limits(max_position=0.001)")
+    check_kind(found, Comparison, "found", "as compare returns it")
     out = []
     for name, rule in RULES.items():
         limit = getattr(limits, name)
         if limit is None:
             continue
+        if finite(limit, name).shape:
+            raise InputError(f"{name}: expected one number, got {limit!r}")
         data = found.problem.data
         if not getattr(data, f"has_{rule.kind.name}"):
             raise CrosscheckError(

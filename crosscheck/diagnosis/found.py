@@ -99,7 +99,7 @@ def diagnosis_of(
         where=where,
         left=left,
         chances=chances,
-        sight=sight,
+        sight=replace(sight, found=tuple(effect.effect for effect in missing)),
     )
     return replace(
         out, model=with_found(out, basis), refitted=refitted_names(out, basis),

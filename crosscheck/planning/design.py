@@ -17,15 +17,12 @@ from crosscheck.planning.places import (
     detours,
     extensions,
     held_within,
-    taut_first,
+    in_room,
     tilted_grid,
     trustworthy,
     upright,
-    within_box,
 )
 from crosscheck.planning.planned import (
-    NO_LIMITS,
-    Limits,
     Planned,
     Reads,
     expected_sigma,
@@ -36,6 +33,7 @@ from crosscheck.planning.planned import (
 )
 from crosscheck.planning.proposer import propose
 from crosscheck.planning.result import Plan, Visible, all_visible
+from crosscheck.planning.room import Demand, Room, usual_tension
 from crosscheck.planning.visibility import (
     EXACT,
     Signal,
@@ -46,58 +44,13 @@ from crosscheck.planning.visibility import (
     signals_like,
 )
 from crosscheck.preparation.prepare import Progress
-from seecr.arguments import finite, numbers, silent, whole
+from seecr.arguments import silent, whole
 from seecr.counted import counted, some
 from seecr.description.joints import pose_of_values
 from seecr.description.robot import ITS_A_POINT, Robot
 from seecr.effects import Term, Terms, catalogue, layout_of
 from seecr.equilibrium.strange import strange
-from seecr.errors import InputError
 from seecr.pose import Array
-
-# Arguments of planning from callers: limits of tensions, boxes, kinds of readings.
-
-
-def box_given(box: ArrayLike | None) -> Array | None:
-    """A box (2, 3) [m], the lowest position first, or None.
-
-    Raises:
-        InputError: something else.
-    """
-    if box is None:
-        return None
-    array = finite(box, "box")
-    if array.shape != (2, 3):
-        raise InputError(
-            f"box must be (2, 3) [m], the lowest and the highest x y z, got {array.shape}"
-        )
-    if np.any(array[0] > array[1]):
-        k = int(np.argmax(array[0] > array[1]))
-        raise InputError(
-            f"box: expected the lowest position first, got {'xyz'[k]} from {array[0, k]:g} to "
-            f"{array[1, k]:g} m"
-        )
-    return array
-
-
-def limits_given(limits: ArrayLike) -> Limits:
-    """The lowest and the highest tension [N].
-
-    Raises:
-        InputError: something else, or limits that contradict each other.
-    """
-    array = numbers(limits, "limits")
-    if array.shape != (2,):
-        raise InputError(
-            f"limits must be two numbers, the lowest and the highest tension [N], got {limits!r}"
-        )
-    low, high = array.tolist()
-    if not 0.0 <= low <= high or low == np.inf:
-        raise InputError(
-            f"limits must be 0 <= lowest <= highest [N], lowest finite, got {low:g} and {high:g}"
-        )
-    return low, high
-
 
 _MOST_LINES = 5
 
@@ -109,8 +62,10 @@ def make_plan(
     progress: Progress = silent,
     *,
     reads: Collection[str] | str = (),
-    limits: Limits = NO_LIMITS,
-    box: Array | None = None,
+    limits: ArrayLike | None = None,
+    box: ArrayLike | None = None,
+    tilt: float = 0.0,
+    floor: float | None = None,
     effects: GivenNames = (),
 ) -> Plan:
     """Predict what planned commands will show of each effect.
@@ -123,8 +78,13 @@ def make_plan(
         progress: called with what is being done and the fraction that is done.
         reads: kinds of readings there will be, of "position", "orientation" and "tension", or one
             of them; by default the pose, and tensions if their noise is stated.
-        limits: lowest and highest tension [N] of poses that are proposed.
-        box: (2, 3) [m] lowest and highest position of these.
+        limits: lowest and highest tension [N] of poses that are proposed; None, also for one of
+            the two, for what a laboratory may run: all cables taut with a margin where the robot
+            can be, and none pulls more than twice what is usual.
+        box: (2, 3) [m] lowest and highest position of these; by default inside the frame of the
+            exit points, with a margin.
+        tilt: [rad] of these, besides level ones.
+        floor: [m] its height against gravity; by default that of the robot's file.
         effects: of one's own, to be considered beside those of the catalogue.
 
     Returns:
@@ -132,13 +92,13 @@ def make_plan(
 
     Raises:
         CrosscheckError: there is an unknown kind of reading.
-        InputError: there are no commands; limits or a box of another form, or reversed.
+        InputError: there are no commands; limits, a box, a tilt or a floor of another form.
 
     Example:
         ``crosscheck.make_plan(robot, "measured.csv").effects``
     """
     robot = robot_of(robot)
-    limits, box = limits_given(limits), box_given(box)
+    room = Room.of(robot, limits=limits, box=box, tilt=tilt, floor=floor)
     commands = commands_of(commands, robot)
     stated = sigma or commands.sigma
     kinds = kinds_of(reads, stated)
@@ -160,7 +120,7 @@ def make_plan(
     effects = all_visible(own)
     progress("what could be added", 0.4)
     suggestions = propose(
-        [*extensions(plan, limits, box), *detours(plan)],
+        [one for one in (*extensions(plan, room), *detours(plan, room)) if room.allows(one.plan)],
         own,
         _wanted(own, effects),
         lambda there: signals_like(there, own),
@@ -176,6 +136,7 @@ def make_plan(
         slack=tuple((int(commands.line[k]), names[i]) for k, i in near_slack(plan)),
         notes=tuple(dict.fromkeys(notes)),
         loose=loose,
+        demand=Demand.of(plan),
     )
 
 
@@ -230,11 +191,8 @@ def _wanted(own: Mapping[str, Signal], effects: Mapping[str, Visible]) -> list[W
 
 # Candidates along x, y, z; number of random ones for joints; most candidates that are evaluated.
 _GRID, _JOINT_POSES, _MOST = (6, 6, 4), 400, 240
-# Parts of the space between the exit points that are kept free at the sides and at the top, and how
-# far joints turn [rad].
-_SIDE, _TOP, _TURN = 0.15, 0.15, 0.2
-# If all exit points are above home: how far below home poses go, relative to the height above it.
-_BELOW = 0.25
+# How far hinges turn [rad] in any case where there are no slides, so that nothing else moves.
+_TURN = 0.2
 # An effect should be told from so many others, those that are most like it.
 _RIVALS = 3
 # Number of candidates that each step of the choice tries.
@@ -249,8 +207,10 @@ def choose_poses(
     *,
     sigma: Sigma | None = None,
     reads: Collection[str] | str = (),
-    limits: Limits = NO_LIMITS,
-    box: Array | None = None,
+    limits: ArrayLike | None = None,
+    box: ArrayLike | None = None,
+    tilt: float = 0.0,
+    floor: float | None = None,
     progress: Progress = silent,
     effects: GivenNames = (),
 ) -> Measurements:
@@ -261,8 +221,7 @@ def choose_poses(
         rows: number of poses.
         sigma: expected noise; by default that of good sensors.
         reads: kinds of readings there will be; see :func:`make_plan`.
-        limits: lowest and highest tension [N].
-        box: (2, 3) [m] lowest and highest position; by default inside the exit points.
+        limits, box, tilt, floor: where the robot may be sent; see :func:`make_plan`.
         progress: called with what is being done and the fraction that is done.
         effects: of one's own, to be shown too.
 
@@ -271,26 +230,26 @@ def choose_poses(
 
     Raises:
         CrosscheckError: the robot can hold too few poses within the limits.
-        InputError: ``rows`` is not a whole number from 1 on; limits or a box of another form, or
-            reversed.
+        InputError: ``rows`` is not a whole number from 1 on; limits, a box, a tilt or a floor of
+            another form.
 
     Example:
         ``crosscheck.choose_poses("robot.xml", 12).command_pose``
     """
     robot, rows = robot_of(robot), whole(rows, "rows", least=1)
-    limits, box = limits_given(limits), box_given(box)
+    room = Room.of(robot, limits=limits, box=box, tilt=tilt, floor=floor)
     progress("looking for poses", 0.0)
     kinds = kinds_of(reads, sigma or Sigma())
     full, _assumed = expected_sigma(robot, sigma or Sigma(), kinds)
-    tried, channels = candidate_poses(robot, box), Reads.of_kinds(robot.n_cables, kinds)
+    tried, channels = candidate_poses(room), Reads.of_kinds(robot.n_cables, kinds)
     there_are = _beside_catalogue(effects)
     plan, found = None, 0
     if robot.n_cables >= robot.n_dof:
-        held = held_within(robot, tried, limits)
-        plan = _usable(robot, held, rows, full, channels, limits, there_are)
+        held = held_within(robot, tried, room.bounds)
+        plan = _usable(room, held, rows, full, channels, there_are)
         found = 0 if plan is None else plan.problem.data.n_rows
     if robot.n_cables <= robot.n_dof and found < rows:  # few cables hold little, but rest nearby
-        plan = _usable(robot, tried, rows, full, channels, limits, there_are)
+        plan = _usable(room, tried, rows, full, channels, there_are)
         found = 0 if plan is None else plan.problem.data.n_rows
     if plan is None or found < rows:
         cure = "ask for fewer rows, a wider range of tensions, or another box"
@@ -315,52 +274,41 @@ def choose_poses(
     return Measurements(path, robot.n_cables, run, command_pose=pose, sigma=noise)
 
 
-def candidate_poses(robot: Robot, box: Array | None) -> Array:
+def candidate_poses(room: Room) -> Array:
+    """Poses (n, 7) all over a room."""
+    robot, box = room.robot, room.box
     frame = upright(robot) if box is None else np.eye(3)
-    low, high = _room(robot, frame) if box is None else box
+    points = np.concatenate([room.points, robot.reference_pose[None, :3]]) @ frame
+    low, high = room.extent(
+        frame, *((points.min(axis=0), points.max(axis=0)) if box is None else box)
+    )
     if robot.joints:
         slides = ~robot.hinges
         axes = np.array([joint.axis for joint in robot.joints]) @ frame
-        reach = np.where(slides, 0.5 * np.abs(axes @ (high - low)), _TURN)
+        turn = room.tilt or (_TURN if robot.hinges.all() else 0.0)
+        reach = np.where(slides, 0.5 * np.abs(axes @ (high - low)), turn)
         home = robot.reference_pose[:3] @ frame
         middle = np.where(slides, axes @ (0.5 * (low + high) - home), 0.0)
         random = np.random.default_rng(0).uniform(-1.0, 1.0, (_JOINT_POSES, len(reach)))
-        poses = pose_of_values(robot, middle + reach * random)[0]
-        return poses if box is None else within_box(poses, box)
-    return tilted_grid(robot, low, high, _GRID, frame)
-
-
-def _room(robot: Robot, frame: Array) -> tuple[Array, Array]:
-    """A box along the axes of a frame (3, 3), the last one upwards, inside the exit points.
-
-    If these are all above home, it begins a little below home.
-    """
-    exits = robot.exit_points @ frame
-    low, high = exits.min(axis=0), exits.max(axis=0)
-    home, span = robot.reference_pose[:3] @ frame, high - low
-    inner_low, inner_high = low + _SIDE * span, high - _SIDE * span
-    below = _BELOW * (high[2] - home[2])
-    inner_high[2] = high[2] - _TOP * (high[2] - min(low[2], home[2] - below))
-    inner_low[2] = low[2] + _SIDE * span[2] if low[2] < home[2] else home[2] - below
-    return np.minimum(inner_low, home), np.maximum(inner_high, home)
+        return in_room(room, pose_of_values(robot, middle + reach * random)[0])
+    return in_room(room, tilted_grid(robot, low, high, _GRID, frame, room.tilt))
 
 
 def _usable(
-    robot: Robot, poses: Array, rows: int, sigma: Sigma, reads: Reads, limits: Limits,
+    room: Room, poses: Array, rows: int, sigma: Sigma, reads: Reads,
     considered: frozenset[str] = frozenset(),
 ) -> Planned | None:  # fmt: skip
-    """The plan of those poses at which the plain robot rests, stiff and within the limits.
-
-    Where a lowest tension is asked for, those with slack cables are left out, if there are ``rows``
-    others.
-    """
+    """The plan of those poses at which the plain robot rests, stiff and where it may be sent."""
+    robot = room.robot
     if len(poses) == 0:
         return None
     every = _plan(robot, poses, sigma, reads, considered)
-    tensions = every.base.prediction.tensions
-    good = trustworthy(every, every) if every.problem.use.any() else every.problem.use
-    good = good & (tensions <= limits[1]).all(axis=1) & (tensions >= limits[0]).all(axis=1)
-    kept = np.flatnonzero(taut_first(every, good, rows, limits))
+    if not every.problem.use.any():
+        return None
+    # a robot works about its home more than at the edge, where tensions grow without end
+    away = np.linalg.norm(poses[:, :3] - robot.reference_pose[:3], axis=1)
+    usual = usual_tension(every, away <= np.median(away))
+    kept = np.flatnonzero(room.may_run(every, trustworthy(every, every), usual, rows))
     if len(kept) == 0:
         return None
     # a selection spread over all of them, as they are in the order of the grid

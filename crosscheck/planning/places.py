@@ -6,25 +6,22 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Measurements
 from crosscheck.planning.planned import (
     MORE_POSES,
-    NO_LIMITS,
     Adding,
     Extension,
-    Limits,
     Planned,
     Reads,
     expected_sigma,
     like,
     near_slack,
-    slack_at,
     usual_cell,
 )
+from crosscheck.planning.room import Room, usual_tension
 from seecr.commands import Loads
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot
@@ -62,38 +59,41 @@ def box_around(low: Array, high: Array, axes: Array) -> tuple[Array, Array]:
 
 # Candidate poses along x, y, z, and how far they extend beyond the planned region.
 _GRID, _BEYOND = (4, 3, 3), 0.25
-_TILT_RAD = np.radians(10.0)
 _TILTS = np.array(
     [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [1, 1, 0], [0, 0, -1], [-1, 1, 0]]
 )
-_JOINT_POSES = 60
+_TILTS = _TILTS / np.linalg.norm(_TILTS, axis=1, keepdims=True)
+_JOINT_POSES = 100
 # A pose is nearly free to move if its smallest stiffness is below this part of the usual one.
 _SOFT = 0.05
 
 
-def more_poses(
-    plan: Planned, limits: Limits = NO_LIMITS, box: Array | None = None
-) -> Extension | None:
-    """Poses in and around the planned region, some tilted, at which the robot can hold still.
+def more_poses(plan: Planned, room: Room | None = None) -> Extension | None:
+    """Poses in and around the planned region at which a laboratory may run the robot.
 
-    Tensions that balance the load are not those that commanded lengths bring about. Where a lowest
-    tension is asked for, poses at which these leave a cable slack are left out, if enough others
-    are left; elsewhere they may be what tells effects apart. ``limits`` [N] and ``box`` (2, 3) [m]
-    hold the lowest and the highest.
+    Tensions that balance the load are not those that commanded lengths bring about: of poses that
+    can be held those are left at which the robot rests in the room, which is also that of the
+    planned poses, with tensions near the usual ones of these.
     """
-    robot = plan.problem.robot
-    poses = _jointed(plan) if robot.joints else _grid(plan, box)
-    if box is not None:
-        poses = within_box(poses, box)
-    poses = held_within(robot, poses, limits)
+    robot, told = plan.problem.robot, plan.problem.data.command_pose
+    room = (room or Room.of(robot)).around(_planned_poses(plan), turning=told is not None)
+    poses = _jointed(plan, room.tilt) if robot.joints else _grid(plan, room)
+    poses = held_within(robot, in_room(room, poses), room.bounds)
     if len(poses) == 0:
         return None
     tried = like(plan, commands_at(plan.problem, poses))
-    poses = poses[taut_first(tried, trustworthy(tried, plan), MORE_POSES, limits)]
+    usual = usual_tension(plan)
+    poses = poses[room.may_run(tried, trustworthy(tried, plan), usual, MORE_POSES)]
     if len(poses) == 0:
         return None
     found = like(plan, commands_at(plan.problem, poses))
     return Extension(Adding.POSES, "add poses", found, poses)
+
+
+def in_room(room: Room, poses: Array) -> Array:
+    """The poses (n, 7) in a room, and in its box."""
+    poses = poses[room.holds(poses)]
+    return poses if room.box is None else within_box(poses, room.box)
 
 
 def within_box(poses: Array, box: Array) -> Array:
@@ -101,7 +101,7 @@ def within_box(poses: Array, box: Array) -> Array:
     return poses[np.all((poses[:, :3] >= box[0]) & (poses[:, :3] <= box[1]), axis=1)]
 
 
-def held_within(robot: Robot, poses: Array, limits: Limits = NO_LIMITS) -> Array:
+def held_within(robot: Robot, poses: Array, limits: tuple[float, float]) -> Array:
     """The poses (n, 7) at which tensions within the limits balance the load."""
     return poses[feasible(robot, poses, lowest=limits[0], highest=limits[1])]
 
@@ -114,16 +114,6 @@ def trustworthy(candidates: Planned, plan: Planned) -> np.ndarray:
     for row, _cable in near_slack(candidates):
         good[row] = False
     return np.asarray(good)
-
-
-def taut_first(
-    candidates: Planned, good: NDArray[np.bool_], enough: int, limits: Limits
-) -> NDArray[np.bool_]:
-    """(n,) the good ones; if cables are to pull, those without a slack one, if they are enough."""
-    if limits[0] <= 0.0:
-        return good
-    taut = good & ~slack_at(candidates).any(axis=1)
-    return taut if taut.sum() >= enough else good
 
 
 def commands_at(problem: Problem, poses: Array) -> Measurements:
@@ -151,60 +141,57 @@ def _planned_poses(plan: Planned) -> Array:
     return pose[problem.use]
 
 
-def _grid(plan: Planned, box: Array | None) -> Array:
-    """Positions on a grid, in the box if there is one, each level and with two tilts."""
-    robot, pose = plan.problem.robot, _planned_poses(plan)
+def _grid(plan: Planned, room: Room) -> Array:
+    """Positions on a grid, in the box if there is one."""
+    robot, pose, box = plan.problem.robot, _planned_poses(plan), room.box
     frame = upright(robot)
-    low, high = _box(robot, pose[:, :3] @ frame, frame)
+    low, high = _around(robot, pose[:, :3] @ frame, frame)
     if box is not None:
         own = box_around(box[0], box[1], frame)
         # where the box is beside what is planned, all of it
         apart = (high < own[0]) | (low > own[1])
         low = np.where(apart, own[0], np.maximum(low, own[0]))
         high = np.where(apart, own[1], np.minimum(high, own[1]))
-    return tilted_grid(robot, low, high, _GRID, frame)
+    return tilted_grid(robot, *room.extent(frame, low, high), _GRID, frame, room.tilt)
 
 
 def tilted_grid(
-    robot: Robot, low: Array, high: Array, steps: tuple[int, int, int], frame: Array
-) -> Array:
+    robot: Robot, low: Array, high: Array, steps: tuple[int, int, int], frame: Array,
+    tilt_rad: float,
+) -> Array:  # fmt: skip
     """Positions on a grid of so many steps [m], each level and with two tilts, as poses (n, 7).
 
-    The grid and the axes of the tilts are along the columns of ``frame`` (3, 3).
+    The grid and the axes of the tilts are along the columns of ``frame`` (3, 3). Without a tilt
+    there are about as many poses, on a finer grid.
     """
-    axes = [np.linspace(low[k], high[k], steps[k]) for k in range(3)]
+    finer = 1.0 if tilt_rad > 0.0 else np.cbrt(3.0)
+    axes = [np.linspace(low[k], high[k], round(finer * steps[k])) for k in range(3)]
     place = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3) @ frame.T
     n = len(place)
     level = np.tile(robot.reference_pose[3:], (n, 1))
     out = [np.concatenate([place, level], axis=1)]
-    for shift in (0, 3):
-        tilt = _TILT_RAD * _TILTS[(np.arange(n) + shift) % len(_TILTS)] @ frame.T
+    for shift in (0, 3) if tilt_rad > 0.0 else ():
+        tilt = tilt_rad * _TILTS[(np.arange(n) + shift) % len(_TILTS)] @ frame.T
         out.append(np.concatenate([place, quat_multiply(quat_from_rotvec(tilt), level)], axis=1))
     return np.concatenate(out)
 
 
-def _box(robot: Robot, place: Array, frame: Array) -> tuple[Array, Array]:
-    """The planned region with a margin, inside the exit points, along the axes of a frame."""
-    exits = robot.exit_points @ frame
-    exits_low, exits_high = exits.min(axis=0), exits.max(axis=0)
+def _around(robot: Robot, place: Array, frame: Array) -> tuple[Array, Array]:
+    """The planned region with a margin, along the axes of a frame."""
     low, high = place.min(axis=0), place.max(axis=0)
-    room = np.maximum(exits_high - exits_low, 0.2 * float(np.max(exits_high - exits_low)))
-    margin = _BEYOND * np.maximum(high - low, 0.2 * room)
-    inside = 0.1 * (exits_high - exits_low)
-    new_low, new_high = low - margin, high + margin
-    # at the sides no further than the exit points; upwards not up to them
-    new_low[:2] = np.maximum(new_low[:2], np.minimum(exits_low[:2] + inside[:2], low[:2]))
-    new_high[:2] = np.minimum(new_high[:2], np.maximum(exits_high[:2] - inside[:2], high[:2]))
-    new_high[2] = min(new_high[2], max(exits_high[2] - 0.1 * room[2], high[2]))
-    return new_low, new_high
+    room = np.ptp(robot.exit_points @ frame, axis=0)
+    margin = _BEYOND * np.maximum(high - low, 0.2 * np.maximum(room, 0.2 * room.max()))
+    return low - margin, high + margin
 
 
-def _jointed(plan: Planned) -> Array:
-    """Random joint values in and around the planned ones."""
+def _jointed(plan: Planned, tilt_rad: float) -> Array:
+    """Random joint values in and around the planned ones; hinges turn no further than asked."""
     robot = plan.problem.robot
     values = values_of_pose(robot, _planned_poses(plan))[0]
     low, high = values.min(axis=0), values.max(axis=0)
     margin = _BEYOND * np.maximum(high - low, 0.2 * float(np.max(high - low)))
+    if not robot.hinges.all():
+        margin = np.where(robot.hinges, tilt_rad, margin)
     random = np.random.default_rng(0)
     chosen = random.uniform(low - margin, high + margin, (_JOINT_POSES, len(low)))
     return np.asarray(pose_of_values(robot, chosen)[0])
@@ -218,18 +205,16 @@ PAYLOAD = 0.25
 _AN_HOUR = 3600.0
 
 
-def extensions(
-    plan: Planned, limits: Limits = NO_LIMITS, box: Array | None = None
-) -> Iterator[Extension]:
+def extensions(plan: Planned, room: Room | None = None) -> Iterator[Extension]:
     """All that can be added to measurements that were made or planned, one after the other.
 
-    ``limits`` [N] and ``box`` (2, 3) [m] hold the lowest and the highest of added poses.
+    A room says where poses may be added, and what tensions may be.
     """
     ways = ~plan.problem.data.read & ~plan.unsolved
     data = plan.problem.data.rows(plan.problem.use | ways)
     for make in (_sensors, _payload, _way_back, _later):
         yield from make(plan, data)
-    found = more_poses(plan, limits, box)
+    found = more_poses(plan, room)
     if found is not None:
         yield found
 
@@ -315,11 +300,12 @@ def _again(data: Measurements) -> np.ndarray:
 _ASIDE, _BEYOND_POSE = 0.25, 0.5
 
 
-def detours(plan: Planned) -> Iterator[Extension]:
+def detours(plan: Planned, room: Room | None = None) -> Iterator[Extension]:
     """An off-centre payload, and each pose reached again from beyond it."""
     data = plan.problem.data.rows(plan.problem.use)
+    room = (room or Room.of(plan.problem.robot)).around(_planned_poses(plan))
     yield from _aside(plan, data)
-    yield from _way_points(plan, data)
+    yield from _way_points(plan, data, room)
 
 
 def _aside(plan: Planned, data: Measurements) -> Iterator[Extension]:
@@ -339,9 +325,9 @@ def _aside(plan: Planned, data: Measurements) -> Iterator[Extension]:
     )
 
 
-def _way_points(plan: Planned, data: Measurements) -> Iterator[Extension]:
+def _way_points(plan: Planned, data: Measurements, room: Room) -> Iterator[Extension]:
     """Each pose again from beyond it, by a way point before each row that has readings."""
-    beyond = _beyond(plan, data)
+    beyond = _beyond(plan, data, room)
     if beyond is None or data.command_pose is None:
         return
     n = data.n_rows
@@ -365,8 +351,8 @@ def _halfway(t_s: Array) -> Array:
     return np.stack([np.minimum(0.5 * (before + t_s), t_s), t_s], axis=1).ravel()
 
 
-def _beyond(plan: Planned, data: Measurements) -> Array | None:
-    """Poses (n, 7) beyond each pose in the direction of travel, where these can be held."""
+def _beyond(plan: Planned, data: Measurements, room: Room) -> Array | None:
+    """Poses (n, 7) beyond each pose in the direction of travel, where the robot may go there."""
     robot = plan.problem.robot
     if data.command_pose is None or robot.joints:
         return None
@@ -374,5 +360,8 @@ def _beyond(plan: Planned, data: Measurements) -> Array | None:
     before = data.as_commands(robot).before(pose, robot.reference_pose)
     beyond = pose.copy()
     beyond[:, :3] += _BEYOND_POSE * (pose - before)[:, :3]
-    beyond = np.where(feasible(robot, beyond)[:, None], beyond, pose)
+    tried = like(plan, replace(data.without_readings(), command_pose=beyond))
+    held = feasible(robot, beyond) & room.holds(beyond)
+    fine = room.may_run(tried, held, usual_tension(plan), data.n_rows)
+    beyond = np.where(fine[:, None], beyond, pose)
     return None if np.array_equal(beyond, pose) else beyond

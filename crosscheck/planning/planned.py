@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +24,9 @@ from seecr.workspace.zones import load_scale
 # Noise of a good tracker relative to the mean cable length (30 micrometres on a DemoBot), of its
 # angles, and of load cells relative to the mean tension.
 _POSITION, _ORIENTATION_RAD, LOAD_CELL = 6e-5, 3.5e-4, 0.01
-# A cable whose stretch or slack is less than this part of the usual stretch may switch.
-_NEAR_SLACK = 0.05
+NEAR_SLACK = 0.05
+"""A cable whose stretch or slack is less than this part of the usual stretch may switch."""
+
 # Smallest noise of a load cell [N].
 _LEAST_CELL = 1e-9
 READ = ("position", "orientation", "tension")
@@ -207,16 +207,11 @@ def near_slack(plan: Planned) -> list[tuple[int, int]]:
     if not taut.any():
         return []
     usual = float(np.mean(stretch[taut]))
-    close = (np.abs(stretch) < _NEAR_SLACK * usual) & plan.problem.use[:, None]
+    close = (np.abs(stretch) < NEAR_SLACK * usual) & plan.problem.use[:, None]
     return [(int(k), int(i)) for k, i in np.argwhere(close)]
 
 
 # The kinds of measurements that could be added, each with words and a plan of its readings.
-
-Limits: TypeAlias = tuple[float, float]
-NO_LIMITS: Limits = (0.0, np.inf)
-"""Lowest and highest tension [N]."""
-
 
 MORE_POSES = 6
 """Most poses that are added."""

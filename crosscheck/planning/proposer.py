@@ -15,6 +15,7 @@ import numpy as np
 from crosscheck.fit.state import derivatives
 from crosscheck.measurements.data import Measurements
 from crosscheck.planning.planned import MORE_POSES, Adding, Extension, Planned, slack_at
+from crosscheck.planning.room import Demand
 from crosscheck.planning.visibility import (
     EXACT,
     Signal,
@@ -76,6 +77,7 @@ class Suggestion:
         poses: (k, 7) poses to add, if poses are added.
         commands: what to command for it; None for sensors.
         slack: the cables that are slack at each of the poses, by name.
+        demand: tensions, and how far the robot rests from its commands.
     """
 
     kind: Adding
@@ -84,6 +86,7 @@ class Suggestion:
     poses: Array | None = None
     commands: Measurements | None = None
     slack: tuple[tuple[str, ...], ...] = ()
+    demand: Demand | None = None
 
     @property
     def reached(self) -> tuple[Gain, ...]:
@@ -108,6 +111,7 @@ class Suggestion:
             "words": self.words,
             "poses": self.poses,
             "slack": None if self.poses is None else self.slack,
+            "demand": self.demand,
             "gains": self.gains,
         }
 
@@ -138,7 +142,8 @@ def propose(
             continue
         told = option.plan.problem.data if option.kind not in _SENSORS else None
         gains = _gains(own, there, wanted)
-        out.append(Suggestion(option.kind, option.words, gains, commands=told))
+        demand = None if told is None else Demand.of(option.plan)
+        out.append(Suggestion(option.kind, option.words, gains, commands=told, demand=demand))
     useful = [s for s in out if s.gains]
     return tuple(sorted(useful, key=lambda s: (-len(s.reached), -len(s.gains))))
 
@@ -170,7 +175,8 @@ def _few_poses(
     gains, told = _gains(own, few, open_), grid.plan.problem.data.rows(rows)
     names = np.array(grid.plan.problem.robot.cable_names)
     slack = tuple(tuple(names[loose].tolist()) for loose in slack_at(grid.plan)[rows])
-    return Suggestion(Adding.POSES, words, gains, grid.poses[rows], told, slack)
+    demand = Demand.of(grid.plan, np.array(rows))
+    return Suggestion(Adding.POSES, words, gains, grid.poses[rows], told, slack, demand)
 
 
 def telling_apart(

@@ -14,6 +14,7 @@ from crosscheck.fit.state import State
 from crosscheck.fit.words import belongs
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.proposer import Gain, Suggestion
+from crosscheck.planning.room import Demand
 from crosscheck.planning.visibility import (
     EXACT,
     LEVEL,
@@ -137,6 +138,7 @@ class Plan(Result):
         slack: (line, cable) of cables about to go slack or taut.
         notes: what was assumed or left out.
         loose: (line, cables) of poses at which cables are slack.
+        demand: tensions, and how far the robot rests from its commands; None if nowhere.
     """
 
     planned: Planned
@@ -147,6 +149,12 @@ class Plan(Result):
     slack: tuple[tuple[int, str], ...]
     notes: tuple[str, ...]
     loose: tuple[tuple[int, tuple[str, ...]], ...] = ()
+    demand: Demand | None = None
+
+    @property
+    def demanded(self) -> list[str]:
+        """What the poses demand of the robot, in words: one line, or none."""
+        return [] if self.demand is None else [f"these poses: {self.demand.words}"]
 
     @property
     def sentence(self) -> str:
@@ -176,7 +184,7 @@ class Plan(Result):
         for item in self.suggestions:
             if item.reached:
                 add += [f"add: {item.words}", *(f"     {place}" for place in item.places)]
-        return [self.sentence, *add, *(f"note: {note}" for note in self.notes)]
+        return [*self.demanded, self.sentence, *add, *(f"note: {note}" for note in self.notes)]
 
     def records(self) -> list[Record]:
         """A record for each effect: how large it must be to show and to be named."""
@@ -209,6 +217,7 @@ class Plan(Result):
             "rows": {"all": problem.data.n_rows, "used": int(problem.use.sum())},
             "reads": list(self.planned.reads.kinds),
             "sigma": problem.sigma,
+            "demand": self.demand,
             "level": LEVEL,
             "power": POWER,
             "effects": self.effects,
@@ -232,10 +241,12 @@ class Sight:
 
     Attributes:
         effects: effects that could be looked for. missing: those that cannot, and why.
+        found: effects that a diagnosis lists: they show, being larger than is plausible.
     """
 
     effects: tuple[Visible, ...]
     missing: Mapping[str, Reason]
+    found: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return "\n".join(self.lines())
@@ -243,7 +254,8 @@ class Sight:
     @property
     def hidden(self) -> tuple[str, ...]:
         """Effects that would not show at a plausible size."""
-        return tuple(found.name for found in self.effects if not found.visible)
+        lost = (one.name for one in self.effects if not one.visible)
+        return tuple(name for name in lost if name not in self.found)
 
     @property
     def alike(self) -> dict[str, tuple[str, ...]]:
@@ -285,7 +297,7 @@ class Sight:
     def as_json(self) -> dict[str, Any]:
         """``can_show`` of ``diagnosis.json``."""
         return {
-            "visible": [found.name for found in self.effects if found.visible],
+            "visible": [one.name for one in self.effects if one.name not in self.hidden],
             "not_visible": list(self.hidden),
             "cannot_be_told_from": {name: list(others) for name, others in self.alike.items()},
             "not_with_these_data": {name: why.words for name, why in self.missing.items()},

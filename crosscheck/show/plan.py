@@ -60,12 +60,16 @@ def _on_terminal(plan: Plan, out: Path, files: Sequence[str]) -> Iterator[Block]
             "them.",
             "bold yellow",
         )
+    for words in plan.demanded:
+        yield Line(words)
     yield Line(plan.sentence, "bold")
     for item in plan.suggestions:
         if item.reached:
             gains = some([gain_words(gain) for gain in item.reached], _MOST_GAINS, "; ")
             yield Line(f"add: {item.words}: {gains}")
             yield Items(item.places, "     ")
+            if item.demand is not None:
+                yield Items([item.demand.words], "     ", "dim")
     more = f", commands in {', '.join(files)}" if files else ""
     yield Line(f"Results in {out}/{more}", "dim")
 
@@ -87,7 +91,7 @@ def page_of_plan(plan: Plan) -> Page:
         sentence=plan.sentence,
         lead=in_brief(plan),
         blocks=present(
-            section("The poses", facts_of(problem)),
+            section("The poses", facts_of(problem), *(Line(words) for words in plan.demanded)),
             *(_visible(plan) if plan.effects else ()),
             section("What to add", *(_card(k, item) for k, item in enumerate(reached, 1))),
             _confusion(plan) if plan.effects else None,
@@ -157,8 +161,9 @@ def _card(number: int, item: Suggestion) -> Panel:
         for pose in (() if item.poses is None else item.poses)
     ]  # fmt: skip
     gains = Items([gain_words(gain) for gain in item.reached])
+    demand = None if item.demand is None else Line(item.demand.words, "dim")
     table = TextTable(heads, poses) if poses else None
-    return Panel(f"{number}. {item.words}", present(gains, table), "card")
+    return Panel(f"{number}. {item.words}", present(gains, table, demand), "card")
 
 
 def _confusion(plan: Plan) -> Panel | None:

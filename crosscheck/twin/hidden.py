@@ -8,12 +8,13 @@ import json
 import math
 import textwrap
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.data import Sigma
@@ -69,6 +70,7 @@ def choose(
     count: int | None = None,
     tensions: bool = False,
     lacking: Mapping[str, str] | None = None,
+    least: int = 0,
 ) -> list[Term]:
     """Draw the effects of a twin.
 
@@ -82,6 +84,7 @@ def choose(
         tensions: whether tensions are recorded: then their scale may be hidden too, if ``given``
             and ``count`` are not given. All else is drawn as without tensions.
         lacking: data needed by effects that the commands do not have, in words.
+        least: of the number that is drawn.
 
     Raises:
         InputError: something else than effects.
@@ -96,7 +99,7 @@ def choose(
         sized = {one.name: Term(one.layout, one.vector) for one in terms if isinstance(one, Term)}
         names = [one.name if isinstance(one, Term) else class_of(one).name for one in terms]
     else:
-        names = _drawn(robot, random, count)
+        names = _drawn(robot, random, count, least)
         if want := _wanted(names, lacking):
             raise CrosscheckError(
                 f"the effects that this seed hides need {want}; expected commands that have them, "
@@ -131,12 +134,28 @@ def _wanted(names: Sequence[str], lacking: Mapping[str, str]) -> str:
     return " and ".join(words for need, words in lacking.items() if need in needs)
 
 
-def _drawn(robot: Robot, random: Generator, count: int | None) -> list[str]:
+def others(
+    robot: Robot, random: Generator, hidden: Sequence[Term], lacking: Mapping[str, str]
+) -> Iterator[Term]:
+    """Effects in place of those that would not show, in an order of the seed's."""
+    known = _known(robot)
+    for k in random.permutation(len(known)):
+        name = known[k]
+        if not _wanted([name], lacking) and all(name != one.name for one in hidden):
+            yield _with_numbers(layout_of(effect_named(name), robot), robot, random)
+
+
+def _known(robot: Robot) -> list[str]:
+    """Names of the effects that may be drawn."""
     without = {_OF_TENSIONS, *CONTAINED}
     without |= set() if _room_for_sheaves(robot) else {"pulley_radius"}
-    known = [name for name in TRUE_EFFECTS if name not in without]
+    return [name for name in TRUE_EFFECTS if name not in without]
+
+
+def _drawn(robot: Robot, random: Generator, count: int | None, least: int) -> list[str]:
+    known = _known(robot)
     if count is None:
-        count = int(random.choice(len(_SHARES), p=_SHARES))
+        count = max(int(random.choice(len(_SHARES), p=_SHARES)), least)
     if count > len(known):
         raise CrosscheckError(f"{counted(count, 'effect')}: expected at most {len(known)}")
     return [known[i] for i in random.choice(len(known), size=count, replace=False)]
@@ -200,13 +219,17 @@ class Moves:
     rms: float
 
     @classmethod
-    def of(cls, truth: Truth, plain: Truth, sigma: Sigma) -> Moves:
-        """The change from the plain truth to another, at the rows where both are at rest."""
+    def of(cls, truth: Truth, plain: Truth, sigma: Sigma, turns: NDArray[np.bool_]) -> Moves:
+        """The change from the plain truth to another, at the rows where both are at rest.
+
+        ``turns`` (3,) says about which axes the orientation is read.
+        """
         rows = truth.at_rest & plain.at_rest
         a = np.concatenate([truth.position, truth.quat_wxyz], axis=1)[rows]
         b = np.concatenate([plain.position, plain.quat_wxyz], axis=1)[rows]
         assert sigma.position_m is not None and sigma.orientation_rad is not None
         change = pose_difference(a, b) / np.repeat([sigma.position_m, sigma.orientation_rad], 3)
+        change = change[:, np.append(np.ones(3, dtype=bool), turns)]
         if sigma.tension_N is not None:
             pull = (truth.tension_readings - plain.tension_readings)[rows] / sigma.tension_N
             change = np.concatenate([change, pull], axis=1)

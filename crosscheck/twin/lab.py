@@ -17,9 +17,17 @@ from crosscheck.twin.hidden import Moves, times
 from crosscheck.twin.measure import Truth, measure
 from crosscheck.twin.own import simulated, with_laws
 from seecr.commands import Loads
+from seecr.description.joints import locked, motion_columns, pose_of_values
 from seecr.description.robot import Robot
 from seecr.effects import Effect, Term
-from seecr.pose import Array, pose_add, pose_difference, quat_from_rotvec, quat_multiply
+from seecr.pose import (
+    Array,
+    pose_add,
+    pose_difference,
+    quat_from_rotvec,
+    quat_multiply,
+    rxyz_from_quat,
+)
 
 # Commands as a person would measure: sweeps to and fro, and a tilted loop, scaled to a robot.
 
@@ -120,8 +128,6 @@ def onto_joints(robot: Robot, poses: Array) -> Array:
     """The poses (n, 7), or for a robot on joints the nearest that one Gauss-Newton step gives."""
     if not robot.joints:
         return poses
-    from seecr.description.joints import motion_columns, pose_of_values
-
     start, screws = pose_of_values(robot, np.zeros((1, len(robot.joints))))
     columns = motion_columns(screws, start[:, :3])[0]
     values = pose_difference(poses, start) @ np.linalg.pinv(columns).T
@@ -134,6 +140,17 @@ def _clock(counts: list[int]) -> Array:
         times.append(now + _BETWEEN_ROWS_S * np.arange(count))
         now = times[-1][-1] + _BETWEEN_RUNS_S
     return np.concatenate(times)
+
+
+def turning(robot: Robot) -> NDArray[np.bool_]:
+    """(3,) about which axes of the base frame a platform's orientation is read: where it can turn.
+
+    All three of a platform that turns about another axis, or is turned at home: its angles about
+    the base frame's are not those of its joints.
+    """
+    free = ~locked(robot)[3:]
+    turned = bool(np.abs(robot.reference_pose[4:]).max() > 0.0)
+    return np.ones(3, dtype=bool) if free.any() and (turned or free.sum() > 1) else free
 
 
 # Noise of a tracker, relative to the mean cable length (30 micrometres on a DemoBot), and in angle.
@@ -194,6 +211,20 @@ class Measured:
     sigma: Sigma
     alone: list[tuple[Term, Truth]]
     at_rest: NDArray[np.bool_]
+    turns: NDArray[np.bool_]
+
+    def moves(self, truth: Truth) -> Moves:
+        """How the readings of a truth differ from those without effects."""
+        return Moves.of(truth, self.plain, self.sigma, self.turns)
+
+    def unseen(self, again: bool) -> set[str]:
+        """The effects that move no reading clearly above its noise.
+
+        Along other commands than a lab's own (``again``) those that move none above it at all: as
+        long as anything shows, it is the robot that was measured before.
+        """
+        least = 1.0 if again else _VISIBLE
+        return {one.name for one, truth in self.alone if not self.moves(truth).max > least}
 
 
 def random_of(
@@ -270,7 +301,7 @@ def rest_of(
         truth = _together(lab, case, fine, plain)
         at_rest = truth.at_rest & plain.at_rest
         if _mostly(at_rest):
-            return Measured(case, plain, truth, sigma, fine, at_rest)
+            return Measured(case, plain, truth, sigma, fine, at_rest, turning(lab.robot))
     where = "the twin's commands, however close to the reference pose"
     if len(cases) == 1:
         where = f"the commands of {cases[0].path}"
@@ -319,15 +350,15 @@ def _made_visible(
     What counts is how poses move, also if tensions are read, so that these change nothing; unless
     the effect moves only tensions.
     """
-    best, of_poses = None, replace(sigma, tension_N=None)
+    best, of_poses, turns = None, replace(sigma, tension_N=None), turning(lab.robot)
     for factor in enlarged:
         one = times(hidden, factor)
         truth = lab.measure(case, [one.effect()], "with effects")
         if not _mostly(truth.at_rest & plain.at_rest):
             break
         best = one, truth
-        moves = Moves.of(truth, plain, of_poses)
-        if (moves if moves.max > 0.0 else Moves.of(truth, plain, sigma)).max > _VISIBLE:
+        moves = Moves.of(truth, plain, of_poses, turns)
+        if (moves if moves.max > 0.0 else Moves.of(truth, plain, sigma, turns)).max > _VISIBLE:
             break
     return best
 
@@ -362,6 +393,8 @@ def read_of(made: Measured, random: np.random.Generator) -> Measurements:
     anew: dict[str, Any] = dict.fromkeys(
         ("angles_rad", "tensions", "position_mask", "angle_mask", "tension_mask", "line")
     )
+    if not made.turns.all():
+        anew["angles_rad"] = np.where(stops & made.turns, rxyz_from_quat(quat), np.nan)
     if sigma.tension_N is not None:
         pulls = truth.tension_readings
         pulls = pulls + sigma.tension_N * random.standard_normal(pulls.shape)
@@ -370,8 +403,8 @@ def read_of(made: Measured, random: np.random.Generator) -> Measurements:
         case,
         path=Path("measured.csv"),
         position=np.where(stops, truth.position + sigma.position_m * noise[:, :3], np.nan),
-        quat_wxyz=np.where(stops, quat, np.nan),
-        sigma=sigma,
+        quat_wxyz=np.where(stops, quat, np.nan) if made.turns.all() else None,
+        sigma=sigma if made.turns.any() else replace(sigma, orientation_rad=None),
         unused_columns=(),
         notes=(),
         **anew,

@@ -7,18 +7,20 @@ measured, and ``answer.sealed`` what the robot really had.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from crosscheck.errors import CrosscheckError
 from crosscheck.given import GivenRobot, check_case, copy_robot, file_of, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import GivenCommands, commands_of
 from crosscheck.measurements.write import write_measurements
-from crosscheck.twin.hidden import NAME, Answer, GivenHidden, Moves, choose, seal, values_of
+from crosscheck.twin.hidden import NAME, Answer, GivenHidden, choose, others, seal, values_of
 from crosscheck.twin.lab import (
     EXTENTS,
     Lab,
@@ -41,6 +43,9 @@ from seecr.effects import Term
 from seecr.files import write_text
 from seecr.folders import staged
 from seecr.result import Record, Result
+
+# Poses that show one effect in four would be refused in three of a hundred seeds.
+_TRIES = 12
 
 FILES = ("robot.xml", "measured.csv", "measured.toml", NAME)
 """The files of a case's folder."""
@@ -101,6 +106,7 @@ def make_twin(
     points: int = 18,
     poses: GivenCommands | None = None,
     sigma: Sigma | None = None,
+    maybe_none: bool = False,
     progress: Progress | None = None,
 ) -> Twin:
     """Measure a robot with undisclosed effects.
@@ -110,7 +116,7 @@ def make_twin(
         seed: of effects, their sizes and the noise.
         effects: the effects, by names or classes, whose sizes are drawn, or with values; None lets
             the seed choose, ``()`` hides none. Effects of one's own act by their own law.
-        n_effects: how many the seed chooses; None lets it choose that too.
+        n_effects: how many the seed chooses; None lets it choose that too, one or two.
         out: folder for the case; None writes nothing.
         tensions: record tensions too.
         points: of each sweep; 18 make 144 rows.
@@ -118,14 +124,16 @@ def make_twin(
             file. If some rows have readings, those without are way points; a list of commands has
             none. With the same seed and noise it is the same robot as along the sweeps.
         sigma: noise; kinds that are not stated are those of a good tracker.
+        maybe_none: whether the seed may also hide nothing, or what these poses hardly show. Else an
+            effect that moves no reading clearly above its noise is exchanged for the seed's next.
         progress: called with the number of rows done since the last call, and what is going on.
 
     Returns:
         the measurements, and what was hidden in them.
 
     Raises:
-        CrosscheckError: an effect that needs what the commands lack, or a robot that MuJoCo cannot
-            bring to rest.
+        CrosscheckError: an effect that needs what the commands lack, a robot that MuJoCo cannot
+            bring to rest, or poses that show no effect.
         InputFileError: poses that cannot be read, or files in ``out`` that are not from an older
             twin.
         InputError: a robot without a file, or with numbers other than its file's.
@@ -142,15 +150,29 @@ def make_twin(
     stated = sigma or (Sigma() if given is None else given.sigma)
     tensions = tensions or stated.tension_N is not None
     lacking = {} if given is None else lacking_in(given)
-    hidden = choose(robot, random_of(seed, 0), effects, n_effects, tensions, lacking)
+    draws = effects is None and not maybe_none
+    random = random_of(seed, 0)
+    hidden = choose(robot, random, effects, n_effects, tensions, lacking, least=int(draws))
     cases = [given] if given is not None else [sweeps(robot, points, e, seed) for e in EXTENTS]
     tell = progress or (lambda rows, now: None)
     commanded = () if given is None else key_of(given)
     lab = Lab(robot, seed, stated, tensions, tell, commanded)
-    if given is None:
-        made = rest_of(lab, cases, hidden)
-    else:
-        made = rest_of(lab, cases, sized(lab, points, hidden), enlarged=(1.0,))
+    spare = islice(others(robot, random_of(seed, 4), hidden, lacking), _TRIES)
+    while True:
+        if given is None:
+            made = rest_of(lab, cases, hidden)
+        else:
+            made = rest_of(lab, cases, sized(lab, points, hidden), enlarged=(1.0,))
+        unseen = made.unseen(given is not None) if draws else set()
+        if not unseen:
+            break
+        kept = [one for one in hidden if one.name not in unseen]
+        hidden = [*kept, *islice(spare, len(unseen))]
+        if len(hidden) < len(kept) + len(unseen):
+            raise CrosscheckError(
+                f"{robot.source}: these poses show too few effects "
+                "clearly above the noise; expected poses further apart, less noise, or --maybe-none"
+            )
     measured = read_of(made, random_of(seed, 2, commanded))
     twin = Twin(
         robot=robot,
@@ -159,7 +181,7 @@ def make_twin(
         truth=made.truth,
         kept=made.at_rest,
         hidden=tuple(Term(one.layout, one.vector) for one, _ in made.alone),
-        answer=_answer(made, robot, seed),
+        answer=_answer(made, robot, seed, measured.sigma),
         notes=(*robot.notes, *(() if given is None else given.notes)),
     )
     if out is not None:
@@ -167,18 +189,16 @@ def make_twin(
     return twin
 
 
-def _answer(made: Measured, robot: Robot, seed: int) -> Answer:
+def _answer(made: Measured, robot: Robot, seed: int, sigma: Sigma) -> Answer:
     import mujoco
 
     return Answer(
         robot=robot.name,
         seed=seed,
         values={one.name: values_of(one) for one, _ in made.alone},
-        moves_over_noise={
-            one.name: Moves.of(truth, made.plain, made.sigma) for one, truth in made.alone
-        },
-        all_move_over_noise=Moves.of(made.truth, made.plain, made.sigma),
-        sigma={kind: value for kind, value in asdict(made.sigma).items() if value is not None},
+        moves_over_noise={one.name: made.moves(truth) for one, truth in made.alone},
+        all_move_over_noise=made.moves(made.truth),
+        sigma=sigma.stated,
         poses=int(np.sum(made.at_rest)),
         truth=_truth(f"MuJoCo {mujoco.__version__}", [one.name for one, _ in made.alone]),
     )

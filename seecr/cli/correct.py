@@ -23,18 +23,22 @@ _SEEN = 1e-6
 @options.command(
     "seecr correct robot.xml poses.csv --model model.toml --out corrected",
     "seecr correct robot.xml poses.csv --lowest 1 --highest 50 --aim middle",
+    "seecr correct robot.xml --grid 0.2:0.6:9 0.1:0.4:7 0.15 --model model.toml --out table",
     "seecr sweep robot.xml corrected/corrected.csv --model model.toml",
     cls=options.NumbersCommand,
 )
 @options.robot
-@click.argument("poses", type=options.FILE, metavar="POSES.csv")
+@click.argument("poses", type=options.FILE, metavar="[POSES.csv]", required=False)
+@options.option("--grid X Y Z", "Each FIRST:LAST:COUNT or one number [m]; z varies fastest.")
+@options.turned("--grid")
 @options.limits
 @options.option(
-    "--aim minimum|middle|N,N,...",
+    "--aim safe|minimum|middle|N,N,...",
     "Where tensions should be within their limits, or the wanted tensions: one, or one per cable. "
+    "Safe ones are the smallest that the model, as uncertain as it is, keeps within the limits. "
     "The nearest ones that balance are taken: with the middle Pott's closed form, wherever that "
     "is within the limits.",
-    default="minimum",
+    default="safe",
 )
 @options.option(
     "--prefer [pose|position]", "What to keep of a pose that cannot be held.", default="pose"
@@ -46,17 +50,23 @@ _SEEN = 1e-6
 @options.out("seecr-correction")
 @options.as_json
 def command(
-    robot: Path, poses: Path, cable: str | None, model: Path | None, lowest: float,
+    robot: Path, poses: Path | None, cable: str | None, model: Path | None, lowest: float,
     highest: float | None, aim: str, prefer: str, as_read: bool, out: Path, as_json: bool,
+    **ways: Any,
 ) -> int:  # fmt: skip
-    """Find the commands that bring the platform to rest at the poses of a file.
+    """Find the commands that bring the platform to rest at the poses of a file or a grid.
 
     ROBOT is an MJCF file or the name of a shipped robot, POSES.csv a list of commands: the wanted
     poses. Elasticity and all effects of the model are taken into account; tensions stay within the
     limits. A pose that cannot be held is replaced by the nearest one that can (without --highest,
     the nearest of those that strain no cable by more than 5 %), and the program says which cables
-    would have to push, or pull more than allowed. If the model has a covariance,
-    correction.json gives for each row the probability that its tensions stay within the limits.
+    would have to push, or pull more than allowed. If the model has a covariance, tensions keep a
+    distance from the limits, so that they stay within them with a probability of 0.99 wherever the
+    balance allows it, and correction.json gives that probability for each row.
+
+    With --grid, table.csv is a look-up table for a controller, too: x_m, y_m, z_m, and what to
+    command there, length_1_m ... (told lengths, counted as the plain model counts; empty without an
+    answer), and reached, 1 or 0. Each pose of it is reached from the reference pose.
 
     If POSES.csv states positions alone and the robot has fewer cables than degrees of freedom, it
     may turn as the balance demands: positions are reached in whatever orientation holds them.
@@ -79,18 +89,17 @@ def command(
     """  # fmt: skip
     from seecr import InputFileError, correct, kept_chance
     from seecr.cli.arguments import model_at, notes_of, robot_at
-    from seecr.columns.commands import read_commands
     from seecr.files import json_text, with_toml, write_texts
     from seecr.folders import check_ours, staged
     from seecr.show.batch_words import chance_lines, turned_words
-    from seecr.show.files import corrected_csv, corrected_toml
+    from seecr.show.files import corrected_csv, corrected_toml, lookup_csv
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
-    wanted = read_commands(poses, machine)
+    wanted = _wanted(machine, poses, **ways)
     if wanted.commands.lengths is not None:
         raise InputFileError.at(
-            poses,
+            poses or Path("--grid"),
             "contains rest lengths; expected the wanted poses, such as cmd_x_m cmd_y_m cmd_z_m: "
             "lengths are what correct computes",
         )
@@ -99,7 +108,7 @@ def command(
     turns = wanted.any_orientation and machine.n_cables < machine.n_dof
     limits = float("inf") if highest is None else highest
     near = _aim(aim, machine.n_cables)
-    commands_of_it = ("corrected.csv", "corrected.toml")
+    commands_of_it = ("corrected.csv", "corrected.toml", "table.csv")
     made = options.made_by(machine.source, poses, model)
     where: dict[str, Any] = {"read": with_toml(poses), "made": made}
     with staged(out, names=["correction.json"], sometimes=commands_of_it, **where) as folder:
@@ -124,8 +133,10 @@ def command(
         text = json_text({**told_of_it, **found.as_json(kept)})
         files = {"correction.json": text + "\n"}
         if found.found.any():  # a list without commands is none that anything reads
-            texts = corrected_csv(found, wanted), corrected_toml(wanted)
-            files |= dict(zip(commands_of_it, texts, strict=True))
+            texts = [corrected_csv(found, wanted), corrected_toml(wanted)]
+            if poses is None:
+                texts.append(lookup_csv(found))
+            files |= dict(zip(commands_of_it, texts, strict=False))
         write_texts({folder / name: text for name, text in files.items()})
     then = mapping(machine, robot, cable, own)  # where there is something to hold
     if found.found.any():
@@ -137,13 +148,29 @@ def command(
     return status
 
 
+def _wanted(
+    robot: Robot, poses: Path | None, grid: tuple[str, ...] | None, turned: tuple[float, ...] | None
+) -> CommandFile:
+    """The wanted poses of a file or of a grid; each of a grid is a run of its own."""
+    import numpy as np
+
+    from seecr.cli.arguments import commands_of
+    from seecr.columns.commands import CommandFile, read_commands
+
+    if poses is not None and grid is None and turned is None:
+        return read_commands(poses, robot)
+    found, _more, notes, _wanted, _runs = commands_of(robot, poses, None, None, grid, turned)
+    each = np.arange(len(found))
+    return CommandFile(replace(found, run=each), None, tuple(map(str, each)), notes)
+
+
 def _aim(text: str, cables: int) -> str | list[float] | float:
     """The name of an aim, or tensions [N]."""
     from math import isfinite
 
     from seecr import InputError
 
-    if text in ("minimum", "middle"):
+    if text in ("safe", "minimum", "middle"):
         return text
     try:
         tensions = [float(part) for part in text.split(",")]
@@ -151,7 +178,7 @@ def _aim(text: str, cables: int) -> str | list[float] | float:
         tensions = []
     if len(tensions) not in (1, cables) or not all(map(isfinite, tensions)):
         raise InputError(
-            f"--aim {text}: expected minimum, middle, or tensions [N]: one, or {cables} with "
+            f"--aim {text}: expected safe, minimum, middle, or tensions [N]: one, or {cables} with "
             "commas between, one per cable"
         )
     return tensions if len(tensions) > 1 else tensions[0]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,20 +21,25 @@ from seecr.inverse.in_place import poses_in_place
 from seecr.inverse.lengths import REACHED, commanded_lengths, lengths_with_history
 from seecr.inverse.nearest import Nearest, nearest
 from seecr.inverse.nearest_problem import NearestProblem
+from seecr.inverse.safe import narrowed, safe_margins
 from seecr.pose import Array, changes_between
 from seecr.prediction.experiment import Experiment, Prediction, effects_of
+from seecr.prediction.model import GivenEffects, Model, model_given
 from seecr.result import COORDINATES, MOTION, Record, Result, named, rows_of
 from seecr.statics.solution import Solution
 from seecr.statics.starts import Commanded, commands_from
 from seecr.statics.tables import Tables, assemble, spanless, take
 from seecr.tensions.balance import bends, bridged_lengths, is_straight, least_of_heavy
-from seecr.tensions.distribution import tension_limits, wanted_tensions, why_not_held, without_span
+from seecr.tensions.distribution import (
+    SAFE,
+    tension_limits,
+    wanted_tensions,
+    why_not_held,
+    without_span,
+)
 from seecr.tensions.max_margin import balances, counted_balance, holds_tightly
 from seecr.tensions.rest_lengths import Held, hold, holds_stably
 from seecr.units import millimetres, without_rounding
-
-if TYPE_CHECKING:
-    from seecr.prediction.model import GivenEffects
 
 PREFERENCES = ("pose", "position")
 """What may change at a pose that cannot be held: position and orientation, or the orientation
@@ -242,7 +248,7 @@ def correct(
     effects: GivenEffects = (),
     lowest: ArrayLike = 0.0,
     highest: ArrayLike = np.inf,
-    aim: str | ArrayLike = "minimum",
+    aim: str | ArrayLike = SAFE,
     prefer: str = "pose",
     any_orientation: bool = False,
 ) -> Correction:
@@ -264,7 +270,11 @@ def correct(
         lowest: (m,) or one [N], not negative. A cable with zero tension is made a little longer
             than its span.
         highest: (m,) or one [N]; infinite for none.
-        aim: "minimum", "middle" (of the limits), or tensions (m,) or (n, m) [N].
+        aim: "safe", "minimum", "middle" (of the limits), or tensions (m,) or (n, m) [N]. The safe
+            ones are the smallest that, as uncertain as the model is, stay within the limits with a
+            probability of 0.99, and with its hysteresis whichever way a pose is reached; as near to
+            that as the balance allows. Without a model that keeps its covariance they are the
+            smallest.
         prefer: what is nearest to a pose that cannot be held. "pose" minimises
             position^2 + (length x rotation)^2; "position" changes only the orientation, if that
             suffices.
@@ -313,11 +323,15 @@ def _search_of(
         raise InputError("correct needs wanted poses (n, 7); got lengths")
     low, high = tension_limits(robot, lowest, highest)
     # an aim is of the line, as limits are
-    target = robot.falls * wanted_tensions(aim, low / robot.falls, high / robot.falls)
+    wanted = wanted_tensions(aim, low / robot.falls, high / robot.falls, also=(SAFE,))
+    target = robot.falls * wanted
     if target.ndim == 2 and len(target) != len(given):
         raise InputError(f"aim must have {counted(len(given), 'row')}, got {len(target)}")
     limits = _Limits(np.broadcast_to(target, (len(given), robot.n_cables)), low, high)
-    return _Search(robot, given, effects_of(effects, robot), limits)
+    model = model_given(effects, robot) if isinstance(effects, Model | str | Path) else None
+    safe = model if isinstance(aim, str) and aim == SAFE else None
+    acting = effects_of(effects if model is None else model, robot)
+    return _Search(robot, given, acting, limits, safe)
 
 
 @dataclass(frozen=True, eq=False)
@@ -353,6 +367,7 @@ class _Search:
     given: Commands
     effects: Sequence[Effect]
     limits: _Limits
+    safe: Model | None = None
 
     def run(self, fix_position: bool) -> Correction:
         held, tables = self._held(self.given)
@@ -369,6 +384,13 @@ class _Search:
         there = mixed._held(commands)[0] if len(lost) else held
         found &= there.fine
         lengths, prediction = mixed._lengths(commands, there)
+        if self.safe is not None:
+            told = replace(commands, lengths=lengths, told=True)
+            margins = safe_margins(self.robot, told, self.safe, prediction)
+            if margins is not None:
+                mixed = mixed._within(commands, margins, held.fine & found)
+                there = mixed._held(commands)[0]
+                lengths, prediction = mixed._lengths(commands, there)
         # beside its exit point a cable could pull any way, but there is none to wind in
         found &= lengths.min(axis=1) > 0.0
         lengths[~found] = np.nan
@@ -379,6 +401,12 @@ class _Search:
             self._why_not(lost, tables),
             _STRAIN if np.isinf(self.limits.high).any() else None,
         )  # fmt: skip
+
+    def _within(self, commands: Commands, margins: Array, rows: NDArray[np.bool_]) -> _Search:
+        """The same with limits that are narrower by margins (n, m) [N], at some rows (n,)."""
+        now, tables = self.limits, self._tables(commands)
+        low, high = narrowed(tables, now.aim, (now.low, now.high), margins, rows)
+        return replace(self, limits=replace(now, low=low, high=high))
 
     def margins_in_place(self, thorough: bool) -> Array:
         """(n,) [N] margins of positions; minus infinity if they are not held or not stable."""

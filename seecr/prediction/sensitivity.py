@@ -17,13 +17,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.arguments import check_kind, numbers
 from seecr.compiled.columns import RADIUS, STRAIN, WEIGHT
 from seecr.compiled.rates import wrench_by_ends_batch
+from seecr.counted import counted
 from seecr.description.joints import motion_columns
 from seecr.effects.base import Effect, Layout, Readings
 from seecr.effects.edits import is_built_in
 from seecr.effects.setup import QUANTITIES, History, Setup
 from seecr.effects.terms import Term, Terms
+from seecr.errors import InputError
 from seecr.parallel import run_parts
 from seecr.pose import Array, changes_between, moved_by
 from seecr.prediction.experiment import Experiment, Prediction, read, senses
@@ -220,10 +223,19 @@ def sensitivities(
     Returns:
         (n, 6 + m, p): position [m], rotation vector [rad] and tensions [N], by each parameter.
 
+    Raises:
+        InputError: other arguments, or a prediction for other commands.
+
     Example:
         ``seecr.sensitivities(experiment, terms, experiment.predict(terms.effects))``
     """
-    wanted = list(columns) if len(columns) else list(range(len(terms)))
+    check_kind(experiment, Experiment, "experiment", "of a robot and commands")
+    check_kind(terms, Terms, "terms", "of effects with values")
+    check_kind(at, Prediction, "at", "as Experiment.predict returns it")
+    if len(at.tables) != len(experiment.commands):
+        rows = counted(len(experiment.commands), "command")
+        raise InputError(f"at: expected a prediction for {rows}, got {len(at.tables)}")
+    wanted = _indices(columns, len(terms))
     out = np.zeros((*_shape(at), len(wanted)))
     by_wrench = _ByWrench(experiment, at, terms)
     if at.has_history and not frozen:
@@ -244,6 +256,16 @@ def sensitivities(
     for (term, k), c in todo.items():
         out[..., c] = by_wrench.column(shifted(terms, term, k))
     return out
+
+
+def _indices(columns: Sequence[int], count: int) -> list[int]:
+    """Indices of parameters, below their count; all of them where none is named."""
+    given = numbers(columns, "columns")
+    if given.ndim != 1 or np.any((given != np.round(given)) | (given < 0) | (given >= count)):
+        raise InputError(
+            f"columns: expected indices of {counted(count, 'parameter')}, from 0, got {columns!r}"
+        )
+    return given.astype(int).tolist() or list(range(count))
 
 
 def _together(places: list[int]) -> slice | list[int]:

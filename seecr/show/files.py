@@ -192,6 +192,18 @@ def corrected_csv(found: Correction, wanted: CommandFile) -> str:
     return table_text({name: [one[i] for i in kept] for name, one in columns.items()})
 
 
+def lookup_csv(found: Correction) -> str:
+    """The look-up table of a controller: each position of a grid, and the lengths to command."""
+    columns: dict[str, Sequence[object] | Array] = dict(
+        zip(("x_m", "y_m", "z_m"), found.wanted.T[:3], strict=True)
+    )
+    columns |= _named(
+        "length_{}_m", [str(k + 1) for k in range(found.lengths.shape[1])], found.lengths
+    )
+    columns["reached"] = found.reached.astype(int).tolist()
+    return table_text(columns)
+
+
 def corrected_toml(wanted: CommandFile) -> str:
     """The TOML that states how the lengths are meant."""
     return toml_beside(True, wanted.commands)

@@ -35,6 +35,7 @@ from seecr.result import COORDINATES, Record, Result, named, rows_of
 from seecr.statics import batch
 from seecr.statics.starts import start_of
 from seecr.statics.tables import Tables, by_row, spanless, take
+from seecr.statics.verification import Verification, verification_of
 from seecr.units import joules, millimetres
 
 # The platform's mass matrix in the coordinates of its stiffness.
@@ -275,6 +276,20 @@ class Solution(Result):
     def frequencies(self) -> Array:
         """Frequencies of small vibrations, (n, d) [Hz], in ascending order; see :attr:`modes`."""
         return self.modes[0]
+
+    def verify(self) -> Verification:
+        """Compute residual and stability again, from poses, points, lengths and loads alone.
+
+        In plain NumPy, which shares no code with the solver. Straight cables of any robot can be
+        verified, also with points, lengths, laws and loads that effects edited; rows with pulleys,
+        sag, friction or the like are named.
+
+        Example:
+            >>> found = seecr.solve("demobot_cogiro", [0.4, 0.25, 0.15, 1, 0, 0, 0])
+            >>> found.verify().holds.all()
+            np.True_
+        """
+        return verification_of(self)
 
     def rows(self, index: ArrayLike) -> Solution:
         """Some rows, by index or by a mask (n,)."""

@@ -20,6 +20,8 @@ _BALANCED = 1e-9
 _PART = 1e-2
 AIMS = ("minimum", "middle")
 """Names of wanted tensions: as small as possible, or the middle of the limits."""
+SAFE = "safe"
+"""The smallest ones that an uncertain model keeps within limits; see :mod:`seecr.inverse.safe`."""
 
 
 def tension_limits(robot: Robot, lowest: ArrayLike, highest: ArrayLike) -> tuple[Array, Array]:
@@ -47,17 +49,22 @@ def tension_limits(robot: Robot, lowest: ArrayLike, highest: ArrayLike) -> tuple
     return low * robot.falls, high * robot.falls
 
 
-def wanted_tensions(aim: str | ArrayLike, low: Array, high: Array) -> Array:
+def wanted_tensions(
+    aim: str | ArrayLike, low: Array, high: Array, also: tuple[str, ...] = ()
+) -> Array:
     """The tensions (m,) or (n, m) [N] of an aim.
+
+    Other names of aims, ``also``, begin with the smallest ones.
 
     Raises:
         InputError: an unknown name, a wrong shape, the middle of limits that are not finite, or
             tensions outside the limits.
     """
     if isinstance(aim, str):
-        if aim not in AIMS:
-            raise InputError(f"aim must be one of {', '.join(AIMS)} or tensions [N], got {aim!r}")
-        if aim == "minimum":
+        if aim not in (*also, *AIMS):
+            names = ", ".join((*also, *AIMS))
+            raise InputError(f"aim must be one of {names} or tensions [N], got {aim!r}")
+        if aim != "middle":
             return np.zeros_like(low)
         if not np.all(np.isfinite(high)):
             raise InputError("aim 'middle' needs a highest tension; expected a finite one [N]")

@@ -61,8 +61,8 @@ class Held(ByRow):
 def hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int = _ROUNDS) -> Held:
     """Find rest lengths with which the poses of ``tables`` are in balance.
 
-    Tensions are near ``aim`` (n, m) within limits (m,) [N]. Cables with weight pull at least about
-    what they weigh, unless the pose can only be held with less.
+    Tensions are near ``aim`` (n, m) within limits (m,) or (n, m) [N]. Cables with weight pull at
+    least about what they weigh, unless the pose can only be held with less.
     """
     limits = limits_of(tables, low, high)
     out = _hold(tables, aim, *limits, rounds, rest_for(tables, first_tensions(tables, limits[0])))
@@ -103,7 +103,8 @@ def _from_inside(
     The aim is moved towards those tensions, which hold the pose, as far as necessary.
     """
     least, most = limits
-    start = max_margin_tensions(take(tables, rows), low, most[rows], HOPELESS)
+    lowest = low if low.ndim == 1 else low[rows]
+    start = max_margin_tensions(take(tables, rows), lowest, most[rows], HOPELESS)
     loose = np.flatnonzero(start.loose)
     out.put(rows[loose], Held(start.rest[loose], start.tensions[loose], start.loose[loose]))
     held = ~start.loose & (start.margins >= -_NONE * tables.scale[rows])

@@ -16,9 +16,10 @@ from crosscheck.inference.fit import Data, fit
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import together
 from crosscheck.planning.design import choose_poses, make_plan
-from crosscheck.planning.places import detours, extensions, more_poses, taut_first
+from crosscheck.planning.places import detours, extensions, more_poses
 from crosscheck.planning.planned import MORE_POSES, Adding, Reads, near_slack, planned
 from crosscheck.planning.proposer import NEEDED, telling_apart
+from crosscheck.planning.room import Room, usual_tension
 from crosscheck.planning.visibility import (
     Wanted,
     chosen_poses,
@@ -171,14 +172,26 @@ def test_a_payload_and_tensions_tell_mass_from_stiffness(plan):
         }
 
 
-def test_poses_to_add_are_few_feasible_and_help(robot, plan):
+def test_poses_to_add_are_few_feasible_and_help(robot, commands):
+    commands = commands.rows(np.arange(10))
+    plan = make_plan(robot, commands)
     poses = next(s for s in plan.suggestions if s.kind == "poses")
     assert 0 < len(poses.poses) <= MORE_POSES
     assert len(np.unique(poses.poses, axis=0)) == len(poses.poses)
     assert np.all(feasible(robot, poses.poses))
     assert poses.reached
-    tilt = np.linalg.norm(rotvec_from_quat(poses.poses[:, 3:]), axis=1)
-    assert np.any(tilt > np.radians(5.0))
+    assert np.abs(rotvec_from_quat(poses.poses[:, 3:])).max() < 1e-12  # as planned ones are
+    for asked, data in ((0.1, commands), (0.0, tilted(commands, 0.1))):
+        found = more_poses(make_plan(robot, data, tilt=asked).planned, Room.of(robot, tilt=asked))
+        turned = np.linalg.norm(rotvec_from_quat(found.poses[:, 3:]), axis=1)
+        assert turned.max() == pytest.approx(0.1)
+
+
+def tilted(data, angle):
+    """The same commands, the first one turned about x."""
+    poses = data.command_pose.copy()
+    poses[0, 3:] = np.cos(angle / 2.0), np.sin(angle / 2.0), 0.0, 0.0
+    return replace(data, command_pose=poses)
 
 
 def test_chosen_poses_beat_the_first_ones(plan):
@@ -304,7 +317,7 @@ def test_poses_to_add_are_in_the_box(name):
     plan = make_plan(robot, poses, SIGMA).planned
     free, home = more_poses(plan).poses[:, :3], robot.reference_pose[:3]
     box = np.array([home - [0.03, 0.1, 0.0], home + np.array([0.06, 0.1, 0.05])])
-    (one,) = (o for o in extensions(plan, box=box) if o.kind is Adding.POSES)
+    (one,) = (o for o in extensions(plan, Room.of(robot, box=box)) if o.kind is Adding.POSES)
     there = one.poses[:, :3]
     assert np.all((there >= box[0] - 1e-12) & (there <= box[1] + 1e-12)) and len(there) > 5
     assert np.any((free < box[0]) | (free > box[1]))
@@ -317,7 +330,7 @@ def test_beside_what_is_planned_the_whole_box_is_used():
     poses[:, 0] += np.linspace(-0.02, 0.02, 6)
     home = robot.reference_pose[:3]
     box = home + np.array([[0.1, -0.05, -0.02], [0.2, 0.05, 0.03]])
-    there = more_poses(make_plan(robot, poses, SIGMA).planned, box=box).poses
+    there = more_poses(make_plan(robot, poses, SIGMA).planned, Room.of(robot, box=box)).poses
     assert np.ptp(there[:, 0]) > 0.05 and len(np.unique(there, axis=0)) == len(there)
 
 
@@ -339,7 +352,7 @@ def test_where_cables_are_to_pull_no_chosen_or_proposed_pose_leaves_one_slack(na
     """Half of them did: tensions could hold the platform there, commanded lengths did not."""
     robot = load_robot(model_path(name))
     chosen = choose_poses(robot, 20, limits=(0.01, np.inf))
-    found = make_plan(robot, chosen, limits=(0.01, np.inf))
+    found = make_plan(robot, chosen.rows(np.arange(6)), limits=(0.01, np.inf))
     poses = next(s for s in found.suggestions if s.kind == "poses")
     assert poses.commands is not None
     for commands in (chosen, poses.commands):
@@ -365,9 +378,15 @@ def test_where_cables_are_slack_is_said_if_there_are_no_other_poses() -> None:
     )
     assert said in " ".join(found.notes)
     assert found.as_json()["slack"][0] == {"line": lines[0][0], "cables": list(lines[0][1])}
-    good, loose = np.ones(8, dtype=bool), slack.any(axis=1)
-    pulls = (0.1, np.inf)
-    assert taut_first(found.planned, good, 8 - len(rows), pulls).tolist() == (~loose).tolist()
-    assert taut_first(found.planned, good, 9 - len(rows), pulls).all()
-    # where slack cables are no matter they may tell effects apart
-    assert taut_first(found.planned, good, 8 - len(rows), (0.0, np.inf)).all()
+    loose, good = slack.any(axis=1), np.ones(8, dtype=bool)
+    usual = usual_tension(found.planned)
+
+    def may_run(limits: object, enough: int) -> list[bool]:
+        room = Room.of(robot, limits=limits).around(found.planned.base.prediction.pose)
+        return room.may_run(found.planned, good, usual, enough).tolist()
+
+    # those with slack cables only where there are not enough others, or if they may be
+    taut = solve(robot, high).tensions.min(axis=1) >= 0.1 * usual
+    assert may_run((None, np.inf), int(taut.sum())) == taut.tolist() != (~loose).tolist()
+    assert all(may_run((None, np.inf), 9)) and all(may_run((0.0, np.inf), 1))
+    assert may_run((0.1, np.inf), 9) == (~loose).tolist()

@@ -13,10 +13,10 @@ import pytest
 import crosscheck
 from crosscheck.fit.reasons import Reason, Why
 from crosscheck.measurements.data import Sigma
-from crosscheck.planning.design import box_given, limits_given
 from crosscheck.planning.planned import Adding, kinds_of
 from crosscheck.planning.proposer import Gain, Suggestion
 from crosscheck.planning.result import Sight, Visible, alike, gain_words, signal_words
+from crosscheck.planning.room import box_given, limits_given
 from crosscheck.planning.visibility import Signal
 from crosscheck.planning.write import planned_files, slack_remark
 from seecr.effects import layout_of
@@ -120,6 +120,17 @@ NONE = np.zeros((0, 7))
         (lambda: limits_given((5, 1)), "0 <= lowest <= highest .* got 5 and 1"),
         (lambda: limits_given((np.nan, 1)), "0 <= lowest <= highest .* got nan and 1"),
         (lambda: limits_given((np.inf, np.inf)), "lowest finite, got inf and inf"),
+        (
+            lambda: crosscheck.make_plan(ROBOT, NONE, tilt=-1.0),
+            r"tilt must be an angle .* got -1.0",
+        ),
+        (lambda: crosscheck.make_plan(ROBOT, NONE, tilt="10deg"), "tilt: expected numbers, got"),
+        (lambda: crosscheck.choose_poses(ROBOT, 6, tilt=2.0), "from 0 to pi/2"),
+        (lambda: crosscheck.choose_poses(ROBOT, 6, floor=9.0), "floor must be .* got 9.0"),
+        (
+            lambda: crosscheck.choose_poses(ROBOT, 6, floor=np.nan),
+            "floor holds numbers",
+        ),
         (lambda: crosscheck.choose_poses(ROBOT, 6, box=[[1, 2], [3, 4]]), "box must be"),
         (lambda: crosscheck.choose_poses(ROBOT, 6, limits=5), "limits must be"),
         (lambda: crosscheck.make_plan(ROBOT, NONE), "there are no commands; expected one or more"),
@@ -166,3 +177,15 @@ def test_lines_that_leave_cables_slack_are_remarked_in_the_file_itself() -> None
     item = Suggestion(Adding.POSES, "", (), slack=((), ("a", "b"), (), ("c",)))
     assert slack_remark(item) == "cables are slack at line 4 (a b), line 6 (c)"
     assert slack_remark(Suggestion(Adding.POSES, "", (), slack=((), ()))) == ""
+
+
+def test_what_a_diagnosis_lists_is_not_said_to_be_too_small() -> None:
+    """Both were printed of one effect: "too small compared with the noise", "> 99 %"."""
+    small = Visible(SIGNAL, 15.0, 1.5, 3.0, "", (), ())
+    name = small.name
+    before, after = Sight((small,), {}), Sight((small,), {}, found=(name,))
+    assert "too small compared with the noise" in " ".join(before.lines())
+    assert "0 of 1 effect would be visible" in before.lines()[0]
+    assert after.hidden == () and "1 of 1 effect would be visible" in after.lines()[0]
+    assert not any("too small" in line for line in after.lines())
+    assert after.as_json()["visible"] == [name] and after.as_json()["not_visible"] == []

@@ -11,9 +11,11 @@ from turned import turned
 
 from crosscheck.planning.design import candidate_poses
 from crosscheck.planning.places import box_around, upright
+from crosscheck.planning.room import Room
 from seecr.description.mjcf import load_robot
 
-COGIRO = load_robot("demobot_cogiro")
+# without its floor, which is a height along z
+COGIRO = replace(load_robot("demobot_cogiro"), floor=None)
 
 
 @pytest.mark.parametrize("gravity", [[0, 0, -9.81], [0, 0, 0]])
@@ -43,9 +45,9 @@ def test_a_box_is_inside_the_one_around_it() -> None:
 
 @pytest.mark.parametrize("name", ["demobot_cogiro", "planar_vertical"])
 def test_candidates_of_a_robot_with_z_down_are_those_of_the_same_one_with_z_up(name: str) -> None:
-    robot = load_robot(name)
+    robot = replace(load_robot(name), floor=None)
     other, turn = turned(robot, [np.pi, 0.0, 0.0])
-    own, there = candidate_poses(robot, None), candidate_poses(other, None)
+    own, there = (candidate_poses(Room.of(one)) for one in (robot, other))
     np.testing.assert_allclose(there[:, :3], own[:, :3] @ turn.T, atol=1e-12)
 
 
@@ -55,7 +57,7 @@ def test_candidates_are_as_far_below_and_above_home_whichever_way_that_is(
 ) -> None:
     other, _turn = turned(COGIRO, rotvec)
     heights = [
-        (candidate_poses(robot, None)[:, :3] - robot.reference_pose[:3]) @ robot.up
+        (candidate_poses(Room.of(robot))[:, :3] - robot.reference_pose[:3]) @ robot.up
         for robot in (COGIRO, other)
     ]
     np.testing.assert_allclose(*(np.unique(some.round(9)) for some in heights), atol=1e-9)
@@ -67,5 +69,6 @@ def test_poses_of_robots_on_joints_stay_in_the_box_that_was_asked_for(way: str) 
     planar = load_robot("planar_vertical")
     middle, half = planar.reference_pose[:3], np.array([0.02, 1.0, 0.02])
     box = np.array([middle - half, middle + half])
-    place = candidate_poses(rejointed(planar, way), box)[:, :3]
+    room = Room.of(rejointed(planar, way), box=box, tilt=0.2)
+    place = candidate_poses(room)[:, :3]
     assert len(place) > 30 and np.all((place >= box[0]) & (place <= box[1]))

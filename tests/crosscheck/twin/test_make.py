@@ -9,6 +9,7 @@ import json
 import shlex
 import xml.etree.ElementTree as ElementTree
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -31,7 +32,7 @@ from seecr.errors import InputError, InputFileError
 from seecr.files import json_text
 from seecr.folders import MANIFEST
 from seecr.inverse.correction import correct
-from seecr.pose import pose_difference
+from seecr.pose import pose_difference, rotvec_from_quat
 from seecr.prediction.experiment import Experiment
 
 COGIRO = model_path("demobot_cogiro")
@@ -519,7 +520,7 @@ def test_what_sweeps_enlarge_is_as_large_along_other_commands(monkeypatch):
     poses = np.tile([0.4, 0.25, 0.15, 1.0, 0.0, 0.0, 0.0], (2, 1))
     drawn = make_twin(path, 13, points=4)
     swept = make_twin(path, 13, points=4, sigma=coarse)
-    again = make_twin(path, 13, points=4, sigma=coarse, poses=poses)
+    again = make_twin(path, 13, points=4, sigma=coarse, poses=poses, maybe_none=True)
     factors = [
         float(one.vector[0] / other.vector[0])
         for one, other in zip(swept.hidden, drawn.hidden, strict=True)
@@ -527,3 +528,62 @@ def test_what_sweeps_enlarge_is_as_large_along_other_commands(monkeypatch):
     assert factors == pytest.approx([3.0, 1.0])
     for one, other in zip(again.hidden, swept.hidden, strict=True):
         np.testing.assert_array_equal(one.vector, other.vector)
+
+
+def test_what_is_hidden_shows_at_the_poses() -> None:
+    """Seeds hid what moves "readings by up to 0 times their noise", one in five nothing at all."""
+    path = model_path("planar_vertical")
+    for seed in range(12):
+        twin = make_twin(path, seed, points=3)
+        moves = twin.answer.moves_over_noise
+        assert 1 <= len(moves) <= 2 and min(one.max for one in moves.values()) > 2.0
+        # by the readings themselves, noise included
+        bare = make_twin(path, seed, points=3, effects=())
+        off = twin.measured.position - bare.measured.position
+        seen = np.nanmax(np.abs(off)) / twin.answer.sigma["position_m"]
+        turned = np.nanmax(np.abs(twin.measured.angles_rad - bare.measured.angles_rad))
+        assert max(seen, turned / twin.answer.sigma["orientation_rad"]) > 1.9
+    maybe = [make_twin(path, seed, points=3, maybe_none=True) for seed in range(12)]
+    assert sum(not twin.hidden for twin in maybe) in range(1, 6)
+    # what showed anyway is what it was
+    for seed, twin in enumerate(maybe):
+        if twin.hidden and min(m.max for m in twin.answer.moves_over_noise.values()) > 2.0:
+            assert make_twin(path, seed, points=3).answer.values == twin.answer.values
+
+
+def test_poses_that_show_nothing_are_refused(tmp_path: Path) -> None:
+    robot = load_robot("camera")
+    poses = np.tile(robot.reference_pose, (3, 1))
+    with pytest.raises(CrosscheckError, match="show too few effects clearly above the noise"):
+        make_twin(robot, 1, poses=poses, points=3, sigma=Sigma(1e3))
+    drawn = make_twin(load_robot("demobot_parallel"), 13, points=4).hidden
+    # what does not show at two poses is exchanged, also if sweeps show it
+    near = np.tile([0.4, 0.25, 0.15, 1.0, 0.0, 0.0, 0.0], (2, 1))
+    other = make_twin("demobot_parallel", 13, points=4, poses=near, sigma=Sigma(3e-4, 3e-3))
+    assert min(one.max for one in other.answer.moves_over_noise.values()) > 1.0
+    assert {one.name for one in other.hidden} != {one.name for one in drawn}
+    plain = make_twin(robot, 1, poses=poses, points=3, sigma=Sigma(1e3), maybe_none=True)
+    assert plain.measured.n_rows == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "angles"), [("planar_vertical", [1]), ("camera", []), ("demobot_cogiro", None)]
+)
+def test_a_tracker_reads_angles_about_axes_that_turn(
+    name: str, angles: list[int] | None, tmp_path: Path
+) -> None:
+    """Plates in a plane had readings of noise about axes that their joints lock."""
+    twin = make_twin(model_path(name), 2, points=3, out=tmp_path / "case")
+    read = load_measurements(tmp_path / "case" / "measured.csv", twin.robot)
+    header = (tmp_path / "case" / "measured.csv").read_text().splitlines()[0].split(",")
+    columns = [one for one in header if one.startswith("meas_") and one[5] in "qr"]
+    if angles is None:
+        assert columns == ["meas_qw", "meas_qx", "meas_qy", "meas_qz"]
+        return
+    assert columns == [f"meas_r{'xyz'[k]}_rad" for k in angles]
+    assert read.sigma.orientation_rad == (3.5e-4 if angles else None)
+    if angles:
+        # about y alone the angle is that of the rotation vector
+        true = rotvec_from_quat(twin.truth.quat_wxyz)[twin.kept, 1]
+        off = read.angles_rad[:, 1] - true
+        assert 0.7 < np.std(off) / 3.5e-4 < 1.4

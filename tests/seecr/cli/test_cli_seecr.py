@@ -407,7 +407,7 @@ def test_wanted_tensions_are_an_aim() -> None:
     ]
     assert pulls[0] < 0.8 * pulls[1] and pulls[1] == pytest.approx(pulls[2])
     for wrong in ("most", "1,2", "nan"):
-        expected = "expected minimum, middle, or tensions [N]: one, or 8 with commas"
+        expected = "expected safe, minimum, middle, or tensions [N]: one, or 8 with commas"
         assert f"--aim {wrong}: {expected}" in refused_in_a_line(f"{words} {wrong}")
 
 
