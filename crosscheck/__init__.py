@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from crosscheck.fit.reasons import DiagnosisVerdict
     from crosscheck.importing.case import Imported, import_case
     from crosscheck.importing.choices import ImportChoices
-    from crosscheck.measurements.data import Measurements, Sigma
+    from crosscheck.measurements.arrays import Measurements
+    from crosscheck.measurements.data import Sigma
     from crosscheck.measurements.read import load_commands, load_measurements
     from crosscheck.measurements.write import write_measurements
     from crosscheck.model.fitted import load_diagnosed
@@ -60,7 +61,8 @@ _MODULES = {
     "fit.reasons": ("DiagnosisVerdict",),
     "importing.case": ("Imported", "import_case"),
     "importing.choices": ("ImportChoices",),
-    "measurements.data": ("Measurements", "Sigma"),
+    "measurements.arrays": ("Measurements",),
+    "measurements.data": ("Sigma",),
     "measurements.read": ("load_commands", "load_measurements"),
     "measurements.write": ("write_measurements",),
     "model.fitted": ("load_diagnosed",),

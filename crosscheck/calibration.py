@@ -27,6 +27,7 @@ from crosscheck.inference.catalogue import Catalogue
 from crosscheck.inference.fit import Data, Fit
 from crosscheck.inference.held_out import hold_out
 from crosscheck.inference.search import Search
+from crosscheck.measurements.data import GivenSigma
 from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import calibrated, provenance_of, renewed
@@ -170,19 +171,23 @@ class Calibrated(Result, JointErrors):
 
 
 def made_ready(
-    robot: GivenRobot, data: GivenData, model: GivenModel, names: frozenset[str]
+    robot: GivenRobot,
+    data: GivenData,
+    model: GivenModel,
+    names: frozenset[str],
+    sigma: GivenSigma = None,
 ) -> tuple[Thinned, Prepared, Model, tuple[str, ...]]:
     """What a search begins with.
 
     Args:
-        robot, data, model: as they were given. names: of the effects that may be missing.
+        robot, data, model, sigma: as they were given. names: of the effects that may be missing.
 
     Returns:
         The rows that are searched, these made ready, the model as it stands, and what is said of
         it. A model given as effects alone becomes a new one of the robot with these.
     """
     robot = robot_of(robot)
-    thin = thinned(robot, measurements_of(data, robot))
+    thin = thinned(robot, measurements_of(data, robot, sigma))
     model = opened(model, robot)
     terms, said = model_of(model, robot)
     basis = basis_of(model, robot)
@@ -199,6 +204,7 @@ def calibrate(
     *,
     only: GivenNames = (),
     exclude: GivenNames = (),
+    sigma: GivenSigma = None,
 ) -> Calibrated:
     """Fit every effect that the data can see, with plausible sizes as priors.
 
@@ -210,6 +216,8 @@ def calibrate(
         only: the effects to fit beside the model's own, by their names or classes; by default
             the whole catalogue. Effects of one's own are among them.
         exclude: effects that are not fitted, unless the model has them.
+        sigma: noise of the readings, in place of what the files state: metres, ``"0.1mm"`` or a
+            :class:`crosscheck.Sigma`.
 
     Returns:
         the fit, with the model to save. About 5 s for 144 rows on one core.
@@ -224,7 +232,8 @@ def calibrate(
     """
     # BLAS on several threads takes longer for matrices as narrow as these
     with threadpool_limits(limits=1, user_api="blas"):
-        thin, ready, basis, said = made_ready(robot, data, model, considered(only, exclude))
+        names = considered(only, exclude)
+        thin, ready, basis, said = made_ready(robot, data, model, names, sigma)
         if ready.refusal is not None:
             raise ready.refusal.error(thin.data.path, "nothing was fitted")
         data_ = Data.of(ready.problem, ready.terms)

@@ -1,12 +1,14 @@
-"""Exceptions: each message is for the person who can remedy the cause.
-
-It is one line, or one line for each of several faults of a file.
-"""
+"""Exceptions: each message is one line for each mistake, for the person who can remedy it."""
 
 from __future__ import annotations
 
 import unicodedata
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
+
+# Most mistakes in files that are told at once: more fill a screen, and often have one cause.
+_MOST_TOLD = 20
 
 
 def printable(text: str, most: int | None = None) -> str:
@@ -55,6 +57,8 @@ class MissingPackageError(SeecrError):
 class InputFileError(SeecrError):
     """A user's file that is missing, of another kind, or wrong at some place."""
 
+    _every: list[str]
+
     @classmethod
     def at(
         cls,
@@ -81,3 +85,42 @@ class InputFileError(SeecrError):
             place.append(f"column {column}")
         start = f"{path}: {', '.join(place)}: " if place else f"{path}: "
         return cls(printable(" ".join((start + text).split())))
+
+    @classmethod
+    def together(cls, errors: Iterable[InputFileError]) -> InputFileError:
+        """One error with the lines of several, each once, and how many more there are."""
+        found = (line for one in errors for line in getattr(one, "_every", [str(one)]))
+        every = list(dict.fromkeys(found))
+        more = len(every) - _MOST_TOLD
+        told = [*every[:_MOST_TOLD], *([f"and {more} more"] if more > 0 else [])]
+        error = cls("\n".join(told))
+        error._every = every
+        return error
+
+
+class Faults:
+    """Mistakes in users' files, collected so that all of them are told at once."""
+
+    def __init__(self) -> None:
+        self._found: list[InputFileError] = []
+
+    def add(self, error: InputFileError) -> None:
+        """Note a mistake."""
+        self._found.append(error)
+
+    def of(self, call: Callable[..., Any], *given: Any) -> Any:
+        """What a call returns; None, with the mistake noted, if it found one."""
+        try:
+            return call(*given)
+        except InputFileError as error:
+            self.add(error)
+            return None
+
+    def check(self) -> None:
+        """Raise what was found, if anything.
+
+        Raises:
+            InputFileError: with a line for each mistake.
+        """
+        if self._found:
+            raise InputFileError.together(self._found)

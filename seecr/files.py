@@ -55,6 +55,19 @@ def no_text(data: bytes) -> str:
     return known or ("a binary file" if b"\0" in data else "")
 
 
+def of_sheet(path: Path) -> tuple[Path, str | None]:
+    """The file of ``book.xlsx:sheet`` and its sheet; None for the first one."""
+    name, colon, sheet = str(path).rpartition(":")
+    if colon and name.lower().endswith((".xlsx", ".xlsm")) and not path.exists():
+        return Path(name), sheet
+    return path, None
+
+
+def toml_beside(path: Path) -> Path:
+    """The TOML beside a file of rows; that of a workbook is beside all of its sheets."""
+    return of_sheet(path)[0].with_suffix(".toml")
+
+
 def read_bytes(path: Path, expected: str) -> bytes:
     """The bytes of a file; an error says what was expected.
 
@@ -216,7 +229,7 @@ def check_writable(path: Path) -> None:
 
 def with_toml(path: Path | None) -> list[Path]:
     """A file of commands and the TOML beside it, which is read with it; empty without a file."""
-    return [] if path is None else [path, path.with_suffix(".toml")]
+    return [] if path is None else [of_sheet(path)[0], toml_beside(path)]
 
 
 def json_text(document: Mapping[str, Any], indent: int | None = 1) -> str:
@@ -275,7 +288,7 @@ class Made:
     @classmethod
     def now(cls, command: str, files: Iterable[Path | None]) -> Made:
         """Today's provenance, with files and the TOML beside each; missing ones are left out."""
-        given = [file for file in files if file is not None]
+        given = [of_sheet(file)[0] for file in files if file is not None]
         beside = [file.with_suffix(".toml") for file in given]
         read = [file for file in dict.fromkeys([*given, *beside]) if file.is_file()]
         names = [file.name for file in read]

@@ -15,6 +15,7 @@ from crosscheck.inference.catalogue import Catalogue, candidates
 from crosscheck.inference.fit import TRACKER, Data, Fit, fit, unfitted
 from crosscheck.inference.noise import Noise
 from crosscheck.inference.search import Search
+from crosscheck.measurements.data import GivenSigma
 from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.preparation.prepare import Progress, prepare
 from seecr.arguments import silent
@@ -58,6 +59,7 @@ def add_effect(
     progress: Progress = silent,
     *,
     per: str | None = None,
+    sigma: GivenSigma = None,
 ) -> Addition:
     """Fit an effect to data, jointly with those that the model has.
 
@@ -70,6 +72,8 @@ def add_effect(
         progress: called with what is being done and the fraction that is done.
         per: "file" or "run" gives the effect separate values for each; by default it has them if
             the model says so.
+        sigma: noise of the readings, in place of what the files state: metres, ``"0.1mm"`` or a
+            :class:`crosscheck.Sigma`.
 
     Returns:
         the fit, with the new model and the errors before and after.
@@ -84,7 +88,7 @@ def add_effect(
     """
     robot = robot_of(robot)
     valued, named = _several(name, robot)
-    return _added(robot, data, valued, named, model, progress, per)
+    return _added(robot, data, valued, named, model, progress, per, sigma)
 
 
 def add_effects(
@@ -93,6 +97,8 @@ def add_effects(
     effects: GivenSeveral,
     model: GivenModel = (),
     progress: Progress = silent,
+    *,
+    sigma: GivenSigma = None,
 ) -> Addition:
     """Fit several effects to data at once, starting from the values that they have.
 
@@ -106,6 +112,8 @@ def add_effects(
             diagnosis.
         model: effects of the model, or their file; by default the plain model.
         progress: called with what is being done and the fraction that is done.
+        sigma: noise of the readings, in place of what the files state: metres, ``"0.1mm"`` or a
+            :class:`crosscheck.Sigma`.
 
     Returns:
         the fit, with the new model and the errors before and after.
@@ -120,7 +128,7 @@ def add_effects(
     """
     robot = robot_of(robot)
     valued, named = _several(effects, robot)
-    return _added(robot, data, valued, named, model, progress)
+    return _added(robot, data, valued, named, model, progress, sigma=sigma)
 
 
 def _several(effects: GivenSeveral, robot: Robot) -> tuple[list[Term], list[Layout]]:
@@ -144,9 +152,9 @@ def _several(effects: GivenSeveral, robot: Robot) -> tuple[list[Term], list[Layo
 
 def _added(
     robot: Robot, given: GivenData, valued: Sequence[Term], named: Sequence[Layout],
-    model: GivenModel, progress: Progress, per: str | None = None,
+    model: GivenModel, progress: Progress, per: str | None = None, sigma: GivenSigma = None,
 ) -> Addition:  # fmt: skip
-    data = measurements_of(given, robot)
+    data = measurements_of(given, robot, sigma)
     terms, said = model_of(model, robot)
     names, had = [*(t.name for t in valued), *(one.name for one in named)], terms.names
     if per is not None:

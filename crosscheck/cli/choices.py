@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from seecr.cli import notes
-from seecr.cli.options import FILE, F, fix, option, together
+from seecr.cli.options import FILE, F, columns, fix, option, together
 
 if TYPE_CHECKING:
     from crosscheck import Addition, Calibrated
@@ -38,12 +38,16 @@ robot_and_data = together(
     click.argument("data", type=FILE, nargs=-1, required=True, metavar="DATA.csv..."),
     fix,
 )
-sigma = option(
-    "--sigma KIND=0.1mm",
-    "Noise of a kind of reading (position, orientation, tension) or of the commanded lengths "
-    "(length); may be repeated; overrides [sigma] in the TOML.",
-    name="sigmas",
-    multiple=True,
+# what is said of the files in place of their TOML
+sigma = together(
+    option(
+        "--sigma KIND=0.1mm",
+        "Noise of a kind of reading (position, orientation, tension) or of the commanded lengths "
+        "(length); may be repeated; overrides [sigma] in the TOML.",
+        name="sigmas",
+        multiple=True,
+    ),
+    columns,
 )
 tolerance = option(
     "--tolerance 0.1mm",

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from seecr.cli.following import following, given_with
+from seecr.columns.headers import columns_said
 
 if TYPE_CHECKING:
     from crosscheck import Comparison, Diagnosis
@@ -34,9 +35,10 @@ class Given:
     history: bool = False
 
     def then(self, verb: str, *words: object) -> str:
-        """The line that names a command of crosscheck, with ``--sigma`` as it was given."""
+        """The line that names a command of crosscheck, with ``--sigma`` and ``--columns``."""
         noise = (word for text in self.sigmas for word in ("--sigma", text))
-        return following("crosscheck", verb, *words, *noise)
+        said = ",".join(f"{theirs}={ours}" for theirs, ours in columns_said().items())
+        return following("crosscheck", verb, *words, *noise, *(["--columns", said] * bool(said)))
 
 
 def after_comparison(found: Comparison, given: Given) -> str:

@@ -68,6 +68,7 @@ from seecr.cli.following import following
     options.Number(),
     callback=options.check_finite,
 )
+@options.columns
 @options.out("case")
 @options.as_json
 def command(

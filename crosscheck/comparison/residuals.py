@@ -22,14 +22,16 @@ from crosscheck.fit.residual_noise import as_table, whiteness
 from crosscheck.fit.state import State, contradictions, evaluate
 from crosscheck.fit.words import rms_words
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
-from crosscheck.measurements.data import Names
+from crosscheck.measurements.data import GivenSigma, Names
 from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.preparation.prepare import noise_floor, prepare
 
 _MOST_WORST = 10
 
 
-def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Comparison:
+def compare(
+    robot: GivenRobot, data: GivenData, model: GivenModel = (), *, sigma: GivenSigma = None
+) -> Comparison:
     """Compare a model with measurements; only values that the data leave free are fitted.
 
     All errors are those of all rows. What they depend on, and whether they are noise, is asked
@@ -39,6 +41,8 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
         robot: a robot, or its MJCF file.
         data: its measurements, or their file.
         model: the effects with their values, or their file; by default the plain model.
+        sigma: noise of the readings, in place of what the files state: metres, ``"0.1mm"`` or a
+            :class:`crosscheck.Sigma`.
 
     Returns:
         errors by coordinate, run, pose and region, and whether they are noise.
@@ -50,7 +54,7 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
         ``crosscheck.compare("robot.xml", "measured.csv", "model.toml").rms``
     """
     robot = robot_of(robot)
-    data = measurements_of(data, robot)
+    data = measurements_of(data, robot, sigma)
     terms, said = model_of(model, robot)
     ready = prepare(robot, data, terms, outliers=rows_far_off)
     problem, outliers = ready.problem, ready.far_off

@@ -22,6 +22,7 @@ from crosscheck.inference.fit import Data
 from crosscheck.inference.priors import LIMITED, MOST_OF_IT, WIDTHS
 from crosscheck.inference.search import Search
 from crosscheck.inference.verdict import judged
+from crosscheck.measurements.data import GivenSigma
 from crosscheck.measurements.read import GivenData
 from crosscheck.planning.result import Sight, sight_of
 from crosscheck.preparation.prepare import Prepared, Progress, noise_floor
@@ -42,7 +43,8 @@ def diagnose(
     *,
     only: GivenNames = (),
     exclude: GivenNames = (),
-    tolerance: Tolerance = HALF_THE_NOISE,
+    tolerance: Tolerance | str = HALF_THE_NOISE,
+    sigma: GivenSigma = None,
 ) -> Diagnosis:
     """Find the effects that a model misses.
 
@@ -54,7 +56,10 @@ def diagnose(
         only: the effects that may be missing, by their names or classes, or one; by default the
             whole catalogue. Effects of one's own are among them.
         exclude: effects that are not considered.
-        tolerance: from which size on a remainder beyond noise counts as missing.
+        tolerance: from which size on a remainder beyond noise counts as missing; also a text such
+            as ``"0.1mm"``, whose unit tells the kind of reading.
+        sigma: noise of the readings, in place of what the files state: metres, ``"0.1mm"`` or a
+            :class:`crosscheck.Sigma`.
 
     Returns:
         the verdict, the missing effects, and what to measure next. It takes about 5 s for 144 rows
@@ -68,11 +73,14 @@ def diagnose(
     Example:
         ``crosscheck.diagnose("robot.xml", "measured.csv").missing``
     """
+    if isinstance(tolerance, str):
+        tolerance = Tolerance.parsed([tolerance])
     if not isinstance(tolerance, Tolerance):
         raise InputError(f"tolerance: expected a crosscheck.Tolerance, got {tolerance!r}")
     # BLAS on several threads takes longer for matrices as narrow as these
     with threadpool_limits(limits=1, user_api="blas"):
-        thin, ready, basis, said = made_ready(robot, data, model, considered(only, exclude))
+        names = considered(only, exclude)
+        thin, ready, basis, said = made_ready(robot, data, model, names, sigma)
         notes = (*said, *ready.all_notes)
         found = _diagnosed(ready, notes, progress, tolerance, basis)
         if found.path is None:

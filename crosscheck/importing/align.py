@@ -104,6 +104,22 @@ def off_commands(frames: Frames, position: Array, quat: Array | None, told: Arra
     return notes
 
 
+def unturned(frames: Frames, position: Array, quat: Array | None, told: Array) -> list[str]:
+    """That commands have one orientation while the platform turns: most likely it is not logged."""
+    turned = frames.poses(position, quat)[1]
+    if turned is None or np.ptp(told[:, 3:], axis=0).max() > 0.0:
+        return []
+    turn = rotvec_from_quat(quat_multiply(turned, quat_conjugate(mean_rotation(turned))))
+    rms = float(np.sqrt(np.mean(np.sum(turn**2, axis=1))))
+    if rms <= _TURNED:
+        return []
+    return [
+        f"all commands have one orientation, but the platform turns by {np.degrees(rms):.3g} deg "
+        "(rms) about its mean: is the orientation missing in the log of commands? Add cmd_qw to "
+        "cmd_qz, or cmd_rx_deg to cmd_rz_deg; otherwise these turns count as errors"
+    ]
+
+
 def by_points(names: Sequence[str], there: Array, here: Array) -> Frames:
     """The tracker's frame from points (k, 3) that are known in it and in the base frame.
 

@@ -8,6 +8,7 @@ have the scalar last; Y is up unless chosen otherwise; cells of hidden bodies ar
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,7 +41,7 @@ def read_motive(path: Path) -> Logged:
     """Read an export of Motive.
 
     Raises:
-        InputFileError: another kind of file, rotations other than quaternions, or broken rows.
+        InputFileError: another kind of file, rotations of unknown type, or broken rows.
     """
     rows = FileRows.of(path, _EXPECTED_MOTIVE)
     settings = _settings(rows)
@@ -54,10 +55,12 @@ def read_motive(path: Path) -> Logged:
     block.check_whole()
     _check_count(rows, settings, block)
     time = next((c for c, cell in enumerate(block.labels) if cell.startswith("Time (")), None)
-    if time is None:
+    rate = settings.get("Export Frame Rate", "")
+    if time is None and not re.fullmatch(r"\d*[1-9]\d*(\.\d*)?", rate):
         raise rows.error("expected a column Time (Seconds), got none; export it again", top)
-    t_s = block.numbers([time])[:, 0]
-    block.check_times(t_s, block.labels[time])
+    # a time code is that of day, in frames of a camera: the number of the frame is finer
+    t_s = block.numbers([0])[:, 0] / float(rate) if time is None else block.numbers([time])[:, 0]
+    block.check_times(t_s, block.labels[time or 0])
     factor = _metres(rows, settings)
     bodies, markers = {}, {}
     for (kind, name), columns in _motive_things(labels, block.labels).items():
@@ -139,10 +142,30 @@ def _quaternions(
     if not given:
         return None
     said = settings.get("Rotation Type", "Quaternion")
-    if said.lower() != "quaternion" or len(given) != 4:
-        text = f"expected Rotation Type Quaternion, got {said!r}; export it again with quaternions"
+    if said.lower() == "quaternion" and len(given) == 4:
+        return block.quaternions(given)
+    if sorted(said.upper()) != list("XYZ") or len(given) != 3 or columns[0] is not None:
+        text = (
+            f"expected Rotation Type Quaternion, or an order of Euler angles such as XYZ, got "
+            f"{said!r} with {counted(len(given), 'column')} of rotations; export it again"
+        )
         raise block.rows.error(text, block.rows.first)
-    return block.quaternions(given)
+    return _of_euler(block.numbers(given), said.upper())
+
+
+def _of_euler(degrees: Array, order: str) -> Array:
+    """Quaternions (n, 4) of angles (n, 3) about X, Y and Z; NaN where the body was not seen.
+
+    Motive turns about moving axes in the order of the type's letters ("relative" in its SDK's
+    samples): XYZ is R = Rx Ry Rz.
+    """
+    seen = np.isfinite(degrees).all(axis=1)
+    out = np.full((len(degrees), 4), np.nan)
+    which = ["XYZ".index(axis) for axis in order]
+    if seen.any():
+        turn = Rotation.from_euler(order, degrees[seen][:, which], degrees=True)
+        out[seen] = turn.as_quat(scalar_first=True)
+    return out
 
 
 # CSV and text exports of Vicon's Nexus: blocks of segments and of trajectories.

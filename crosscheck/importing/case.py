@@ -22,11 +22,13 @@ from crosscheck.importing.align import (
     place_of_target,
     size_of_cloud,
     to_commands,
+    unturned,
     with_target,
 )
 from crosscheck.importing.choices import ImportChoices
 from crosscheck.importing.join import commanded, joined
 from crosscheck.importing.logs import Logged
+from crosscheck.importing.repeated import repeated
 from crosscheck.importing.take import READERS, Take, take_of
 from crosscheck.measurements.data import LEAST, Measurements, Sigma
 from crosscheck.measurements.read import load_commands, together
@@ -167,6 +169,7 @@ class Imported(Result):
             "rows": self.measured.n_rows,
             "dwells": int(self.measured.read.sum()),
             "sigma": self.measured.sigma,
+            "sigma_source": self.measured.sigma_source,
             "free": list(self.frames.free),
             "tracker_to_base": {"quat_wxyz": self.frames.turn, "shift_m": self.frames.shift},
             "body_on_platform": {
@@ -236,13 +239,15 @@ def import_case(
         frames = _frames(robot, takes, choices)
     parts = [_measured(take, frames) for take in takes]
     measured = _one([part for part, _noise in parts])
-    sigma = _sigma(takes, [noise for _part, noise in parts])
+    scatter = _sigma(takes, [noise for _part, noise in parts])
+    sigma, origin, repeats = repeated(measured, scatter)
     measured = replace(
-        measured, sigma=sigma, sigma_source="dwell_scatter", free=frames.free,
+        measured, sigma=sigma, sigma_source=origin, free=frames.free,
         stands=np.ones(measured.n_rows, dtype=bool),
     )  # fmt: skip
     off = off_commands(frames, *_rests(robot, takes)) if choices.aligned else []
-    notes = (*said, *strays, frames.how, *off, _noise(measured))
+    off += unturned(frames, *_rests(robot, takes)) if robot.n_cables >= robot.n_dof else []
+    notes = (*said, *strays, frames.how, *off, _noise(replace(measured, sigma=scatter)), repeats)
     found = Imported(robot, measured, frames, tuple(takes), notes)
     if source is not None:
         write_case(found, source, Path(str(out)))

@@ -10,11 +10,11 @@ import dataclasses
 import difflib
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +24,7 @@ from crosscheck.given import check_above_zero
 from seecr.commands import Commands, Loads
 from seecr.counted import counted, plural, some
 from seecr.description.robot import Robot
+from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.result import COORDINATES, Record, Result, rows_of
 from seecr.units import UNITS
@@ -171,10 +172,34 @@ class Sigma:
             values[key] = parse_quantity(f"--sigma {kind}", kind, quantity, LEAST_NOISE)
         return cls(**values)
 
+    @classmethod
+    def of(cls, given: GivenSigma) -> Sigma | None:
+        """The noise as callers may give it: metres, or ``"0.1mm"``, whose unit tells the kind.
+
+        Raises:
+            InputError: something else.
+        """
+        if isinstance(given, str):
+            kind, value = parse_kind("sigma", ("position", "orientation", "tension"), given,
+                                     LEAST_NOISE)  # fmt: skip
+            return cls(**{f"{kind}_{SI[kind]}": value})
+        if isinstance(given, int | float) and not isinstance(given, bool):
+            return cls(position_m=float(given))
+        if given is None or isinstance(given, Sigma):
+            return given
+        raise InputError(
+            "sigma: expected a crosscheck.Sigma, such as Sigma(position_m=1e-4), metres, or a "
+            f'text such as "0.1mm", got {type(given).__name__}'
+        )
+
     @property
     def stated(self) -> dict[str, float]:
         """The kinds that are stated, with their noise in SI."""
         return {name: value for name, value in vars(self).items() if value is not None}
+
+
+GivenSigma: TypeAlias = Sigma | float | str | None
+"""Noise of readings: a sigma, metres, ``"0.1mm"``, or None for what the files state."""
 
 
 def origin_of(path: Path) -> str:
@@ -222,6 +247,10 @@ class Measurements(Result):
         unused_columns: names of columns without a known meaning.
         notes: sentences for the reader: what was assumed, filled in or left out.
     """
+
+    # set by crosscheck.measurements.arrays, which reads by what reads files into this class
+    from_arrays: ClassVar[Callable[..., Measurements]]
+    from_frame: ClassVar[Callable[..., Measurements]]
 
     path: Path
     n_cables: int
@@ -303,6 +332,9 @@ class Measurements(Result):
     def n_rows(self) -> int:
         """Number of rows n."""
         return len(self.run)
+
+    def __len__(self) -> int:
+        return self.n_rows
 
     @property
     def parts(self) -> dict[str, Names]:

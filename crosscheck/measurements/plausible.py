@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crosscheck.measurements.copied import copied
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.dwells import mean_rotation
 from seecr.columns.known import ANGLES, POSITION, Column, Columns
-from seecr.columns.plausible import away_from, check_commands, scalar_may_be_last, turned_from
+from seecr.columns.plausible import away_from, scalar_may_be_last, turned_from
 from seecr.counted import some
-from seecr.errors import InputFileError
+from seecr.errors import Faults, InputFileError
 from seecr.pose import Array, quat_conjugate, quat_from_rxyz, quat_multiply, rxyz_from_quat
 
 if TYPE_CHECKING:
@@ -55,7 +56,6 @@ def check_readings(columns: Columns, robot: Robot, data: Measurements) -> list[s
     Raises:
         InputFileError: commands or readings that must be in another unit or order, or are none.
     """
-    check_commands(columns, robot, data.command_pose, data.command_lengths)
     _refuse_unread(columns, robot)
     placed, turned = list[str](), list[str]()
     if data.command_pose is not None:
@@ -71,6 +71,7 @@ def check_readings(columns: Columns, robot: Robot, data: Measurements) -> list[s
         *turned,
         *_other_order(columns, robot, data),
         *twice(data),
+        *copied(data),
     ]
 
 
@@ -81,14 +82,16 @@ def _refuse_unread(columns: Columns, robot: Robot) -> None:
     """Refuse numbers that are absurd, or that stand for "not read"."""
     far = _NOWHERE * robot.reach
     near = f"within {far:.3g} m of the robot"
+    faults = Faults()
     for axis, home in zip(POSITION, robot.reference_pose[:3], strict=True):
-        _refuse_beyond(columns, f"meas_{axis}", float(home), far, near, _SURVEY)
+        faults.of(_refuse_beyond, columns, f"meas_{axis}", float(home), far, near, _SURVEY)
     for angle in ANGLES:
-        _refuse_beyond(columns, f"meas_{angle}", 0.0, _TURNS, "of at most ten turns")
+        faults.of(_refuse_beyond, columns, f"meas_{angle}", 0.0, _TURNS, "of at most ten turns")
     parts = [f"meas_{part}" for part in _PARTS]
     for quantity in (*parts, *(f"tension_{i + 1}" for i in range(robot.n_cables))):
         if quantity in columns.known:
-            _refuse_nines(columns, quantity)
+            faults.of(_refuse_nines, columns, quantity)
+    faults.check()
 
 
 def _refuse_beyond(

@@ -17,18 +17,30 @@ from numpy.typing import ArrayLike
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.given import GivenRobot, robot_of
+from crosscheck.measurements.copied import copied
 from crosscheck.measurements.data import (
     EXAMPLE,
     LEAST_NOISE,
     MOST,
+    GivenSigma,
     Measurements,
     Sigma,
     parse_quantity,
 )
 from crosscheck.measurements.dwells import averaged_dwells
 from crosscheck.measurements.plausible import check_readings, twice
-from seecr.columns.commands import CHOICES, began, choice, known_loads, runs, temperatures, times
-from seecr.columns.csv import read_table
+from seecr.columns.commands import (
+    CHOICES,
+    began,
+    check_commanded,
+    choice,
+    known_loads,
+    opened,
+    runs,
+    temperatures,
+    times,
+)
+from seecr.columns.csv import Table
 from seecr.columns.known import POSITION, Columns, know_columns
 from seecr.columns.poses import (
     command_lengths,
@@ -39,8 +51,8 @@ from seecr.columns.poses import (
 from seecr.commands import Commands, Loads
 from seecr.counted import counted
 from seecr.effects import known
-from seecr.errors import InputError, InputFileError
-from seecr.files import Toml, path_of, read_toml
+from seecr.errors import Faults, InputError, InputFileError
+from seecr.files import Toml, path_of, read_toml, toml_beside
 from seecr.folders import check_together
 from seecr.pose import Array, rxyz_from_quat
 
@@ -99,7 +111,7 @@ def read_beside(path: Path) -> Beside:
 
 def _check_names(toml: Toml) -> None:
     """Refuse misspelt keys; other names are the user's own."""
-    known = ["sigma", "free", *CHOICES]
+    known = ["sigma", "free", "columns", *CHOICES]
     for name in toml.content:
         if name in _SIGMAS:
             raise toml.error(f"{name} is outside the table [sigma]; put it into that table", name)
@@ -209,7 +221,8 @@ def together(parts: Sequence[Measurements]) -> Measurements:
     )
     # repetitions within a file are in its own notes already
     own = any(twice(part) for part in parts)
-    return whole if own else whole.with_notes(twice(whole))
+    whole = whole if own else whole.with_notes(twice(whole))
+    return whole.with_notes(() if any(copied(part) for part in parts) else copied(whole))
 
 
 def _check_alike(parts: Sequence[Measurements]) -> None:
@@ -325,7 +338,7 @@ def load_measurements(
     path: str | Path | Sequence[str | Path],
     robot: GivenRobot,
     *,
-    sigma: Sigma | None = None,
+    sigma: GivenSigma = None,
     sigma_path: str | Path | None = None,
 ) -> Measurements:
     """Read measurements, and the TOML beside them if there is one: noise and the like.
@@ -341,31 +354,26 @@ def load_measurements(
 
     Raises:
         InputFileError: any mistake in either file.
-        InputError: no path, or ``sigma`` is something else than a :class:`crosscheck.Sigma`.
+        InputError: no path, or ``sigma`` is no noise.
 
     Example:
         ``crosscheck.load_measurements("measured.csv", robot).n_rows``
     """
     robot = robot_of(robot)
-    _check_sigma(sigma)
+    noise = Sigma.of(sigma)
     paths = [path] if isinstance(path, str | Path) or not isinstance(path, Sequence) else path
     for one in paths:
         if not isinstance(one, str | Path):
             raise InputError(f"expected measurements or their files, got {type(one).__name__}")
     if not paths:
         raise InputError("expected measurements or their files, got none")
-    return _stated(together([_measured(Path(one), robot, sigma_path) for one in paths]), sigma)
+    faults = Faults()
+    parts = [faults.of(_measured, Path(one), robot, sigma_path) for one in paths]
+    faults.check()
+    return stated(together(parts), noise)
 
 
-def _check_sigma(sigma: Sigma | None) -> None:
-    if sigma is not None and not isinstance(sigma, Sigma):
-        raise InputError(
-            "sigma: expected a crosscheck.Sigma, such as Sigma(position_m=1e-4), got "
-            f"{type(sigma).__name__}"
-        )
-
-
-def _stated(data: Measurements, sigma: Sigma | None) -> Measurements:
+def stated(data: Measurements, sigma: Sigma | None) -> Measurements:
     """The measurements with the noise that is stated for them, the same in all files."""
     if sigma is None or not sigma.stated:
         return data
@@ -377,8 +385,9 @@ def _stated(data: Measurements, sigma: Sigma | None) -> Measurements:
 
 
 def _measured(path: Path, robot: Robot, sigma_path: str | Path | None) -> Measurements:
-    columns = _open(path, robot)
-    data = _load(columns, robot, sigma_path)
+    toml = _toml_of(path, sigma_path)
+    columns = opened(path, robot, toml)
+    data = _load(columns, robot, toml)
     if not (data.has_position or data.has_orientation or data.has_tension):
         raise columns.table.error(
             "no measurement; expected readings in at least one column such as meas_x_m, meas_qw "
@@ -391,7 +400,7 @@ def load_commands(
     path: str | Path,
     robot: GivenRobot,
     *,
-    sigma: Sigma | None = None,
+    sigma: GivenSigma = None,
     sigma_path: str | Path | None = None,
 ) -> Measurements:
     """Like :func:`load_measurements`, for commands that have not been measured yet.
@@ -407,20 +416,24 @@ def load_commands(
 
     Raises:
         InputFileError: any mistake in either file.
-        InputError: no path, or ``sigma`` is something else than a :class:`crosscheck.Sigma`.
+        InputError: no path, or ``sigma`` is no noise.
 
     Example:
         ``crosscheck.load_commands("measured.csv", robot)``
     """
-    robot = robot_of(robot)
-    _check_sigma(sigma)
-    return _stated(_load(_open(path_of(path, "commands"), robot), robot, sigma_path), sigma)
+    robot, noise = robot_of(robot), Sigma.of(sigma)
+    path = path_of(path, "commands")
+    toml = _toml_of(path, sigma_path)
+    return stated(_load(opened(path, robot, toml), robot, toml), noise)
 
 
-def measurements_of(given: GivenData, robot: Robot) -> Measurements:
-    """The measurements, read if a path is given, with the dwells of long logs averaged."""
+def measurements_of(given: GivenData, robot: Robot, sigma: GivenSigma = None) -> Measurements:
+    """The measurements, read if a path is given, with the dwells of long logs averaged.
+
+    ``sigma`` is stated for the kinds that it has, in place of what they or their files say.
+    """
     whole = given if isinstance(given, Measurements) else load_measurements(given, robot)
-    return averaged_dwells(whole)
+    return averaged_dwells(stated(whole, Sigma.of(sigma)))
 
 
 def commands_of(given: GivenCommands, robot: Robot) -> Measurements:
@@ -443,7 +456,7 @@ def _of_poses(given: ArrayLike, robot: Robot) -> Measurements:
     """Poses (n, 7) as a file of them would be read, one run."""
     from seecr.statics.starts import commanded_poses  # takes a while to import
 
-    pose = commanded_poses(given)
+    pose = commanded_poses(given, robot=robot)
     if len(pose) == 0:
         raise InputError(_NONE)
     run = np.full(len(pose), "all")
@@ -462,7 +475,7 @@ def _of_one_clock(given: Commands, robot: Robot) -> Measurements:
         Path("commands.csv"),
         robot.n_cables,
         run.astype(np.str_),
-        command_pose=commanded_poses(given.pose) if lengths is None else None,
+        command_pose=commanded_poses(given.pose, robot=robot) if lengths is None else None,
         command_lengths=lengths,
         told=given.told and lengths is not None,
         t_s=given.time,
@@ -473,21 +486,38 @@ def _of_one_clock(given: Commands, robot: Robot) -> Measurements:
     )
 
 
-def _open(path: Path, robot: Robot) -> Columns:
-    check_together(path, path.with_suffix(".toml"))
-    return know_columns(read_table(path), robot.n_cables, robot.cable_names)
+def _toml_of(path: Path, sigma_path: str | Path | None) -> Path | None:
+    """The TOML of a file, if it has one; one that is named must exist."""
+    if sigma_path is not None:
+        return Path(sigma_path)
+    beside = toml_beside(path)
+    check_together(path, beside)
+    return beside if beside.exists() else None
 
 
-def _load(columns: Columns, robot: Robot, sigma_path: str | Path | None) -> Measurements:
+def table_measurements(table: Table, robot: Robot) -> Measurements:
+    """Measurements, or commands alone, of a table without a TOML.
+
+    Raises:
+        InputFileError: with a line for each mistake.
+    """
+    return _load(know_columns(table, robot.n_cables, robot.cable_names), robot, None)
+
+
+def _load(columns: Columns, robot: Robot, toml: Path | None) -> Measurements:
+    cables = [str(i + 1) for i in range(robot.n_cables)]
+    check_commanded(
+        columns, robot, lambda c: c.readings("meas", POSITION), measured_orientation,
+        lambda c: c.readings("tension", cables), lambda c: wanted_poses(c, robot),
+        lambda c: None if toml is None else read_beside(toml),
+    )  # fmt: skip
     run = runs(columns)
     t_s, temperature = times(columns, run), temperatures(columns)
     lengths = command_lengths(columns, robot)
     pose = command_poses(columns, robot) if lengths is None else None
     position = columns.readings("meas", POSITION)
     quat, angles = measured_orientation(columns)
-    cables = [str(i + 1) for i in range(robot.n_cables)]
-    toml = columns.table.path.with_suffix(".toml") if sigma_path is None else Path(sigma_path)
-    beside = Beside() if sigma_path is None and not toml.exists() else read_beside(toml)
+    beside = Beside() if toml is None else read_beside(toml)
     if beside.told and lengths is None:
         columns.notes.append('lengths = "told" has no effect here: the commands are poses.')
     data = Measurements(

@@ -20,6 +20,7 @@ from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.dwells import mean_rotation
 from crosscheck.preparation.exchanged import Pulls, exchange_doubts, rows_of_files
+from crosscheck.preparation.filled import filled_in
 from seecr.columns.plausible import turned_from
 from seecr.counted import counted, some
 from seecr.effects.base import Readings
@@ -428,8 +429,17 @@ def without_constants(problem: Problem, at: Prediction) -> tuple[Problem, list[s
     least[:6] = np.repeat([_MOVES * problem.robot.reach, _LEAST_TURN], 3)
     odd = np.zeros_like(seen)
     for name, rows in rows_of_files(problem):
-        columns = _constant(read, expected, seen & rows[:, None], least)
-        odd |= rows[:, None] & columns
+        mine = seen & rows[:, None]
+        columns = _constant(read, expected, mine, least)
+        some = filled_in(read, expected, mine & ~columns, least)
+        odd |= (rows[:, None] & columns) | some
+        if some.any():
+            which = f"{name}{_names(np.asarray(some.any(axis=0)))}"
+            notes.append(
+                f"{which}: {data.lines_of(some.any(axis=1))} not counted as readings, because the "
+                "same number stands there again and again where the model expects changes; leave "
+                "the cells empty where nothing was read"
+            )
         if columns.any():
             notes.append(
                 f"{name}{_names(columns)}: not counted as readings, because the file has the same "

@@ -31,6 +31,7 @@ _SEEN = 1e-6
 @click.argument("poses", type=options.FILE, metavar="[POSES.csv]", required=False)
 @options.option("--grid X Y Z", "Each FIRST:LAST:COUNT or one number [m]; z varies fastest.")
 @options.turned("--grid")
+@options.columns
 @options.limits
 @options.option(
     "--aim safe|minimum|middle|N,N,...",

@@ -132,9 +132,8 @@ class LazyGroup(click.Group):
         click.echo(f"{self.name}: {text}", err=True)
 
     def _refuse(self, text: str, status: int = BAD_INPUT) -> int:
-        # several faults of one file are a line each
-        lines = [printable(" ".join(line.split())) for line in text.splitlines()]
-        click.echo(f"{self.name}: " + "\n  ".join(line for line in lines if line), err=True)
+        for line in text.splitlines():  # several faults of one file are a line each
+            click.echo(f"{self.name}: {printable(' '.join(line.split()))}", err=True)
         return status
 
     def _run(self, *args: Any, **extra: Any) -> Any:

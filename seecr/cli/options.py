@@ -218,6 +218,23 @@ limits = together(
 )
 
 
+def _renamed(ctx: click.Context, _option: click.Parameter, value: str | None) -> None:
+    """``--columns`` holds for all files that the command reads."""
+    if value is not None:
+        from seecr.columns.headers import parse_columns, renamed
+
+        ctx.with_resource(renamed(parse_columns(value)))
+
+
+columns = option(
+    "--columns THEIRS=OURS,...",
+    "What headers of other programs stand for, such as px=meas_x_m; one * on each side stands for "
+    "the same text: L*=length_*_m. Also [columns] in the TOML.",
+    expose_value=False,
+    callback=_renamed,
+)
+
+
 def files_of_pictures(name: str, figure: str, no_recording: bool) -> tuple[set[str], set[str]]:
     """Pictures of that name: those that ``--figure`` and ``--no-recording`` ask for, and all."""
     every = {kind: f"{name}.{kind}" for kind in ("png", "svg", "rrd")}

@@ -48,6 +48,7 @@ _WANTED = "Lengths are commanded; deviations are from the wanted poses, columns 
     "compiled one, or one of the paper's two, from SciPy.",
 )
 @options.turned("--line and --grid")
+@options.columns
 @options.pictures
 @options.out("seecr-sweep")
 @options.as_json

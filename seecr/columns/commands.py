@@ -8,8 +8,8 @@ poses that lengths are for. The TOML beside it may state ``lengths = "told"`` an
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -18,13 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.columns.csv import Table, read_table, show
+from seecr.columns.headers import columns_said, renamed
 from seecr.columns.known import ANGLES, POSITION, QUATERNION, Columns, know_columns
 from seecr.columns.plausible import check_commands
 from seecr.columns.poses import aimed_poses, command_lengths, command_poses
 from seecr.commands import Commands, Loads
 from seecr.description.robot import Robot
-from seecr.errors import InputFileError
-from seecr.files import Toml, read_toml
+from seecr.errors import Faults, InputFileError
+from seecr.files import Toml, read_toml, toml_beside
 from seecr.folders import check_together
 from seecr.pose import Array
 
@@ -341,8 +342,10 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
         InputFileError: with line and column of the mistake.
     """
     path = Path(path)
-    check_together(path, path.with_suffix(".toml"))
-    columns = know_columns(read_table(path), robot.n_cables, robot.cable_names)
+    toml = toml_beside(path)
+    check_together(path, toml)
+    columns = opened(path, robot, toml if toml.exists() else None)
+    check_commanded(columns, robot)
     run = runs(columns)
     lengths = command_lengths(columns, robot)
     if lengths is None:
@@ -350,8 +353,7 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
         poses, wanted = command_poses(columns, robot), None
     else:
         poses, wanted = aimed_poses(columns, robot)
-    check_commands(columns, robot, poses, lengths)
-    told, stands = _beside(path.with_suffix(".toml"))
+    told, stands = _beside(toml)
     commands = Commands(
         pose=poses,
         lengths=lengths,
@@ -365,6 +367,45 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
     )
     free = lengths is None and not columns.present("cmd", QUATERNION + ANGLES)
     return CommandFile(commands, wanted, tuple(run.tolist()), tuple(columns.notes), free)
+
+
+def opened(path: Path, robot: Robot, toml: Path | None) -> Columns:
+    """The columns of a file, by the names that its TOML gives them, if it has one.
+
+    Raises:
+        InputFileError: any mistake in its headers, or in the TOML's table ``[columns]``.
+    """
+    said = None if toml is None else read_toml(toml, "expected a TOML file with a table [sigma]")
+    beside = {} if said is None else said.content.get("columns", {})
+    if not isinstance(beside, dict) or not all(isinstance(ours, str) for ours in beside.values()):
+        assert said is not None
+        text = 'columns must be a table, [columns], of theirs = "ours", such as px = "meas_x_m"'
+        raise said.error(text, "columns")
+    with renamed({**beside, **columns_said()}):  # what is said on the command line comes last
+        return know_columns(read_table(path), robot.n_cables, robot.cable_names)
+
+
+def check_commanded(columns: Columns, robot: Robot, *more: Callable[[Columns], object]) -> None:
+    """Read everything once, so that all mistakes of a file are told together.
+
+    Args:
+        columns: of the file. robot: that is commanded.
+        more: further readers of the columns, for those who do not ignore readings.
+
+    Raises:
+        InputFileError: with a line for each mistake.
+    """
+    trial, faults = replace(columns, notes=[]), Faults()
+
+    def commanded(columns: Columns) -> None:
+        lengths = command_lengths(columns, robot)
+        poses = command_poses(columns, robot) if lengths is None else None
+        check_commands(columns, robot, poses, lengths)
+
+    for reader in (lambda c: times(c, runs(c)), temperatures, commanded,
+                   lambda c: known_loads(c, robot), *more):  # fmt: skip
+        faults.of(reader, trial)
+    faults.check()
 
 
 def _beside(path: Path) -> tuple[bool, bool]:

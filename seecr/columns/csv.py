@@ -10,33 +10,26 @@ import io
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.counted import counted
+from seecr.columns.cells import NOT_READ, OF_NUMBERS, Style, fault_of, is_comment, is_statistic
+from seecr.columns.cells import show as show  # for those who read tables
+from seecr.columns.headers import QUANTITY, numbered_headers, spelled
+from seecr.columns.sheets import decoded, is_workbook, sheet_rows
+from seecr.counted import counted, plural, some
 from seecr.errors import InputFileError, MissingPackageError, printable
-from seecr.files import no_text, read_bytes
+from seecr.files import of_sheet, read_bytes
 from seecr.pose import LARGEST, Array
 
-# The parts of a column's name: a quantity and, after the last underscore, its unit.
-
-QUANTITY = re.compile(
-    r"(t|temperature|run|(?:cmd|meas|want)_(?:q[wxyz]|r?[xyz])|(?:length|tension)_\d+"
-    r"|payload(?:_[xyz])?|(?:force|moment)_[xyz])(?:_([^_]*))?"
-)
-
-
-def is_number(name: str) -> bool:
-    """Whether a column of that name holds numbers that are read; runs have names."""
-    found = QUANTITY.fullmatch(name.strip())
-    return found is not None and found[1] != "run"
-
-
 EXPECTED_FILE = "expected a CSV file in UTF-8 with a header row and one row per resting pose"
+# Most cells of a column that are named one by one where they are no numbers.
+_MOST_CELLS = 3
+_MEANS = re.compile("mean|average|avg|mittel|durchschnitt|moyenne", re.IGNORECASE)
 
 _PARQUET_MAGIC = b"PAR1"
 _TEXT_BEGINNINGS = {"{": "JSON", "[": "JSON or TOML", "<": "XML, such as a robot's MJCF"}
@@ -44,11 +37,6 @@ _TEXT_BEGINNINGS = {"{": "JSON", "[": "JSON or TOML", "<": "XML, such as a robot
 VICON = ("segments", "trajectories", "devices", "joints", "model outputs")
 _QUALISYS = "no_of_frames"
 _SEPARATORS = (",", ";", "\t")
-# Marks of a missing reading, besides an empty cell.
-_NOT_READ = ("nan", "NaN")
-_COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)(e[+-]?\d+)?", re.IGNORECASE)
-_POINT_NUMBER = re.compile(r"[+-]?(\d+\.\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
-_NO_NUMBER = {"nan", "inf", "infinity", "na", "n/a", "#n/a", "null", "none", "-", "--"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +49,8 @@ class Table:
         line: (n,) line at which each row begins, counted from 1.
         header_line: line of the header; None if the file has no lines.
         cells: for each column the stripped texts, (n,) each; numbers with decimal points.
+        word: how people count in it: "line", or "row" of a workbook.
+        notes: sentences for the reader: what was left out or understood.
     """
 
     path: Path
@@ -68,42 +58,69 @@ class Table:
     line: NDArray[np.int64]
     header_line: int | None
     cells: Sequence[Sequence[str]]
+    word: str = "line"
+    notes: tuple[str, ...] = ()
+    _seen: dict[tuple[int, bool], Array] = field(default_factory=dict)
 
     def error(
         self, text: str, *, row: int | None = None, column: str | None = None
     ) -> InputFileError:
         """An error at a row (counted from 0) or, without one, in the header."""
-        in_lines = self.header_line is not None
         line = self.header_line if row is None else int(self.line[row])
-        word = "line" if in_lines else "row"
+        word = self.word if self.header_line is not None else "row"
         return InputFileError.at(self.path, text, line=line, column=column, line_word=word)
 
     def numbers(self, index: int, *, blank_is_nan: bool) -> Array:
-        """Numbers (n,) of one column, as written; NaN for missing readings, if allowed."""
+        """Numbers (n,) of one column, as written; NaN for missing readings, if allowed.
+
+        Raises:
+            InputFileError: with every cell that is no number.
+        """
+        if (index, blank_is_nan) not in self._seen:  # checks read columns again
+            self._seen[index, blank_is_nan] = self._numbers(index, blank_is_nan)
+        return self._seen[index, blank_is_nan].copy()
+
+    def _numbers(self, index: int, blank_is_nan: bool) -> Array:
         cells = self.cells[index]
+        try:  # most columns hold nothing else
+            values = np.array(list(map(float, cells)))
+            if np.all(np.abs(values) <= LARGEST) and "_" not in "".join(cells):
+                return values
+        except ValueError:
+            pass
         if blank_is_nan:
-            cells = ["" if cell in _NOT_READ else cell for cell in cells]
+            cells = ["" if cell.lower() in NOT_READ else cell for cell in cells]
         try:
             values = np.array([float(cell) if cell else math.nan for cell in cells])
         except ValueError:
-            raise self._first_fault(index, cells, blank_is_nan) from None
+            raise self._faults(index, cells, blank_is_nan) from None
         blank = np.array([not cell for cell in cells])
         odd = np.any((np.abs(values) <= LARGEST) == blank) or "_" in "".join(cells)
         if odd or (np.any(blank) and not blank_is_nan):
-            raise self._first_fault(index, cells, blank_is_nan)
+            raise self._faults(index, cells, blank_is_nan)
         return values
 
-    def _first_fault(self, index: int, cells: Sequence[str], blank_is_nan: bool) -> InputFileError:
-        for row, cell in enumerate(cells):
-            fault = _cell_fault(cell, blank_is_nan)
-            if fault:
-                return self.error(fault, row=row, column=self.names[index])
-        raise AssertionError("numbers() found a fault that no cell has")
+    def _faults(self, index: int, cells: Sequence[str], blank_is_nan: bool) -> InputFileError:
+        name = self.names[index]
+        faults = [(row, text) for row, cell in enumerate(cells)
+                  if (text := fault_of(cell, blank_is_nan))]  # fmt: skip
+        told = [(int(self.line[row]), text) for row, text in faults]
+        word = self.word if self.header_line is not None else "row"
+        return _first_few(self.path, told, name, word)
 
 
-def show(text: str) -> str:
-    """A cell or header for an error message: quoted, one line, not too long."""
-    return repr(text if len(text) <= 40 else text[:37] + "...")
+def _first_few(
+    path: Path, faults: Sequence[tuple[int, str]], column: str | None, word: str
+) -> InputFileError:
+    """The error about faults of one kind at several lines: the first ones, and where others are."""
+    told = [
+        InputFileError.at(path, text, line=line, column=column, line_word=word)
+        for line, text in faults[:_MOST_CELLS]
+    ]
+    if others := [str(line) for line, _text in faults[_MOST_CELLS:]]:
+        text = f"{len(others)} more like these, {plural(len(others), word)} {some(others, 8)}"
+        told.append(InputFileError.at(path, text, column=column))
+    return InputFileError.together(told)
 
 
 def taken_for(names: Sequence[str]) -> str:
@@ -119,74 +136,112 @@ def taken_for(names: Sequence[str]) -> str:
 
 
 def read_table(path: Path) -> Table:
-    """Read a CSV or Parquet file (told apart by content, not by name).
+    """Read a CSV, a Parquet file or a workbook (told apart by content, not by name).
+
+    Args:
+        path: of the file; ``book.xlsx:sheet`` is a sheet of a workbook, else the first one is read.
 
     Raises:
-        InputFileError: of another kind, not UTF-8, or rows that do not fit the header.
+        InputFileError: of another kind, not text, or rows that do not fit the header.
     """
-    if path.is_dir():
+    file, sheet = of_sheet(path)
+    if file.is_dir():
         raise InputFileError.at(path, f"is a folder; {EXPECTED_FILE}")
-    data = read_bytes(path, EXPECTED_FILE)
+    data = read_bytes(file, EXPECTED_FILE)
     if data.startswith(_PARQUET_MAGIC):
         return _read_parquet(path)
-    return _read_csv(path, data)
+    if is_workbook(data):
+        return _of_rows(path, sheet_rows(path, file, sheet), ";", "row", ())
+    text, notes = decoded(path, data, EXPECTED_FILE)
+    return _read_csv(path, text, notes)
 
 
-def _decode(path: Path, data: bytes) -> str:
-    kind = no_text(data)
-    if kind:
-        raise InputFileError.at(path, f"is {kind}; {EXPECTED_FILE}, or Parquet")
-    try:
-        return data.decode("utf-8").removeprefix("\ufeff")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        text = (
-            f"byte 0x{data[error.start]:02X} (number {error.start + 1} of the file) is not UTF-8; "
-            "expected text in UTF-8; save the file again in that encoding"
-        )
-        raise InputFileError.at(path, text, line=line) from None
-
-
-def _read_csv(path: Path, data: bytes) -> Table:
+def _read_csv(path: Path, text: str, notes: list[str]) -> Table:
     numbered = [
         (number, line)
-        for number, line in enumerate(io.StringIO(_decode(path, data), newline=""), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
+        for number, line in enumerate(io.StringIO(text, newline=""), start=1)
+        if line.strip() and not (line.lstrip()[0] == "#" and is_comment(line))
     ]
+    # so Excel says what separates the cells below
+    said = re.fullmatch(r'"?sep=(.)"?', numbered[0][1].strip()) if numbered else None
+    numbered = numbered[1:] if said else numbered
     if not numbered:
         raise InputFileError.at(path, f"is empty; {EXPECTED_FILE}")
     _check_first_line(path, *numbered[0])
-    separator = _separator(path, *numbered[0])
-    (header_line, header), *body = _csv_rows(path, numbered, separator)
+    separator = said[1] if said else _separator(path, *numbered[0])
+    return _of_rows(path, _csv_rows(path, numbered, separator), separator, "line", notes)
+
+
+def _of_rows(
+    path: Path, rows: list[tuple[int, list[str]]], separator: str, word: str, notes: Sequence[str]
+) -> Table:
+    """The table of rows with their lines, the header first; those without any text are none."""
+    stripped = [(line, [cell.strip() for cell in row]) for line, row in rows]
+    stripped = [(line, row) for line, row in stripped if any(row)]
+    if not stripped:
+        raise InputFileError.at(path, f"is empty; {EXPECTED_FILE}")
+    if names := numbered_headers(stripped[0][1]):
+        stripped = [(stripped[0][0], names), *stripped]
+    (header_line, header), *body = stripped
+    while not header[-1] and not any(any(row[len(header) - 1 :]) for _, row in body):
+        header = header[:-1]  # spreadsheets write separators for columns that are empty
+    body = [(line, _trimmed(row, len(header))) for line, row in body]
+    _check_cell_counts(path, header_line, header, body, word)
+    body, left_out = _without_statistics(header, body, word)
     if not body:
-        raise InputFileError.at(
-            path, "has a header but no rows; expected one row per resting pose", line=header_line
-        )
-    _check_cell_counts(path, header_line, header, body)
-    columns = zip(*(row for _, row in body), strict=True)
-    cells = [[cell.strip() for cell in column] for column in columns]
-    return Table(
-        path=path,
-        names=tuple(name.strip() for name in header),
-        line=np.array([line for line, _ in body]),
-        header_line=header_line,
-        cells=cells if separator == "," else _with_points(header, cells),
-    )
+        text = "has a header but no rows; expected one row per resting pose"
+        raise InputFileError.at(path, text, line=header_line, line_word=word)
+    cells = [list(column) for column in zip(*(row for _, row in body), strict=True)]
+    cells, said = _plain_numbers(header, cells, separator)
+    lines = np.array([line for line, _ in body])
+    notes = (*notes, *left_out, *said)
+    return Table(path, tuple(header), lines, header_line, cells, word, notes)
 
 
-def _with_points(names: list[str], cells: list[list[str]]) -> list[list[str]]:
-    """Decimal commas as points, if no number has a point: a file uses only one kind.
+def _trimmed(row: list[str], width: int) -> list[str]:
+    """A row without empty cells beyond the header's."""
+    return row[:width] if len(row) > width and not any(row[width:]) else row
 
-    Columns without numbers are left out of that test: a run's name may be 1.5.
+
+def _plain_numbers(
+    names: list[str], cells: list[list[str]], separator: str
+) -> tuple[list[list[str]], list[str]]:
+    """Cells whose numbers have decimal points and nothing else, and notes about them.
+
+    Columns without numbers are left as they are: a run's name may be 1.5.
     """
-    pairs = zip(names, cells, strict=True)
-    every = [cell for name, column in pairs if is_number(name) for cell in column]
-    if any(_POINT_NUMBER.fullmatch(cell) for cell in every):
-        return cells
-    return [
-        [cell.replace(",", ".") if _COMMA_NUMBER.fullmatch(cell) else cell for cell in column]
-        for column in cells
-    ]
+    which = [k for k, name in enumerate(names) if spelled(name) != "run"]
+    # a file has one style, so columns that are ours show it, if there are any
+    ours = [k for k in which if QUANTITY.fullmatch(spelled(names[k]))] or which
+    odd = {k for k in which if not OF_NUMBERS.fullmatch("".join(cells[k]))}
+    style = Style((cell for k in ours for cell in cells[k] if odd), comma=separator != ",")
+    for k in which if style.comma else odd:
+        cells[k] = [style.plain(cell) for cell in cells[k]]
+    return cells, style.notes()
+
+
+def _without_statistics(
+    names: list[str], body: list[tuple[int, list[str]]], word: str
+) -> tuple[list[tuple[int, list[str]]], list[str]]:
+    """The rows without those below them that are computed from them, and a note.
+
+    Such a row begins with a word for it. As the name of a run that word counts only where the row
+    has no whole command, or where it is a mean.
+    """
+    commands = [k for k, name in enumerate(names) if spelled(name).startswith(("cmd_", "length_"))]
+    end = len(body)
+    while end and (said := is_statistic(body[end - 1][1])):
+        row = body[end - 1][1]
+        named = spelled(names[row.index(said)]) == "run"
+        if named and all(row[k] for k in commands) and not _MEANS.match(said):
+            break
+        end -= 1
+    if end == len(body):
+        return body, []
+    named_rows = [f"{line} ({is_statistic(row)})" for line, row in body[end:]]
+    noun = plural(len(named_rows), word)
+    text = f"Left out: {noun} {some(named_rows, 8)}, computed from the other rows."
+    return body[:end], [text]
 
 
 def _check_first_line(path: Path, number: int, line: str) -> None:
@@ -230,16 +285,17 @@ def _csv_rows(
 
 
 def _check_cell_counts(
-    path: Path, header_line: int, header: list[str], body: list[tuple[int, list[str]]]
+    path: Path, header_line: int, header: list[str], body: list[tuple[int, list[str]]], word: str
 ) -> None:
-    n_columns = len(header)
+    n_columns, faults = len(header), list[tuple[int, str]]()
     for line, row in body:
         if row == header:
-            text = f"expected a row of cells, got the header (line {header_line}) again; are two "
-            raise InputFileError.at(path, f"{text}files in one? Give them one at a time", line=line)
-        if len(row) != n_columns:
+            text = f"expected a row of cells, got the header ({word} {header_line}) again; are two "
+            text += "files in one? Give them one at a time"
+            faults.append((line, text))
+        elif len(row) != n_columns:
             text = (
-                f"expected {counted(n_columns, 'cell')} as in the header (line {header_line}), "
+                f"expected {counted(n_columns, 'cell')} as in the header ({word} {header_line}), "
                 f"got {counted(len(row), 'cell')}"
             )
             if line == body[-1][0] and len(row) < n_columns:
@@ -249,7 +305,9 @@ def _check_cell_counts(
                     "; a decimal comma splits a number in two: write 1.5, not 1,5, or put "
                     "semicolons between cells"
                 )
-            raise InputFileError.at(path, text, line=line)
+            faults.append((line, text))
+    if faults:
+        raise _first_few(path, faults, None, word)
 
 
 def _read_parquet(path: Path) -> Table:
@@ -277,33 +335,6 @@ def _read_parquet(path: Path) -> Table:
             ["" if value is None else str(value).strip() for value in column.to_pylist()]
             for column in content.columns
         ],
-    )
-
-
-def _cell_fault(cell: str, blank_is_nan: bool) -> str | None:
-    """What is wrong with a cell that should hold a number; None if nothing is."""
-    expected = "expected a number, or an empty cell where the reading is missing"
-    if not blank_is_nan:
-        expected = "expected a number in every row"
-    if not cell:
-        return None if blank_is_nan else f"{expected}, got an empty cell; fill it or drop the row"
-    if cell.lower().lstrip("+-") in _NO_NUMBER or cell.lower() in _NO_NUMBER:
-        remedy = "" if blank_is_nan else "; fill it or drop the row"
-        return f"{expected}, got {show(cell)}{remedy}"
-    if _COMMA_NUMBER.fullmatch(cell):
-        point = cell.replace(",", ".")
-        return f"{expected}, got a decimal comma in {show(cell)}; write {point}"
-    if re.fullmatch(r"[+-]?[\d.]+(e[+-]?\d+)?\s*[^\W\d_]+", cell, re.IGNORECASE):
-        return f"{expected}, got {show(cell)}; a unit belongs in the column's name, not in a cell"
-    try:
-        number = float(cell.replace("_", "?"))
-    except ValueError:
-        return f"{expected}, got {show(cell)}"
-    if abs(number) <= LARGEST:
-        return None
-    largest = f"{LARGEST:g}".replace("+", "")
-    return (
-        f"{expected}, got {show(cell)}, which is too large; numbers go from -{largest} to {largest}"
     )
 
 

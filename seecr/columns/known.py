@@ -15,9 +15,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.columns.csv import QUANTITY, Table, show
-from seecr.counted import counted
-from seecr.errors import InputFileError
+from seecr.columns.csv import Table, show
+from seecr.columns.headers import QUANTITY, foreign, numbered_headers, spelled
+from seecr.counted import counted, some
+from seecr.errors import Faults, InputFileError
 from seecr.pose import Array
 from seecr.units import Unit, of_columns
 
@@ -134,6 +135,9 @@ def unused_note(names: Sequence[str], rotations: Sequence[str]) -> list[str]:
     return notes
 
 
+# Most further lines that an error names.
+_MOST_LINES = 8
+
 POSITION = ("x", "y", "z")
 QUATERNION = ("qw", "qx", "qy", "qz")
 ANGLES = ("rx", "ry", "rz")
@@ -191,23 +195,42 @@ class Columns:
         column = self.known[quantity]
         return column.unit.to_si(self.table.numbers(column.index, blank_is_nan=blank_is_nan))
 
+    def all_numbers(self, quantities: Sequence[str], *, blank_is_nan: bool = False) -> Array:
+        """Several columns (n, k) in SI units; an error tells the mistakes of all of them."""
+        values, faults = np.full((self.n_rows, len(quantities)), np.nan), Faults()
+        for k, quantity in enumerate(quantities):
+            column = faults.of(lambda q: self.numbers(q, blank_is_nan=blank_is_nan), quantity)
+            if column is not None:
+                values[:, k] = column
+        faults.check()
+        return values
+
     def readings(self, prefix: str, parts: Sequence[str]) -> Array:
         """Columns ``prefix_part`` (n, k) in SI units; NaN for a missing column or an empty cell."""
         values = np.full((self.n_rows, len(parts)), np.nan)
+        there = [k for k, part in enumerate(parts) if f"{prefix}_{part}" in self.known]
+        quantities = [f"{prefix}_{parts[k]}" for k in there]
+        values[:, there] = self.all_numbers(quantities, blank_is_nan=True)
         for k, part in enumerate(parts):
             quantity = f"{prefix}_{part}"
-            if quantity in self.known:
-                values[:, k] = self.numbers(quantity, blank_is_nan=True)
-                if np.all(np.isnan(values[:, k])):
-                    name = self.known[quantity].name
-                    self.notes.append(f"Column {name} is empty: not measured.")
+            if quantity in self.known and np.all(np.isnan(values[:, k])):
+                name = self.known[quantity].name
+                self.notes.append(f"Column {name} is empty: not measured.")
         return values
 
     def refuse(self, wrong: NDArray[np.bool_], quantity: str, text: Callable[[int], str]) -> None:
-        """Raise an error at the first row that is ``wrong`` (n,), if any."""
-        if np.any(wrong):
-            row = int(np.argmax(wrong))
-            raise self.table.error(text(row), row=row, column=self.known[quantity].name)
+        """Raise an error at the first row that is ``wrong`` (n,), if any, which names the others.
+
+        If all rows are, it is no matter of single rows, and none is named.
+        """
+        if not np.any(wrong):
+            return
+        row, *others = np.flatnonzero(wrong).tolist()
+        said = text(row)
+        if others and not np.all(wrong):
+            lines = some([str(self.table.line[k]) for k in others], _MOST_LINES)
+            said += f" (also at {self.table.word} {lines})"
+        raise self.table.error(said, row=row, column=self.known[quantity].name)
 
     def half_there(self, what: str, missing: Sequence[str], need: str) -> InputFileError:
         """The error about an incomplete group of columns."""
@@ -227,52 +250,61 @@ def know_columns(table: Table, n_cables: int, cables: Sequence[str] = ()) -> Col
     """Identify the columns of a table; cables may have their names in place of a number.
 
     Raises:
-        InputFileError: a missing or unknown unit, a repeated column, a cable that the robot does
-            not have, no header, or the same quantity given in two ways.
+        InputFileError: missing or unknown units, repeated columns, cables that the robot does not
+            have, no header, or the same quantity given in two ways.
     """
     _check_names(table)
     known: dict[str, Column] = {}
-    unused = []
-    for index, name in enumerate(table.names):
-        found = _parse_name(table, name, n_cables, cables)
+    unused, faults = list[str](), Faults()
+    for index, ours in enumerate(foreign(table)):
+        name = table.names[index]
+        try:
+            found = _parse_name(table, name, ours, n_cables, cables)
+        except InputFileError as fault:
+            faults.add(fault)
+            continue
         if found is None:
             unused.append(name or f"(column {index + 1}, without a name)")
             continue
         quantity, unit = found
         if quantity in known:
             text = f"says the same as {known[quantity].name}; expected only one of the two"
-            raise table.error(text, column=name)
-        known[quantity] = Column(name, index, unit)
+            faults.add(table.error(text, column=name))
+        known.setdefault(quantity, Column(name, index, unit))
     meant = meant_by(unused, _absent(known, n_cables))
     turned = other_rotations(unused)
     lost = of_no_cable([name for name in unused if name not in meant])
     rest = [name for name in unused if name not in (*meant, *turned, *lost)]
-    notes = [question(name, near) for name, near in meant.items()]
+    notes = [*table.notes, *(question(name, near) for name, near in meant.items())]
     notes += [*no_cable_note(lost, cables), *unused_note(rest, turned)]
     columns = Columns(table, known, tuple(unused), meant, notes, tuple(cables))
-    _check_one_way(columns)
+    faults.of(_check_one_way, columns)
+    faults.check()
     return columns
 
 
 def _check_names(table: Table) -> None:
     """Check that there is a header, without repeated names."""
     numbers = [name for name in table.names if re.fullmatch(r"[+-]?\d*\.?\d+(e[+-]?\d+)?", name)]
-    if numbers:
+    if numbers and not numbered_headers(list(table.names)):
         raise table.error(
             f"expected a header row with column names such as cmd_x_m, got the number "
             f"{show(numbers[0])}; put the names in the first row, without a # before them"
         )
+    faults = Faults()
     for index, name in enumerate(table.names):
         first = table.names.index(name)
         if name and first < index:
             text = f"repeated header, columns {first + 1} and {index + 1}; expected each once"
-            raise table.error(f"{text}; rename or remove one", column=name)
+            faults.add(table.error(f"{text}; rename or remove one", column=name))
+    faults.check()
 
 
 def _parse_name(
-    table: Table, name: str, n_cables: int, cables: Sequence[str]
+    table: Table, name: str, ours: str, n_cables: int, cables: Sequence[str]
 ) -> tuple[str, Unit] | None:
-    match = QUANTITY.fullmatch(numbered(name, cables))
+    """The quantity and unit of a column with its name in the file and in our terms."""
+    match = QUANTITY.fullmatch(spelled(numbered(spelled(ours), cables)))
     if match is None:
         return None
     quantity, suffix = match[1], match[2] or ""
@@ -280,7 +312,7 @@ def _parse_name(
         return None
     units = of_columns(_si_of(quantity))
     if suffix not in units:
-        shown = name.removesuffix(f"_{suffix}") if suffix else name
+        shown = ours.removesuffix(f"_{suffix}") if suffix else ours
         raise table.error(_unit_fault(shown, suffix, units), column=name)
     _check_cable(table, quantity, name, n_cables)
     return quantity, units[suffix]

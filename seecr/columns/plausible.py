@@ -12,6 +12,7 @@ from seecr.counted import figures
 from seecr.description.joints import off_joints
 from seecr.description.robot import ABSURD as ABSURD  # for those who read commands
 from seecr.description.robot import Robot
+from seecr.errors import Faults
 from seecr.pose import Array, quat_conjugate, quat_multiply, rotvec_from_quat
 from seecr.units import of_columns
 
@@ -51,10 +52,13 @@ def check_commands(
     homes = {f"length_{i + 1}": 0.0 for i in range(robot.n_cables)}
     if lengths is None:
         homes = {f"cmd_{axis}": robot.reference_pose[k] for k, axis in enumerate(POSITION)}
-    away = away_from(robot, poses, lengths)
-    for (quantity, home), distances in zip(homes.items(), away.T, strict=True):
+    away, faults = away_from(robot, poses, lengths), Faults()
+    for quantity, distances in zip(homes, away.T, strict=True):
         if quantity in columns.known:
-            _refuse_far(columns, quantity, distances, robot.reach)
+            faults.of(_refuse_far, columns, quantity, distances, robot.reach)
+    faults.check()
+    for quantity, home in homes.items():
+        if quantity in columns.known:
             _refuse_small(columns, quantity, home, robot.reach)
     if lengths is None and poses is not None:
         _refuse_another(columns, robot, poses)

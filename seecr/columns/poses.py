@@ -7,10 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.columns.cells import decimals
 from seecr.columns.known import ANGLES, POSITION, QUATERNION, Columns
 from seecr.columns.plausible import refuse_degrees
-from seecr.description.joints import pose_of_values
+from seecr.description.joints import OFF_MANIFOLD, off_joints, pose_of_values
+from seecr.description.projected import determined, projected
+from seecr.errors import Faults
+from seecr.files import toml_beside
 from seecr.pose import NORM_TOLERANCE, Array, quat_from_rxyz, rxyz_from_quat
+from seecr.units import millimetres
 
 if TYPE_CHECKING:
     from seecr.description.robot import Robot
@@ -25,15 +30,18 @@ def command_lengths(columns: Columns, robot: Robot) -> Array | None:
     missing = [f"length_{i}_m" for i in range(1, m + 1) if i not in given]
     if missing:
         raise columns.half_there("length", missing, f"all {m} cables of the robot")
-    rest = robot.rest_lengths.tolist()
-    return np.stack([_length(columns, f"length_{i}", rest[i - 1]) for i in given], axis=1)
+    lengths, faults = columns.all_numbers([f"length_{i}" for i in given]), Faults()
+    for length, i, rest in zip(lengths.T, given, robot.rest_lengths.tolist(), strict=True):
+        faults.of(_check_length, columns, f"length_{i}", length, rest)
+    faults.check()
+    return lengths
 
 
-def _length(columns: Columns, quantity: str, rest: float) -> Array:
-    """One column (n,) [m] of lengths; ``rest`` [m] is the rest length at the reference pose."""
-    length, unit = columns.numbers(quantity), columns.known[quantity].unit
+def _check_length(columns: Columns, quantity: str, length: Array, rest: float) -> None:
+    """Refuse lengths (n,) [m] of a column that are none; ``rest`` [m] is that at the reference."""
+    unit = columns.known[quantity].unit
     one = unit.to_si(1.0)
-    toml = columns.table.path.with_suffix(".toml").name
+    toml = toml_beside(columns.table.path).name
     columns.refuse(
         length <= 0,
         quantity,
@@ -43,7 +51,6 @@ def _length(columns: Columns, quantity: str, rest: float) -> Array:
             f'length there, {rest / one:.6g} {unit.suffix}, and put lengths = "told" into {toml}'
         ),
     )
-    return length
 
 
 def command_poses(columns: Columns, robot: Robot) -> Array:
@@ -56,7 +63,8 @@ def command_poses(columns: Columns, robot: Robot) -> Array:
     if poses is None:
         raise columns.table.error(
             "no command; expected columns cmd_x_m cmd_y_m cmd_z_m, or length_1_m to "
-            f"length_{robot.n_cables}_m{columns.near_misses()}"
+            f"length_{robot.n_cables}_m{columns.near_misses()}; if they have other names, say so "
+            "with --columns THEIRS=cmd_x_m,... or [columns] in the TOML"
         )
     return poses
 
@@ -71,17 +79,129 @@ def poses_of(columns: Columns, robot: Robot, prefix: str, word: str) -> Array | 
     if not present(prefix, POSITION + QUATERNION + ANGLES):
         return None
     free, reference = _free_coordinates(robot), robot.reference_pose
-    position = _group(columns, (prefix, word, "m"), POSITION, free[:3], reference[:3])
+    # joints may determine what is left out, which is found when all is read
+    needed = free & (not robot.joints)
+    noted = not robot.joints
+    of = (prefix, word, "m")
+    position = _group(columns, of, POSITION, needed[:3], reference[:3], noted=noted)
     if present(prefix, QUATERNION):
         orientation = _quaternions(columns, prefix, blank_is_nan=False)
     elif present(prefix, ANGLES):
         rxyz = rxyz_from_quat(reference[3:])
-        angles = _group(columns, (prefix, word, "deg"), ANGLES, free[3:], rxyz)
+        of = (prefix, word, "deg")
+        angles = _group(columns, of, ANGLES, needed[3:], rxyz, noted=noted)
         orientation = quat_from_rxyz(angles)
     else:
-        columns.notes.append(f"No {word} orientation: that of the reference pose is used.")
         orientation = np.tile(reference[3:], (columns.n_rows, 1))
-    return np.concatenate([position, orientation], axis=1)
+    poses = np.concatenate([position, orientation], axis=1)
+    turned = False
+    if robot.joints:
+        poses, turned = _on_joints(columns, robot, (prefix, word), poses, free)
+    if not present(prefix, QUATERNION + ANGLES):
+        why = "the joints determine it" if turned else "that of the reference pose is used"
+        columns.notes.append(f"No {word} orientation: {why}.")
+    return poses
+
+
+# Nobody who commands a robot rounds to more than this part of its size, or of a radian.
+_COARSEST = 1e-3
+
+
+def _on_joints(
+    columns: Columns, robot: Robot, of: tuple[str, str], poses: Array, free: NDArray[np.bool_]
+) -> tuple[Array, bool]:
+    """The poses (n, 7) that joints reach nearest to those of a file, and whether they turn them.
+
+    What the file leaves out of a pose must follow from the rest, or from the orientation of the
+    reference pose. What it states may be as rounded as its digits: then the true pose, which the
+    joints reach, is at most half a unit of the last digit away in each part, and the nearest one
+    no farther than that one.
+
+    Raises:
+        InputFileError: parts are missing, or a pose is farther from the joints than rounding.
+    """
+    prefix, word = of
+    given = np.array([f"{prefix}_{part}" in columns.known for part in POSITION + ANGLES])
+    given[3:] |= bool(columns.present(prefix, QUATERNION))
+    stated = given.copy()
+    turned = bool(given[3:].any()) or determined(robot, stated)
+    # angles that cannot change are as good as given; without any, those of the reference pose are
+    stated[3:] |= (given[3:].any() and not (free & ~given)[3:].any()) or not turned
+    turns = turned and bool(free[3:].any())
+    names = [f"{prefix}_{part}_{'m' if part in POSITION else 'deg'}" for part in POSITION + ANGLES]
+    parts = range(6 if given[3:].any() else 3)
+    missing = [names[k] for k in parts if free[k] and not given[k]]
+    need = " ".join(names[k] for k in parts if free[k])
+    if not determined(robot, stated):
+        raise columns.half_there(f"{word} pose", missing, need)
+    if (stated | ~free).all() and off_joints(robot, poses) is None:
+        _absent_notes(columns, prefix, given, free)
+        return poses, turns
+    reached, off, other = projected(robot, poses, stated)
+    if not stated.all() and other.any():
+        raise columns.half_there(f"{word} pose", missing, need)
+    _absent_notes(columns, prefix, given, free)
+    allowed = _rounding(columns, robot, prefix)
+    size = np.repeat([robot.length, 1.0], 3)
+    far = np.linalg.norm(off / size, axis=1)
+    row = int(np.argmax(far))
+    if far[row] > np.linalg.norm(allowed / size) + OFF_MANIFOLD:
+        raise columns.table.error(_too_far(robot, off[row], allowed), row=row)
+    if far[row] > OFF_MANIFOLD:
+        moved = _distance(off[np.argmax(far)])
+        columns.notes.append(
+            f"The {word} poses are rounded: those that the joints reach are up to {moved} away, "
+            "and are taken."
+        )
+    return reached, turns
+
+
+def _absent_notes(
+    columns: Columns, prefix: str, given: NDArray[np.bool_], free: NDArray[np.bool_]
+) -> None:
+    """Notes on coordinates that were left out, and on angles if some are given."""
+    for parts in (range(3), range(3, 6) if given[3:].any() else ()):
+        for stays in (True, False):
+            lost = [k for k in parts if not given[k] and free[k] != stays]
+            if lost:
+                names = " ".join(f"{prefix}_{(POSITION + ANGLES)[k]}" for k in lost)
+                why = "the robot cannot move there, the reference pose's value is used"
+                columns.notes.append(f"No {names}: {why if stays else 'the joints determine it'}.")
+
+
+def _rounding(columns: Columns, robot: Robot, prefix: str) -> Array:
+    """(6,) half a unit of the last digit [m, rad]; the finest of the positions, and of the angles.
+
+    A quaternion that is off by d is off by an angle of 2 d.
+    """
+    out = np.repeat([_COARSEST * robot.reach, _COARSEST], 3)
+    for parts, where, factor in (
+        (POSITION, slice(0, 3), 1.0), (ANGLES, slice(3, 6), 1.0), (QUATERNION, slice(3, 6), 2.0)
+    ):  # fmt: skip
+        for part in columns.present(prefix, parts):
+            column = columns.known[f"{prefix}_{part}"]
+            half = 0.5 * 10.0 ** -max(map(decimals, columns.table.cells[column.index]))
+            out[where] = np.minimum(out[where], factor * column.unit.to_si(half))
+    return out
+
+
+def _distance(off: Array) -> str:
+    """Parts (6,) [m, rad] of a distance in words."""
+    size, turn = float(np.linalg.norm(off[:3])), float(np.degrees(np.linalg.norm(off[3:])))
+    words = [millimetres(size, 3)] if size > 0.0 else []
+    return " and ".join([*words, *([f"{turn:.3g} deg"] if turn > np.degrees(OFF_MANIFOLD) else [])])
+
+
+def _too_far(robot: Robot, off: Array, allowed: Array) -> str:
+    part = int(np.argmax(np.abs(off) / np.repeat([robot.length, 1.0], 3)))
+    unit = "m" if part < 3 else "rad"
+    coarse = f", where rounding of its digits explains {allowed[part]:.2g} {unit}"
+    return (
+        f"the joints of robot {robot.name} cannot reach the commanded pose: it is off by "
+        f"{abs(off[part]):.3g} {unit} in {'xyz'[part % 3]}"
+        f"{coarse if allowed[part] > OFF_MANIFOLD else ''}; expected a pose that they can reach; "
+        "are these the commands of another robot?"
+    )
 
 
 def wanted_poses(columns: Columns, robot: Robot) -> Array | None:
@@ -146,11 +266,12 @@ def _all_stated(columns: Columns, robot: Robot) -> bool:
 
 def _group(
     columns: Columns, of: tuple[str, str, str], parts: tuple[str, ...], free: NDArray[np.bool_],
-    reference: Array, *, blank_is_nan: bool = False,
+    reference: Array, *, blank_is_nan: bool = False, noted: bool = True,
 ) -> Array:  # fmt: skip
     """Three coordinates or angles (n, 3); the reference pose's where they cannot change.
 
-    ``of`` is the columns' prefix, the word for it, and a unit for errors.
+    ``of`` is the columns' prefix, the word for it, and a unit for errors; ``noted`` says whether
+    missing columns are.
 
     Raises:
         InputFileError: a missing column, or radians that must be degrees.
@@ -161,7 +282,7 @@ def _group(
     if missing:
         need = " ".join(f"{prefix}_{parts[k]}_{unit}" for k in range(3) if free[k])
         raise columns.half_there(f"{word} pose", missing, need)
-    if absent:
+    if absent and noted:
         names = " ".join(f"{prefix}_{parts[k]}" for k in absent)
         columns.notes.append(
             f"No {names}: the robot cannot move there, the reference pose's value is used."
@@ -169,9 +290,9 @@ def _group(
     if parts == ANGLES:
         refuse_degrees(columns, prefix, parts)
     values = np.tile(np.asarray(reference, float), (columns.n_rows, 1))
-    for k, part in enumerate(parts):
-        if k not in absent:
-            values[:, k] = columns.numbers(f"{prefix}_{part}", blank_is_nan=blank_is_nan)
+    there = [k for k in range(len(parts)) if k not in absent]
+    quantities = [f"{prefix}_{parts[k]}" for k in there]
+    values[:, there] = columns.all_numbers(quantities, blank_is_nan=blank_is_nan)
     return values
 
 
@@ -192,8 +313,8 @@ def _quaternions(columns: Columns, prefix: str, *, blank_is_nan: bool) -> Array:
     missing = [f"{prefix}_{part}" for part in QUATERNION if part not in given]
     if missing:
         raise columns.half_there("quaternion", missing, "all four or none")
-    parts = [columns.numbers(f"{prefix}_{p}", blank_is_nan=blank_is_nan) for p in QUATERNION]
-    quat = np.stack(parts, axis=1)
+    parts = [f"{prefix}_{part}" for part in QUATERNION]
+    quat = columns.all_numbers(parts, blank_is_nan=blank_is_nan)
     _check_whole(columns, prefix, np.isnan(quat))
     norm: Array = np.linalg.norm(quat, axis=1)
     _check_norm(columns, prefix, quat, norm)

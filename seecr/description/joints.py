@@ -11,8 +11,8 @@ from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.pose import Array, cross, pose_difference
 
-# Allowed distance of a commanded pose from what the joints reach [robot's length, or rad].
-_OFF_MANIFOLD = 1e-6
+OFF_MANIFOLD = 1e-6
+"""Allowed distance of a commanded pose from what joints reach [robot's length, or rad]."""
 # Poses nearer than this [m or robot's length, rad] are the same but for rounding.
 _EXACT = 1e-15
 # Changes of a pose below this are rounding [m or robot's length, rad]; so many values show them.
@@ -164,7 +164,7 @@ def _searched(robot: Robot, poses: Array, values: Array, off: Array) -> Array:
     least = _far(robot, poses, best)
     turns = np.random.default_rng(0).uniform(-np.pi, np.pi, (_TRIES, len(robot.joints)))
     for start in turns * robot.hinges:
-        rows = np.flatnonzero(unknown & (least > _OFF_MANIFOLD) & np.isfinite(poses).all(axis=1))
+        rows = np.flatnonzero(unknown & (least > OFF_MANIFOLD) & np.isfinite(poses).all(axis=1))
         if len(rows) == 0:
             break
         found = _by_newton(robot, poses[rows], np.tile(start, (len(rows), 1)))
@@ -218,7 +218,7 @@ def reachable(robot: Robot, poses: Array) -> Array:
 def _off_joints(robot: Robot, poses: Array, reached: Array) -> tuple[int, str] | None:
     """The row farthest from what the joints can reach, and its distance; None if none is."""
     miss = _missed(robot, poses, reached)
-    if not np.any(miss > _OFF_MANIFOLD):
+    if not np.any(miss > OFF_MANIFOLD):
         return None
     row, part = np.unravel_index(np.argmax(miss), miss.shape)
     size = miss[row, part] * (robot.length if part < 3 else 1.0)

@@ -361,8 +361,15 @@ class Robot:
         return np.asarray(self.nominal_lengths(self.reference_pose[None])[0])
 
     def nominal_lengths(self, poses: Array) -> Array:
-        """Straight lengths |A_i - (t + R B_i)| at poses (n, 7), as (n, m) [m] (eqs 1, 2)."""
-        anchors = transform_points(np.asarray(poses, float), self.anchor_points)
+        """Straight lengths |A_i - (t + R B_i)| at poses (n, 7), as (n, m) [m] (eqs 1, 2).
+
+        Positions (n, 3) are poses turned as the reference pose.
+        """
+        poses = np.asarray(poses, float)
+        if poses.shape[-1] == 3:
+            turn = np.broadcast_to(self.reference_pose[3:], (*poses.shape[:-1], 4))
+            poses = np.concatenate([poses, turn], axis=-1)
+        anchors = transform_points(poses, self.anchor_points)
         return np.asarray(np.linalg.norm(self.exit_points - anchors, axis=-1))
 
     def commanded_lengths(self, poses: Array) -> Array:

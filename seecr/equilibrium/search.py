@@ -204,7 +204,8 @@ def equilibria(
     Example:
         ``seecr.equilibria(robot, [0.4, 0.25, 0.15, 1, 0, 0, 0])``
     """
-    robot, command = robot_of(robot), commanded_poses(pose)
+    robot = robot_of(robot)
+    command = commanded_poses(pose, robot=robot)
     most = whole(most, "most", least=1)
     if len(command) != 1:
         raise InputError(f"equilibria needs one commanded pose (7,), got {len(command)}")
@@ -224,7 +225,7 @@ def equilibria(
 
 def on_their_way(robot: Robot, pose: ArrayLike, effects: GivenEffects) -> list[str]:
     """Names of the effects by which a command leads to one rest, on the way: see `equilibria`."""
-    command = Commands(commanded_poses(pose))
+    command = Commands(commanded_poses(pose, robot=robot))
     each = [(one.name, setup_with([one], robot, command)) for one in effects_of(effects, robot)]
     return [name for name, alone in each if alone.has_history or alone.laws]
 

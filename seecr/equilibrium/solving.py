@@ -117,7 +117,7 @@ def solve(
         return replace(found, line=commands.line)
     starts = None
     if start is not None:
-        starts = commanded_poses(start, "start")
+        starts = commanded_poses(start, "start", robot)
         if len(starts) != len(commands):
             raise InputError(f"start must have {counted(len(commands), 'pose')}, got {len(starts)}")
     elif method == "newton" and not follow:
@@ -158,7 +158,7 @@ def _commands(
     if lengths is None:
         if poses is None:
             raise InputError("solve needs commanded poses (n, 7) or rest_lengths (n, m); got none")
-        return Commands(commanded_poses(poses))
+        return Commands(commanded_poses(poses, robot=robot))
     table = np.atleast_2d(finite(lengths, "rest_lengths"))
     if table.ndim != 2 or table.shape[1] != robot.n_cables:
         raise InputError(
@@ -166,7 +166,7 @@ def _commands(
         )
     if np.any(table <= 0):
         raise InputError("rest_lengths must be positive [m]")
-    start = robot.reference_pose[None] if poses is None else commanded_poses(poses)
+    start = robot.reference_pose[None] if poses is None else commanded_poses(poses, robot=robot)
     if len(start) not in (1, len(table)):
         raise InputError(
             f"poses must be one or as many as the {counted(len(table), 'row')} of rest_lengths, "

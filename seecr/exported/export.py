@@ -245,7 +245,7 @@ def export(robot: GivenRobot, effects: GivenEffects = (), at: ArrayLike | None =
         ``seecr.export(robot, "model.toml").text``
     """
     robot = robot_of(robot)
-    place = robot.reference_pose[None] if at is None else commanded_poses(at, "at")
+    place = robot.reference_pose[None] if at is None else commanded_poses(at, "at", robot)
     if len(place) != 1:
         raise InputError(f"expected one pose to export at, got {len(place)}")
     said, solution = _sorted(robot, effects_of(effects, robot), place)

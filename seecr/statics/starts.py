@@ -27,7 +27,7 @@ class HasCommands(Protocol):
 
 
 Commanded: TypeAlias = Commands | HasCommands | ArrayLike
-"""Commands, what holds them, or commanded poses (n, 7)."""
+"""Commands, what holds them, commanded poses (n, 7), or positions (n, 3) of level platforms."""
 
 
 def commands_from(given: Commanded, robot: Robot) -> Commands:
@@ -40,7 +40,7 @@ def commands_from(given: Commanded, robot: Robot) -> Commands:
         return given
     if isinstance(given, HasCommands):
         return given.as_commands(robot)
-    return Commands(commanded_poses(given))
+    return Commands(commanded_poses(given, robot=robot))
 
 
 def answered(commands: Commands) -> Commands:
@@ -76,9 +76,14 @@ def start_of(
     return batch.deviations(tables, start), change * np.where(robot.hinges, robot.length, 1.0)
 
 
-def commanded_poses(values: ArrayLike, name: str = "poses") -> Array:
-    """Checked poses (n, 7) with unit quaternions; ``name`` is for errors."""
+def commanded_poses(values: ArrayLike, name: str = "poses", robot: Robot | None = None) -> Array:
+    """Checked poses (n, 7) with unit quaternions; ``name`` is for errors.
+
+    With a robot positions (n, 3) are poses turned as its reference pose.
+    """
     array = np.atleast_2d(finite(values, name))
+    if robot is not None and array.ndim == 2 and array.shape[1] == 3:
+        array = np.column_stack([array, np.tile(robot.reference_pose[3:], (len(array), 1))])
     if array.ndim != 2 or array.shape[1] != 7:
         raise InputError(f"{name} must be (n, 7), x y z qw qx qy qz, got {np.shape(values)}")
     norm = np.linalg.norm(array[:, 3:], axis=1)

@@ -102,7 +102,7 @@ def bar_balances(robot: GivenRobot, pose: ArrayLike) -> tuple[BarBalance, ...] |
         ``seecr.bar_balances("planar_two_cable", solution.pose[0])``
     """
     robot = robot_of(robot)
-    places = commanded_poses(pose)
+    places = commanded_poses(pose, robot=robot)
     if len(places) != 1:
         raise InputError(f"bar_balances needs one pose (7,), got {len(places)}")
     across = _across(robot)

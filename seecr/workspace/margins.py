@@ -166,7 +166,7 @@ def held_chance(
     if known is None:
         return None
     terms, covariance = known
-    places, limits = commanded_poses(poses), (lowest, highest, wrenches)
+    places, limits = commanded_poses(poses, robot=robot), (lowest, highest, wrenches)
     vectors = _drawn(terms, covariance, _STAGES[-1][0])
     solved = robot.n_cables < robot.n_dof
     out, rows = np.zeros(len(places)), np.arange(len(places))
@@ -306,7 +306,8 @@ def boundary(
     if not 0.0 < tolerance < np.inf:
         raise InputError(f"an edge's tolerance [m] must be above 0 and finite, got {tolerance:g}")
     effects = read_once(effects, robot)
-    near, far = commanded_poses(inside, "inside"), commanded_poses(outside, "outside")
+    near = commanded_poses(inside, "inside", robot)
+    far = commanded_poses(outside, "outside", robot)
 
     def held(poses: Array) -> NDArray[np.bool_]:
         if at_least is not None:

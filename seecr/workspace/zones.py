@@ -153,7 +153,7 @@ def tension_margin(
     from seecr.compiled.tensions import margins_at  # takes a while to import
 
     robot = robot_of(robot)
-    places = commanded_poses(poses)
+    places = commanded_poses(poses, robot=robot)
     low, high = tension_limits(robot, lowest, highest)
     if wrench is not None:
         wrench = _wrench(wrench, len(places))
@@ -340,7 +340,7 @@ def slack_zones(solution: Solution) -> list[Zone]:
 
 def wrench_matrix(robot: Robot, poses: ArrayLike) -> Array:
     """W of eq 4 at poses (n, 7): unit vectors over moments at the platform origin, (n, 6, m)."""
-    places = commanded_poses(poses)
+    places = commanded_poses(poses, robot=robot)
     anchors = transform_points(places, robot.anchor_points)
     cables = robot.exit_points - anchors
     size = np.linalg.norm(cables, axis=-1, keepdims=True)

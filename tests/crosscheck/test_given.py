@@ -55,8 +55,8 @@ DATA = Measurements(Path("m.csv"), 8, np.array(["a"]), command_pose=ROBOT.refere
 BAD: dict[str, tuple[Callable[[], Any], str]] = {
     "no data": (lambda: crosscheck.compare(ROBOT, []), "expected measurements or their files, got"),
     "tolerance": (
-        lambda: crosscheck.diagnose(ROBOT, DATA, tolerance=cast(Any, "1mm")),
-        "tolerance: expected a crosscheck.Tolerance, got '1mm'",
+        lambda: crosscheck.diagnose(ROBOT, DATA, tolerance=cast(Any, 0.1)),
+        "tolerance: expected a crosscheck.Tolerance, got 0.1",
     ),
     "names": (
         lambda: crosscheck.add_effects(ROBOT, DATA, ["creep", cast(Any, 3)]),

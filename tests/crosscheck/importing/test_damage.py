@@ -74,7 +74,8 @@ DAMAGE = {
     ),
     "Euler angles": (
         "motive", lambda x: [x[0].replace("Quaternion", "XYZ"), *x[1:]],
-        r"line 1: expected Rotation Type Quaternion, got 'XYZ'; export it again with quaternions"
+        r"line 1: expected Rotation Type Quaternion, or an order of Euler angles such as XYZ, got "
+        r"'XYZ' with 4 columns of rotations; export it again"
     ),
     "inches": (
         "motive", lambda x: [x[0].replace("Meters", "Inches"), *x[1:]],

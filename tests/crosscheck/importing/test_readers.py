@@ -243,3 +243,59 @@ def test_orders_of_angles_take_each_from_its_own_axis() -> None:
     for order, expected in {"xyz": z * y * x, "XYZ": x * y * z, "zxy": y * x * z}.items():
         assert (rotations(angles, order)[0] * expected.inv()).magnitude() < 1e-12
     assert rotations(angles, "vector").as_rotvec() == pytest.approx(angles)
+
+
+EULER = """Format Version,1.23,Take Name,a,Export Frame Rate,20.0,Rotation Type,{order},Length Units,Meters,Coordinate Space,Global
+
+,Type,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body
+,Name,deck,deck,deck,deck,deck,deck
+,ID,"9E20","9E20","9E20","9E20","9E20","9E20"
+,,Rotation,Rotation,Rotation,Position,Position,Position
+Frame,{time},{axes},X,Y,Z
+0,{t0},{first},0.1,0.2,0.3
+4,{t1},,,,,,
+"""  # noqa: E501
+
+
+def euler_take(folder: Path, order: str, axes: str = "XYZ", time: str = "Time (Seconds)") -> Path:
+    """Angles of 10, 20 and 40 degrees about X, Y and Z; in the second frame it was not seen."""
+    angles = dict(zip("XYZ", ("10", "20", "40"), strict=True))
+    path = folder / "take.csv"
+    t0, t1 = ("0.0", "0.2") if time.startswith("Time (") else ("15:26:46:00", "15:26:46:04")
+    path.write_text(
+        EULER.format(order=order, time=time, t0=t0, t1=t1, axes=",".join(axes),
+                     first=",".join(angles[axis] for axis in axes))
+    )  # fmt: skip
+    return path
+
+
+def turn_about(axis: str, degrees: float) -> np.ndarray:
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    i, j = {"X": (1, 2), "Y": (2, 0), "Z": (0, 1)}[axis]
+    out = np.eye(3)
+    out[i, i], out[j, j], out[i, j], out[j, i] = c, c, -s, s
+    return out
+
+
+@pytest.mark.parametrize("order", ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"])
+@pytest.mark.parametrize("axes", ["XYZ", "ZYX"])
+def test_motives_euler_angles_turn_about_moving_axes(tmp_path: Path, order: str, axes: str) -> None:
+    """The matrix is the product in the order of the header's letters, whatever the columns'."""
+    ((_place, quat),) = read_motive(euler_take(tmp_path, order, axes)).bodies.values()
+    angle = {"X": 10.0, "Y": 20.0, "Z": 40.0}
+    expected = np.linalg.multi_dot([turn_about(axis, angle[axis]) for axis in order])
+    found = Rotation.from_quat(quat[0], scalar_first=True).as_matrix()
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+    assert np.isnan(quat[1]).all()
+
+
+def test_frames_over_their_rate_are_times_where_there_is_none(tmp_path: Path) -> None:
+    export = read_motive(euler_take(tmp_path, "XYZ", time="TimeCode"))
+    assert export.t_s.tolist() == [0.0, 0.2]
+
+
+@pytest.mark.parametrize("order", ["XYX", "Angles", "XY"])
+def test_an_unknown_type_of_rotation_is_refused(tmp_path: Path, order: str) -> None:
+    said = f"line 1: .*such as XYZ, got '{order}' with 3 columns of rotations; export it again"
+    with pytest.raises(InputFileError, match=said):
+        read_motive(euler_take(tmp_path, order))

@@ -15,8 +15,16 @@ from crosscheck.measurements.read import commands_of, load_commands, load_measur
 from seecr.columns.csv import Table
 from seecr.columns.known import know_columns
 from seecr.commands import Loads
+from seecr.description.joints import off_joints
 from seecr.errors import InputError, InputFileError
-from seecr.pose import quat_from_rotvec, quat_from_rxyz, quat_multiply, quat_rotate, quat_to_matrix
+from seecr.pose import (
+    quat_from_rotvec,
+    quat_from_rxyz,
+    quat_multiply,
+    quat_rotate,
+    quat_to_matrix,
+    rxyz_from_quat,
+)
 
 NO_TURN = "No commanded orientation: that of the reference pose is used."
 
@@ -94,17 +102,26 @@ def test_robot_on_an_arm_needs_the_coordinates_the_arm_sweeps(csv_file, robots):
 def test_sliding_robot_keeps_its_reference_orientation(csv_file, robots):
     data = load_measurements(csv_file("run,cmd_x_m,cmd_z_m,meas_x_m", "a,1,2,3"), robots["slides"])
     assert data.command_pose[0] == pytest.approx([1, 0.05, 2, 0.8, 0, 0.6, 0])
-    # A body turned about the vertical takes its slides along: now it moves in y as well.
-    with pytest.raises(InputFileError, match="cmd_y_m missing"):
-        load_measurements(data.path, robots["yawed"])
+    # A body turned about the vertical takes its slides along: now it moves in y as well, as far as
+    # x says.
+    data = load_measurements(data.path, robots["yawed"])
+    assert "No cmd_y: the joints determine it." in data.notes
+    assert off_joints(robots["yawed"], data.command_pose) is None
+    assert data.command_pose[0, [0, 2]] == pytest.approx([1, 2], abs=1e-12)
+    assert abs(data.command_pose[0, 1] - 0.05) > 0.1
 
 
 def test_a_hinge_turns_only_the_joints_after_it(csv_file, robots):
     path = csv_file("run,cmd_x_m,cmd_ry_deg,meas_x_m", "a,0.3,0,0.3")
     data = load_measurements(path, robots["slide then hinge"])
     assert data.command_pose[0] == pytest.approx([0.3, 0.05, 0, 1, 0, 0, 0])
-    with pytest.raises(InputFileError, match="expected cmd_x_m cmd_z_m, cmd_z_m missing"):
-        load_measurements(path, robots["hinge then slide"])
+    # the slide of a turned body: x and the angle tell how far it went, and so z
+    data = load_measurements(
+        csv_file("run,cmd_x_m,cmd_ry_deg,meas_x_m", "a,0.3,30,0.3"), robots["hinge then slide"]
+    )
+    assert off_joints(robots["hinge then slide"], data.command_pose) is None
+    assert rxyz_from_quat(data.command_pose[0, 3:]) == pytest.approx([0, np.pi / 6, 0])
+    assert data.command_pose[0, 0] == pytest.approx(0.3, abs=1e-12)
 
 
 def test_two_angles_only_stay_angles(csv_file, robot):
@@ -195,7 +212,7 @@ def test_byte_order_mark_crlf_comments_spaces_and_blank_lines(csv_file, robot):
 
 
 def test_unnamed_column_is_unused(csv_file, robot):
-    data = load_measurements(csv_file("," + CMD + ",meas_x_m,", "0,1,2,3,4,"), robot)
+    data = load_measurements(csv_file("," + CMD + ",meas_x_m,,", "0,1,2,3,4,5,"), robot)
     assert data.unused_columns == ("(column 1, without a name)", "(column 6, without a name)")
 
 

@@ -64,7 +64,7 @@ REFUSED = {
         "commands are given twice, as cmd_x_m and as length_1_m; expected poses or lengths"),
     "no command": (["run,t_s,meas_x_m", "a,0,0"],
         "line 1: no command; expected columns cmd_x_m cmd_y_m cmd_z_m, or "
-        "length_1_m to length_4_m$"),
+        "length_1_m to length_4_m; if they have other names, say so with --columns THEIRS="),
     "misspelt command": (["cmdx_m,cmdy_m,cmdz_m,meas_x_m", "0,0,0,0"],
         r"no command; .* \(Column 'cmdx_m' is not used; did you mean cmd_x_m\?; "),
     "no measurement": (["run," + CMD, "a,0,0,0"],
@@ -87,8 +87,8 @@ REFUSED = {
         "expected all four or none, meas_qz missing"),
     "lengths half there": (["length_1_m,length_2_m,length_3_m,meas_x_m", "1,1,1,0"],
         "incomplete length columns: expected all 4 cables of the robot, length_4_m missing"),
-    "misspelt half": (["cmd_x_m,cmd_y_m,cmd_Z_m,meas_x_m", "0,0,0,0"],
-        r"cmd_z_m missing \(Column 'cmd_Z_m' is not used; did you mean cmd_z_m\?\)"),
+    "misspelt half": (["cmd_x_m,cmd_y_m,cmdz_m,meas_x_m", "0,0,0,0"],
+        r"cmd_z_m missing \(Column 'cmdz_m' is not used; did you mean cmd_z_m\?\)"),
     "cable nine": ([POSE + ",tension_9_N", "0,0,0,0,1"],
         "column tension_9_N: there is no cable 9; the robot has 4 cables, expected "
         "tension_1 to tension_4"),
@@ -108,9 +108,10 @@ REFUSED = {
     "NaN command": ([POSE, "0,NaN,0,0"],
         "line 2, column cmd_y_m: expected a number in every row, got 'NaN'; "
         "fill it or drop the row"),
-    "not available": ([POSE, "0,0,0,0", "0,0,0,N/A"],
-        "line 3, column meas_x_m: expected a number, or an empty cell where the "
-        "reading is missing, got 'N/A'"),
+    "not available": ([POSE, "0,0,0,0", "0,0,N/A,0"],
+        "line 3, column cmd_z_m: expected a number in every row, got 'N/A'"),
+    "broken formula": ([POSE, "0,0,0,0", "0,0,0,#DIV/0!"],
+        "line 3, column meas_x_m: .* got '#DIV/0!', an error of a formula; mend it in"),
     "infinite": ([POSE, "0,0,0,-inf"], "line 2, column meas_x_m: .*got '-inf'"),
     "overflow": ([POSE, "0,0,0,1e999"], "line 2, column meas_x_m: .*got '1e999'"),
     "blank command": ([POSE, "0,0,,0"],
@@ -198,10 +199,10 @@ def test_norm_tolerance_lies_between_rounding_and_mistake(csv_file, robot):
         (b"PK\x03\x04\x14\0", "is a zip archive or an Excel workbook; expected"),
         (b"%PDF-1.7\n", "is a PDF; expected"),
         (b"RRF2\0\0", "is a Rerun recording; expected"),
-        ("run,cmd_x_m\n".encode("utf-16"), "is UTF-16 text; expected"),
+        ("run,cmd_x_m\n".encode("utf-16"), "line 1: has a header but no rows"),
         (b"\x01\x02\0\x03", "is a binary file; expected"),
         (
-            b"run,meas_x_m\n# caf\xe9\na,0\n",
+            b"run,meas_x_m\n# caf\xe9\x81\na,0\n",
             r"line 2: byte 0xE9 \(number 19 of the file\) is not UTF-8; expected text in UTF-8",
         ),
         (b"PAR1 and then nothing", "cannot be read as Parquet"),

@@ -151,6 +151,41 @@ def test_of_several_files_only_the_one_that_was_filled_in_loses_them(cogiro):
     assert np.array_equal(seen, ready.problem.data.file == 0)
 
 
+AGAIN = "not counted as readings, because the same number stands there again and again where the"
+TENSIONS = ", ".join(f"tension_{k}" for k in range(1, 9))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "names"),
+    [
+        (lambda d, some: replace(d, tensions=np.where(some, 0.0, d.tensions)), TENSIONS),
+        (lambda d, some: replace(d, tensions=np.where(some, -1.0, d.tensions)), TENSIONS),
+        (lambda d, some: replace(d, tensions=np.where(some, d.tensions[0], d.tensions)), TENSIONS),
+        (lambda d, some: replace(d, quat_wxyz=np.where(some, [1.0, 0, 0, 0], d.quat_wxyz)),
+         "rotation about x, rotation about y, rotation about z"),
+        (lambda d, some: replace(d, position=np.where(some & [[True, False, True]], [9.0, 0, -1],
+                                                      d.position)), "x, z"),
+    ],
+    ids=["0", "-1", "the last value", "no turn", "positions"],
+)  # fmt: skip
+def test_cells_that_were_filled_in_are_no_readings(cogiro, spoil, names):
+    """In a third of the rows; the others count."""
+    some = (np.arange(cogiro.n_rows) % 3 == 1)[:, None]
+    ready = prepare(COGIRO, spoil(cogiro, some), Terms())
+    (said,) = [note for note in ready.notes if "again and again" in note]
+    assert said.startswith(f"{names}: lines ") and AGAIN in said
+    width = names.count(",") + 1
+    gone = prepare(COGIRO, cogiro, Terms()).problem.n_readings - ready.problem.n_readings
+    assert 0 <= gone - width * int(some.sum()) <= width  # the value that was held, too
+
+
+def test_coarse_readings_repeat_by_rounding(cogiro):
+    """In steps of half the usual tension: as many of one number, nearly, as of the next."""
+    step = 0.5 * float(np.sqrt(np.mean(cogiro.tensions**2)))
+    coarse = replace(cogiro, tensions=np.round(cogiro.tensions / step) * step)
+    assert not any("again and again" in n for n in prepare(COGIRO, coarse, Terms()).notes)
+
+
 def test_numbers_that_may_well_stay_the_same_are_readings(cogiro):
     slack = np.where(np.arange(8) == 2, 0.0, cogiro.tensions)
     still = replace(COGIRO, ea=1e4 * COGIRO.ea)  # whose platform hardly turns

@@ -44,7 +44,9 @@ def test_columns_are_known_by_quantity_in_si() -> None:
 def test_the_first_wrong_row_is_named() -> None:
     columns = columns_of("t_s", "1", "2", "3")
     columns.refuse(np.zeros(3, dtype=bool), "t", lambda row: "never")
-    with pytest.raises(InputFileError, match=r"a\.csv: line 3, column t_s: row 1$"):
+    with pytest.raises(
+        InputFileError, match=r"a\.csv: line 3, column t_s: row 1 \(also at line 4\)$"
+    ):
         columns.refuse(np.array([False, True, True]), "t", lambda row: f"row {row}")
 
 
