@@ -12,7 +12,7 @@ release = version = __version__
 
 root_doc = "docs/index"
 include_patterns = ["*.md", "docs/*.md", "models/README.md", "examples/*"]
-exclude_patterns = [".venv*", "build", "dist"]
+exclude_patterns = [".venv*", "build", "dist", "docs/joss", "CODE_OF_CONDUCT.md", "SECURITY.md"]
 extensions = ["myst_nb"]
 
 smartquotes = False  # two hyphens begin an option

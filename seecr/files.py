@@ -63,7 +63,7 @@ def of_sheet(path: Path) -> tuple[Path, str | None]:
     return path, None
 
 
-def toml_beside(path: Path) -> Path:
+def toml_path(path: Path) -> Path:
     """The TOML beside a file of rows; that of a workbook is beside all of its sheets."""
     return of_sheet(path)[0].with_suffix(".toml")
 
@@ -229,7 +229,7 @@ def check_writable(path: Path) -> None:
 
 def with_toml(path: Path | None) -> list[Path]:
     """A file of commands and the TOML beside it, which is read with it; empty without a file."""
-    return [] if path is None else [of_sheet(path)[0], toml_beside(path)]
+    return [] if path is None else [of_sheet(path)[0], toml_path(path)]
 
 
 def json_text(document: Mapping[str, Any], indent: int | None = 1) -> str:

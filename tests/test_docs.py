@@ -73,7 +73,7 @@ def test_the_page_of_public_names_is_current_and_has_them_all() -> None:
     # and what a method takes
     assert "- `.count(verdict: Verdict) -> int`: " in page
     assert "- `.fixed(*names: str) -> Term`: " in page
-    assert "\nJoint(kind: str, name: str, axis: Array, point: Array)\n" in page
+    assert "\nJoint(kind: str, name: str, axis: Array, point: Array, ball: bool = False)\n" in page
 
 
 def test_one_line_of_a_docstring_may_explain_several_names() -> None:

@@ -92,6 +92,7 @@ crosscheck.given: check_case
 crosscheck.importing: FILES write_case
 crosscheck.twin: FILES
 seecr.columns.commands: CommandFile read_commands
+seecr.columns.headers: columns_said parse_columns renamed
 seecr.columns.plausible: ABSURD scalar_last
 seecr.compiled.compile_notice: tell_compiling
 seecr.counted: counted

@@ -78,7 +78,9 @@ def from_arrays(
         ("temperatures", temperatures, ["temperature_C"]),
         ("payloads", payloads, ["payload_kg"]),
     ]
-    columns: dict[str, Sequence[Any]] = {} if runs is None else {"run": list(runs)}
+    columns: dict[str, Sequence[Any]] = {}
+    if runs is not None:
+        columns["run"] = list(runs)
     faults = []
     for name, values, names in given:
         if values is not None:

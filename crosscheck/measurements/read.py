@@ -52,7 +52,7 @@ from seecr.commands import Commands, Loads
 from seecr.counted import counted
 from seecr.effects import known
 from seecr.errors import Faults, InputError, InputFileError
-from seecr.files import Toml, path_of, read_toml, toml_beside
+from seecr.files import Toml, path_of, read_toml, toml_path
 from seecr.folders import check_together
 from seecr.pose import Array, rxyz_from_quat
 
@@ -490,7 +490,7 @@ def _toml_of(path: Path, sigma_path: str | Path | None) -> Path | None:
     """The TOML of a file, if it has one; one that is named must exist."""
     if sigma_path is not None:
         return Path(sigma_path)
-    beside = toml_beside(path)
+    beside = toml_path(path)
     check_together(path, beside)
     return beside if beside.exists() else None
 

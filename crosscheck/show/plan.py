@@ -89,7 +89,7 @@ def page_of_plan(plan: Plan) -> Page:
         verdict="plan",
         name="What these poses can reveal",
         sentence=plan.sentence,
-        lead=in_brief(plan),
+        lead=plan_in_brief(plan),
         blocks=present(
             section("The poses", facts_of(problem), *(Line(words) for words in plan.demanded)),
             *(_visible(plan) if plan.effects else ()),
@@ -103,7 +103,7 @@ def page_of_plan(plan: Plan) -> Page:
     )
 
 
-def in_brief(plan: Plan) -> list[Words]:
+def plan_in_brief(plan: Plan) -> list[Words]:
     """What will be seen, what cannot be told apart, and what to add, a line each."""
     title = {found.name: found.signal.layout.effect.title for found in plan.effects}
     shows, pairs = [], []

@@ -278,12 +278,11 @@ class Answer:
         words: list[Any] = [document.get(key) for key in ("robot", "truth")]
         counts: list[Any] = [document.get(key) for key in ("seed", "poses")]
         values, moves = (_table(document.get(key)) for key in ("values", "moves_over_noise"))
-        known = {*TRUE_EFFECTS, _OF_TENSIONS, *CONTAINED}
         if (
             not all(isinstance(word, str) and word.isprintable() for word in words)
             or not all(type(count) is int and count >= 0 for count in counts)
             or values.keys() != moves.keys()
-            or not values.keys() <= known
+            or not all(map(str.isidentifier, values))  # an effect of one's own may be among them
         ):
             raise ValueError
         return cls(

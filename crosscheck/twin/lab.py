@@ -220,11 +220,12 @@ class Measured:
     def unseen(self, again: bool) -> set[str]:
         """The effects that move no reading clearly above its noise.
 
-        Along other commands than a lab's own (``again``) those that move none above it at all: as
-        long as anything shows, it is the robot that was measured before.
+        Along other commands than a lab's own (``again``) all of them, if none moves any above it:
+        as long as anything shows, it is the robot that was measured before.
         """
         least = 1.0 if again else _VISIBLE
-        return {one.name for one, truth in self.alone if not self.moves(truth).max > least}
+        hidden = {one.name for one, truth in self.alone if not self.moves(truth).max > least}
+        return hidden if not again or len(hidden) == len(self.alone) else set()
 
 
 def random_of(

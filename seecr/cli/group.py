@@ -133,7 +133,10 @@ class LazyGroup(click.Group):
 
     def _refuse(self, text: str, status: int = BAD_INPUT) -> int:
         for line in text.splitlines():  # several faults of one file are a line each
-            click.echo(f"{self.name}: {printable(' '.join(line.split()))}", err=True)
+            words = printable(" ".join(line.split()))
+            click.echo(
+                f"  {words}" if words.startswith("- ") else f"{self.name}: {words}", err=True
+            )
         return status
 
     def _run(self, *args: Any, **extra: Any) -> Any:

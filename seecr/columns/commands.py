@@ -25,7 +25,7 @@ from seecr.columns.poses import aimed_poses, command_lengths, command_poses
 from seecr.commands import Commands, Loads
 from seecr.description.robot import Robot
 from seecr.errors import Faults, InputFileError
-from seecr.files import Toml, read_toml, toml_beside
+from seecr.files import Toml, read_toml, toml_path
 from seecr.folders import check_together
 from seecr.pose import Array
 
@@ -342,7 +342,7 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
         InputFileError: with line and column of the mistake.
     """
     path = Path(path)
-    toml = toml_beside(path)
+    toml = toml_path(path)
     check_together(path, toml)
     columns = opened(path, robot, toml if toml.exists() else None)
     check_commanded(columns, robot)

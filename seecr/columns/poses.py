@@ -13,7 +13,7 @@ from seecr.columns.plausible import refuse_degrees
 from seecr.description.joints import OFF_MANIFOLD, off_joints, pose_of_values
 from seecr.description.projected import determined, projected
 from seecr.errors import Faults
-from seecr.files import toml_beside
+from seecr.files import toml_path
 from seecr.pose import NORM_TOLERANCE, Array, quat_from_rxyz, rxyz_from_quat
 from seecr.units import millimetres
 
@@ -41,7 +41,7 @@ def _check_length(columns: Columns, quantity: str, length: Array, rest: float) -
     """Refuse lengths (n,) [m] of a column that are none; ``rest`` [m] is that at the reference."""
     unit = columns.known[quantity].unit
     one = unit.to_si(1.0)
-    toml = toml_beside(columns.table.path).name
+    toml = toml_path(columns.table.path).name
     columns.refuse(
         length <= 0,
         quantity,
@@ -150,7 +150,7 @@ def _on_joints(
     if far[row] > OFF_MANIFOLD:
         moved = _distance(off[np.argmax(far)])
         columns.notes.append(
-            f"The {word} poses are rounded: those that the joints reach are up to {moved} away, "
+            f"Poses {word} are rounded: those that the joints reach are up to {moved} away, "
             "and are taken."
         )
     return reached, turns

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from seecr.errors import InputFileError
-from seecr.importing.draft import Draft, Faults, pulley_notes
+from seecr.importing.draft import Draft, DraftFaults, pulley_notes
 from seecr.importing.xml_tree import Node, numbers_in, numbers_of, read_xml
 from seecr.pose import Array, quat_from_rotvec, quat_multiply, quat_rotate
 
@@ -49,7 +49,7 @@ def read_caspr(bodies: Path, cables: Path, wanted: str | None) -> Draft:
     """
     body = read_xml(bodies, "bodies_system", "expected CASPR's *_bodies.xml, with <bodies_system>")
     sets = read_xml(cables, "cables", "expected CASPR's *_cables.xml, with <cables>")
-    faults = Faults(bodies)
+    faults = DraftFaults(bodies)
     link = _link(body, faults)
     pose, joints = _joint(link, faults)
     physical = link.child("physical")
@@ -62,7 +62,7 @@ def read_caspr(bodies: Path, cables: Path, wanted: str | None) -> Draft:
     centre = numbers_in(physical, "com_location", 3, faults)
     inertia = _inertia(physical, mass, centre, faults)
     faults.check()
-    faults = Faults(cables)
+    faults = DraftFaults(cables)
     some, which = _chosen(sets, wanted, cables)
     found = list(_cables(some, centre, faults))
     faults.check()
@@ -76,7 +76,7 @@ def read_caspr(bodies: Path, cables: Path, wanted: str | None) -> Draft:
     )  # fmt: skip
 
 
-def _link(body: Node, faults: Faults) -> Node:
+def _link(body: Node, faults: DraftFaults) -> Node:
     links = [one for part in body.children if part.tag == "links" for one in part.children]
     links = [one for one in links if one.tag.startswith("link_")]
     if len(links) != 1:
@@ -86,7 +86,7 @@ def _link(body: Node, faults: Faults) -> Node:
     return links[0]
 
 
-def _joint(link: Node, faults: Faults) -> tuple[Array, tuple[dict[str, Any], ...]]:
+def _joint(link: Node, faults: DraftFaults) -> tuple[Array, tuple[dict[str, Any], ...]]:
     """The pose (7,) at the joint's initial values, and the joints there."""
     joint = link.child("joint") or Node("joint", {}, link.line)
     kind = joint.values.get("type", "")
@@ -112,7 +112,7 @@ def _joint(link: Node, faults: Faults) -> tuple[Array, tuple[dict[str, Any], ...
     return pose, () if kind == _FREE else held
 
 
-def _inertia(physical: Node, mass: float, centre: Array, faults: Faults) -> Array | None:
+def _inertia(physical: Node, mass: float, centre: Array, faults: DraftFaults) -> Array | None:
     """About the centre of mass, (3, 3); None where the file has none."""
     node = physical.child("inertia")
     if node is None:
@@ -162,7 +162,7 @@ def _chosen(sets: Node, wanted: str | None, path: Path) -> tuple[list[Node], lis
     return some, [f"cables of set {name!r}; others with --set: {', '.join(others)}"]
 
 
-def _cables(some: list[Node], centre: Array, faults: Faults) -> Iterator[tuple[Any, ...]]:
+def _cables(some: list[Node], centre: Array, faults: DraftFaults) -> Iterator[tuple[Any, ...]]:
     """Name, exit point, anchor point, E S, limits of tension and pulley radius of each cable."""
     for cable in some:
         name, about = cable.values.get("name", ""), cable.values.get("attachment_reference")
@@ -195,5 +195,5 @@ def _cables(some: list[Node], centre: Array, faults: Faults) -> Iterator[tuple[A
         )  # fmt: skip
 
 
-def _optional(node: Node, tag: str, default: float, faults: Faults) -> float:
+def _optional(node: Node, tag: str, default: float, faults: DraftFaults) -> float:
     return default if node.child(tag) is None else float(numbers_in(node, tag, 1, faults)[0])

@@ -22,7 +22,7 @@ _MOST_FAULTS = 12
 
 
 @dataclass
-class Faults:
+class DraftFaults:
     """All that is wrong with a file, so that it is said at once."""
 
     path: Path

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from seecr.columns.csv import Table, read_table, show
-from seecr.importing.draft import Draft, Faults
+from seecr.importing.draft import Draft, DraftFaults
 from seecr.pose import LARGEST, Array
 from seecr.units import Unit, of_columns
 
@@ -29,7 +29,7 @@ def read_points(path: Path) -> Draft:
         InputFileError: no such table; all its faults are told at once.
     """
     table = read_table(path)
-    faults = Faults(path)
+    faults = DraftFaults(path)
     columns, unused = _columns(table, faults)
     is_point = not any(name in columns for name in _ENDS["anchor"])
     needed = _ENDS["exit"] if is_point else [*_ENDS["exit"], *_ENDS["anchor"]]
@@ -54,7 +54,7 @@ def read_points(path: Path) -> Draft:
     return Draft(path, path.stem, exits, anchors, ea, stiffness, names, notes=notes)
 
 
-def _columns(table: Table, faults: Faults) -> tuple[dict[str, tuple[int, Unit]], list[str]]:
+def _columns(table: Table, faults: DraftFaults) -> tuple[dict[str, tuple[int, Unit]], list[str]]:
     """The index and unit of each known column, and the names of the others."""
     known: dict[str, tuple[int, Unit]] = {}
     unused = [name or "(one without a name)" for name in table.names if not _NAME.fullmatch(name)]
@@ -74,7 +74,7 @@ def _columns(table: Table, faults: Faults) -> tuple[dict[str, tuple[int, Unit]],
     return known, [name for name in unused if name.lower() != "name"]
 
 
-def _numbers(table: Table, quantity: str, index: int, unit: Unit, faults: Faults) -> Array:
+def _numbers(table: Table, quantity: str, index: int, unit: Unit, faults: DraftFaults) -> Array:
     """One column (m,) in SI; NaN for what is wrong, and for empty cells where these may be."""
     values = np.full(len(table.line), math.nan)
     for row, cell in enumerate(table.cells[index]):
@@ -90,7 +90,7 @@ def _numbers(table: Table, quantity: str, index: int, unit: Unit, faults: Faults
     return np.asarray(unit.to_si(values))
 
 
-def _names(table: Table, faults: Faults) -> tuple[str, ...]:
+def _names(table: Table, faults: DraftFaults) -> tuple[str, ...]:
     """The cables' names, which must differ; none without a column for them."""
     index = next((k for k, name in enumerate(table.names) if name.lower() == "name"), None)
     names = () if index is None else tuple(table.cells[index])

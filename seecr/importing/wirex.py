@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from seecr.importing.draft import Draft, Faults, pulley_notes
+from seecr.importing.draft import Draft, DraftFaults, pulley_notes
 from seecr.importing.xml_tree import Node, numbers_of, read_xml
 from seecr.pose import Array
 
@@ -31,7 +31,7 @@ def read_wirex(path: Path) -> Draft:
         InputFileError: no such file, or one without a robot; all its faults are told at once.
     """
     root = read_xml(path, "models", _EXPECTED)
-    faults = Faults(path)
+    faults = DraftFaults(path)
     robot = _part(root, "robot", faults)
     chains = list(robot.every("chain"))
     if not chains:
@@ -71,7 +71,7 @@ def read_wirex(path: Path) -> Draft:
     )  # fmt: skip
 
 
-def _part(node: Node, tag: str, faults: Faults) -> Node:
+def _part(node: Node, tag: str, faults: DraftFaults) -> Node:
     """The element of that name in a node; an empty one, and a fault, if there is none."""
     found = node.child(tag)
     if found is None:
@@ -80,7 +80,7 @@ def _part(node: Node, tag: str, faults: Faults) -> Node:
     return found
 
 
-def _value(node: Node, key: str, faults: Faults, default: float | None = None) -> float:
+def _value(node: Node, key: str, faults: DraftFaults, default: float | None = None) -> float:
     """The number of an attribute; it may be missing if there is a default."""
     if key not in node.values and default is not None:
         return default
@@ -89,11 +89,11 @@ def _value(node: Node, key: str, faults: Faults, default: float | None = None) -
     )
 
 
-def _point(node: Node, faults: Faults) -> Array:
+def _point(node: Node, faults: DraftFaults) -> Array:
     return np.array([_value(node, axis, faults) for axis in "xyz"])
 
 
-def _elasticity(root: Node, faults: Faults) -> tuple[float, list[str]]:
+def _elasticity(root: Node, faults: DraftFaults) -> tuple[float, list[str]]:
     """E S [N] of the file's cables, NaN without one; and what to say of it."""
     cable = root.child("cable")
     if cable is None:

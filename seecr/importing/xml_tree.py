@@ -11,7 +11,7 @@ import numpy as np
 
 from seecr.errors import InputFileError
 from seecr.files import no_text, read_bytes
-from seecr.importing.draft import Faults
+from seecr.importing.draft import DraftFaults
 from seecr.pose import Array, all_finite
 
 
@@ -83,7 +83,7 @@ def read_xml(path: Path, root: str, expected: str) -> Node:
     return found
 
 
-def numbers_in(node: Node, tag: str, count: int, faults: Faults) -> Array:
+def numbers_in(node: Node, tag: str, count: int, faults: DraftFaults) -> Array:
     """The numbers (count,) in the element ``tag`` of a node; NaN, and a fault, if it has none."""
     place = node.child(tag)
     if place is None:
@@ -92,7 +92,7 @@ def numbers_in(node: Node, tag: str, count: int, faults: Faults) -> Array:
     return numbers_of(place.text, f"<{tag}>", count, faults, place.line)
 
 
-def numbers_of(text: str, what: str, count: int, faults: Faults, line: int) -> Array:
+def numbers_of(text: str, what: str, count: int, faults: DraftFaults, line: int) -> Array:
     """So many numbers in a text; NaN, and a fault, if it holds something else."""
     try:
         values = np.array([float(word) for word in text.replace(",", " ").split()])

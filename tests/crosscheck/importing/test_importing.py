@@ -332,7 +332,9 @@ def test_what_only_the_last_digit_shows_is_not_stated(tmp_path, flicker, digits)
     assert sigma.orientation_rad is None
     assert sigma.position_m is None if digits == 0 else 1e-6 < sigma.position_m < 1e-4
     hidden = "position and orientation" if digits == 0 else "mm; orientation"
-    assert f"{hidden} not stated: within a dwell only the last digit changes" in found.notes[-1]
+    assert f"{hidden} not stated: within a dwell only the last digit changes" in " ".join(
+        found.notes
+    )
 
 
 def test_a_swing_that_dies_out_is_no_rest():

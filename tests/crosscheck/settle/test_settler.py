@@ -475,7 +475,10 @@ def broken(old, new):
     return mjcf(*COGIRO).replace(old, new)
 
 
-TWO = '</body><body name="second"><freejoint/><geom size="0.1"/></body></worldbody>'
+TWO = (
+    '</body><body name="second"><freejoint/><geom size="0.1"/><site name="S"/></body></worldbody>'
+    '<tendon><spatial name="more"><site site="S"/><site site="A1"/></spatial></tendon>'
+)
 
 
 @pytest.mark.parametrize(

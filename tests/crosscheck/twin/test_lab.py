@@ -49,7 +49,7 @@ def truth(n: int = 2, at_rest: Any = True) -> Truth:
 
 def measured(case: Measurements, sigma: Sigma, at_rest: Any = True) -> Measured:
     found = truth(case.n_rows, at_rest)
-    return Measured(case, found, found, sigma, [], found.at_rest)
+    return Measured(case, found, found, sigma, [], found.at_rest, np.ones(3, dtype=bool))
 
 
 def test_noise_is_as_large_as_stated_in_every_direction() -> None:

@@ -73,7 +73,7 @@ def test_rounded_poses_are_projected(tmp_path: Path, digits: int) -> None:
     assert found.commands.pose[:, 1] == pytest.approx(
         np.tan(TILT) * found.commands.pose[:, 2], abs=1e-12
     )
-    assert sum("poses are rounded: those that the joints reach are up to" in n
+    assert sum("are rounded: those that the joints reach are up to" in n
                for n in found.notes) == 1  # fmt: skip
 
 
