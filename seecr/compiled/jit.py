@@ -39,6 +39,11 @@ jit_inner = njit(  # type: ignore[call-overload]
 fifth of the compile time.
 """
 
+jit_lanes = njit(  # type: ignore[call-overload]
+    **_UNCOUNTED, no_cpython_wrapper=True, no_cfunc_wrapper=True, fastmath={"contract"}
+)
+"""The same for loops over lanes, see seecr.compiled.lanes: products and sums may be fused."""
+
 jit_merged = njit(  # type: ignore[call-overload]
     **_UNCOUNTED, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True
 )

@@ -30,6 +30,9 @@ ITS_A_POINT = (
 # Anchor points are one if they are no farther apart than this part of the robot's length.
 _ONE_POINT = 1e-6
 
+# For so many poses straight lengths are worth loading compiled functions.
+_MANY = 1000
+
 # What every cable has one of.
 _OF_CABLES = ("exit_points", "anchor_points", "ea", "rest_lengths")
 
@@ -369,6 +372,13 @@ class Robot:
         if poses.shape[-1] == 3:
             turn = np.broadcast_to(self.reference_pose[3:], (*poses.shape[:-1], 4))
             poses = np.concatenate([poses, turn], axis=-1)
+        if poses.ndim == 2 and len(poses) >= _MANY:
+            from seecr.compiled.cable_law import lengths_at  # takes a while to import
+
+            out, straight = np.empty((len(poses), self.n_cables)), np.zeros(self.n_cables)
+            points = (np.array(a, float, order="C") for a in (self.anchor_points, self.exit_points))
+            lengths_at(np.array(poses, order="C"), *points, straight, self.up, out)
+            return out
         anchors = transform_points(poses, self.anchor_points)
         return np.asarray(np.linalg.norm(self.exit_points - anchors, axis=-1))
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 from threading import Event
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +38,13 @@ from seecr.compiled.platform import add_skew, evaluate_batch
 from seecr.compiled.rates import change_at_rest, change_of_each_cable
 from seecr.parallel import run_parts
 from seecr.pose import Array, deviated, products, quat_conjugate
-from seecr.statics.tables import ByRow, Tables, by_row, take
+from seecr.statics.abreast import (
+    Rested,
+    are_for_lanes,
+    descend_in_lanes,
+    stiffness_in_lanes,
+)
+from seecr.statics.tables import ByRow, Tables, by_row, rest_lengths_of, take
 
 
 @dataclass(eq=False)
@@ -82,11 +89,77 @@ class Evaluation(ByRow):
         n, m = tables.cables.shape[:2]
         return cls.empty(n, m, tables.n_dof)
 
+    @property
+    def tension(self) -> Array:
+        """(n, m) [N] tensions."""
+        return np.asarray(self.states[..., TENSION])
+
+    @property
+    def pull(self) -> Array:
+        """(n, m) [N] tensions, negative where a cable is slack and has none."""
+        return np.where((self.states[..., SLACK] > 0.5) & (self.tension == 0.0), -1.0, self.tension)
+
     def there(self) -> Evaluation:
         """Nothing evaluated yet, with the platform and its catenaries where they are here."""
         out = Evaluation.empty(*self.slopes.shape)
         out.deviation[:], out.values[:], out.guess[:] = self.deviation, self.values, self.guess
         return out
+
+
+class Abreast(Evaluation):
+    """What lanes found: where the platforms rest, and the pulls of the cables.
+
+    All else takes more memory, and longer to write than the rest to find: it is evaluated when it
+    is asked for.
+    """
+
+    tables: Tables
+    cables_pull: Array
+
+    @classmethod
+    def of(cls, tables: Tables, found: Rested) -> Abreast:
+        out = cls.__new__(cls)
+        vars(out).update(vars(found), tables=tables)
+        vars(out)["cables_pull"] = vars(out).pop("pull")
+        return out
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    def only(self, rows: NDArray[np.integer] | NDArray[np.bool_]) -> Evaluation:
+        own = {name: each for name, each in vars(self).items() if name != "tables"}
+        out = Abreast.__new__(Abreast)
+        some = np.flatnonzero(rows) if rows.dtype == bool else rows
+        vars(out).update(
+            {name: each[rows] for name, each in own.items()}, tables=take(self.tables, some)
+        )
+        return out
+
+    @property
+    def tension(self) -> Array:
+        return np.maximum(self.cables_pull, 0.0)
+
+    @property
+    def pull(self) -> Array:
+        return self.cables_pull
+
+    def there(self) -> Evaluation:
+        out = Evaluation.at_commands(self.tables)
+        out.deviation[:] = self.deviation
+        return out
+
+    def __getattr__(self, name: str) -> Array:
+        if name not in {field.name for field in fields(Evaluation)} or "tables" not in vars(self):
+            raise AttributeError(name)
+        if name == "hessian":
+            vars(self)[name] = stiffness_in_lanes(self.tables, self.deviation)
+        elif name in ("values", "guess"):
+            nothing = Evaluation.at_commands(self.tables)
+            vars(self).update(values=nothing.values, guess=nothing.guess)
+        else:
+            at = evaluate(self.tables, self, threads=None)
+            vars(self).update({k: getattr(at, k) for k in ("gradient", "states", "slopes")})
+        return np.asarray(vars(self)[name])
 
 
 def _are_at_rest(outcome: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -103,15 +176,38 @@ def descend(
     Stiff robots whose descent does not converge are solved again with a stiffness that is raised in
     stages. ``staged=True`` does so from the start, ``False`` never: a soft robot may change to
     another equilibrium by it. ``guess`` (n, m, 3) are the catenaries at the start, if known.
+
+    Many poses with straight linear cables descend in lanes, the same way and sixteen abreast; those
+    whose descent takes another way are left to the compiled loop.
     """
+    if not staged and are_for_lanes(tables):
+        found = descend_in_lanes(tables, start, limit, threads)
+        left = np.flatnonzero(found.outcome < 0)
+        if len(left):
+            first = None if start is None else start[left]
+            some = take(tables, left)
+            alone = _descend_alone(some, first, limit, threads, None, staged, None)
+            found.put(left, alone, evaluate(some, alone))
+        out = Abreast.of(tables, found)
+        _refuse_no_length(tables, out)
+        return out
+    return _descend_alone(tables, start, limit, threads, start_values, staged, guess)
+
+
+def _descend_alone(
+    tables: Tables, start: Array | None, limit: int, threads: int | None,
+    start_values: Array | None, staged: bool | None, guess: Array | None,
+) -> Evaluation:  # fmt: skip
+    """The same, each pose by itself in the compiled loop."""
     if staged is None:
-        out = descend(tables, start, limit, threads, start_values, False, guess)
+        out = _descend_alone(tables, start, limit, threads, start_values, False, guess)
         unsettled = (out.outcome == ITERATIONS) | (out.outcome == STALLED)
         stiff = tables.cables[..., EA].max(axis=1) > STIFF * tables.scale
         again = np.flatnonzero(unsettled & stiff)
         if len(again):
             first, values = (None if s is None else s[again] for s in (start, start_values))
-            better = descend(take(tables, again), first, limit, threads, values, staged=True)
+            some = take(tables, again)
+            better = _descend_alone(some, first, limit, threads, values, True, None)
             better.count += out.count[again]
             out.put(again, better)
         return out
@@ -134,7 +230,7 @@ def descend(
 
 def _refuse_no_length(tables: Tables, found: Evaluation) -> None:
     """Rows in which an effect leaves a cable no length have no result, whatever was computed."""
-    rest = tables.cables[..., REST]
+    rest = rest_lengths_of(tables)
     if not rest.min(initial=np.inf) > 0.0:
         found.outcome[(rest <= 0.0).any(axis=1)] = NO_LENGTH
 
@@ -318,8 +414,8 @@ def without_idle(tables: Tables, at: Evaluation) -> Evaluation:
 
 def is_slack(tables: Tables, at: Evaluation) -> NDArray[np.bool_]:
     """Slack cables, (n, m): those longer than their span, which may sag, or without tension."""
-    nothing = at.states[..., TENSION] < IDLE * tables.scale[:, None]
-    return np.asarray((at.states[..., SLACK] > 0.5) | nothing)
+    nothing = at.tension < IDLE * tables.scale[:, None]
+    return nothing if isinstance(at, Abreast) else nothing | (at.states[..., SLACK] > 0.5)
 
 
 def joints_at_rest(tables: Tables, at: Evaluation) -> Array:

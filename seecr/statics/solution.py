@@ -18,11 +18,9 @@ from seecr.compiled.columns import (
     FALLING,
     FORCE_OF_WEIGHT,
     ITERATIONS,
-    REST,
     SINGULAR,
     SPINNING,
     STALLED,
-    TENSION,
     TOLERANCE,
     UNSTABLE,
 )
@@ -34,7 +32,7 @@ from seecr.pose import Array, pose_difference, quat_rotate, quat_to_matrix, rota
 from seecr.result import COORDINATES, Record, Result, named, rows_of
 from seecr.statics import batch
 from seecr.statics.starts import start_of
-from seecr.statics.tables import Tables, by_row, spanless, take
+from seecr.statics.tables import Tables, by_row, rest_lengths_of, spanless, take
 from seecr.statics.verification import Verification, verification_of
 from seecr.units import joules, millimetres
 
@@ -104,6 +102,9 @@ _PER_ROW = (
     "command", "pose", "deviation", "tensions", "slack", "rest_lengths", "iterations", "residual",
     "energy", "status",
 )  # fmt: skip
+# By outcome; the last is for whatever is none.
+_STATUSES = np.array([*(_OF_OUTCOME[k] for k in range(len(_OF_OUTCOME))), Status.GAVE_UP])
+_IS_BALANCED = np.array([one in _BALANCED for one in _STATUSES])
 # A squared frequency below this part of the largest is rounding.
 _NO_FREQUENCY = 1e-12
 # Errors [mm, deg] that differ by less than this, or by this part of them, are alike.
@@ -227,7 +228,7 @@ class Solution(Result):
     @property
     def converged(self) -> NDArray[np.bool_]:
         """(n,) bool, the pose is a stable equilibrium."""
-        return np.array([s is Status.CONVERGED for s in self.status], dtype=bool)
+        return np.asarray(self.status == Status.CONVERGED, dtype=bool)
 
     @cached_property
     def stiffness(self) -> Array:
@@ -456,29 +457,32 @@ class Solution(Result):
 
 def certify(robot: Robot, tables: Tables, found: batch.Evaluation) -> Solution:
     """Recompute wrench, stiffness and energy at the result, and derive its status."""
-    check = batch.evaluate(tables, found, threads=None)
+    # lanes have evaluated what they leave, and others what lanes have left
+    known = isinstance(found, batch.Abreast)
+    check = found if known else batch.evaluate(tables, found, threads=None)
     check.count = found.count
-    status = np.full(len(found.outcome), Status.GAVE_UP, dtype=object)
-    for outcome, words in _OF_OUTCOME.items():
-        status[found.outcome == outcome] = words
-    no_length = np.any(tables.cables[..., REST] <= 0.0, axis=1)
-    balanced = check.residual < TOLERANCE
-    status[(status == Status.CONVERGED) & ~balanced] = Status.STALLED
+    rest = rest_lengths_of(tables)
+    ends = np.where(found.outcome < len(_OF_OUTCOME), found.outcome, len(_OF_OUTCOME))
+    ends[(ends == CONVERGED) & ~(check.residual < TOLERANCE)] = STALLED
+    no_length = np.zeros(len(ends), dtype=bool)
+    if not rest.min(initial=np.inf) > 0.0:
+        no_length |= np.any(rest <= 0.0, axis=1)
     # a pulley pays out some cable even where an anchor point is commanded to its exit point
-    failed = np.flatnonzero([one not in _BALANCED for one in status])
-    no_length[failed] |= spanless(take(tables, failed)).any(axis=1)
+    failed = np.flatnonzero(~_IS_BALANCED[ends])
+    if len(failed):
+        no_length[failed] |= spanless(take(tables, failed)).any(axis=1)
+    status = _STATUSES[ends]
     status[no_length] = Status.NO_LENGTH
     # not the deviations in ``found``: SciPy's search on joints leaves these at zero
     moved = check.deviation
-    turn = np.where(moved[:, 3:4] < 0, -1.0, 1.0) * moved[:, 3:]
+    turned = np.ascontiguousarray(moved[:, 3:])
     lost = no_length | np.isin(found.outcome, (FALLING, CABLE_LAW, SPINNING))
     return Solution(
         robot=robot, tables=tables, evaluation=check, command=tables.poses,
         pose=_blank(batch.platform_poses(tables, moved), lost),
-        deviation=_blank(np.concatenate([moved[:, :3], rotation_vectors(turn)], axis=1), lost),
-        tensions=_blank(check.states[..., TENSION] / robot.falls, lost),
-        slack=batch.is_slack(tables, check),
-        rest_lengths=tables.cables[..., REST], iterations=found.count,
+        deviation=_blank(np.concatenate([moved[:, :3], rotation_vectors(turned)], axis=1), lost),
+        tensions=_blank(check.tension / robot.falls, lost), slack=batch.is_slack(tables, check),
+        rest_lengths=rest, iterations=found.count,
         residual=np.where(lost, np.inf, check.residual),
         energy=_energies(robot, tables, check, status), status=status,
     )  # fmt: skip
@@ -488,9 +492,9 @@ def _energies(
     robot: Robot, tables: Tables, check: batch.Evaluation, status: NDArray[np.object_]
 ) -> Array:
     """Energies (n,) [J] of poses, whatever full turns a search made under a moment."""
-    balanced = np.array([one in _BALANCED for one in status], dtype=bool)
-    rows = np.flatnonzero(batch.under_moment(tables) & balanced)
-    if len(rows) == 0 or not robot.joints:
+    pushed = batch.under_moment(tables) if robot.joints else np.zeros(0, bool)
+    rows = np.array([i for i in np.flatnonzero(pushed) if status[i] in _BALANCED], int)
+    if len(rows) == 0:
         return check.energy
     some, at = take(tables, rows), check.only(rows)
     poses = batch.platform_poses(some, at.deviation)
@@ -505,7 +509,8 @@ def _energies(
 def _blank(values: Array, rows: NDArray[np.bool_]) -> Array:
     """NaN in rows without a result."""
     values = values.copy()
-    values[rows] = np.nan
+    if rows.any():
+        values[rows] = np.nan
     return values
 
 

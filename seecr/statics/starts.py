@@ -86,7 +86,7 @@ def commanded_poses(values: ArrayLike, name: str = "poses", robot: Robot | None 
         array = np.column_stack([array, np.tile(robot.reference_pose[3:], (len(array), 1))])
     if array.ndim != 2 or array.shape[1] != 7:
         raise InputError(f"{name} must be (n, 7), x y z qw qx qy qz, got {np.shape(values)}")
-    norm = np.linalg.norm(array[:, 3:], axis=1)
+    norm = np.sqrt(np.einsum("ij,ij->i", array[:, 3:], array[:, 3:]))  # NumPy's takes longer
     if np.any(np.abs(norm - 1.0) > NORM_TOLERANCE):
         row = int(np.argmax(np.abs(norm - 1.0)))
         raise InputError(

@@ -46,27 +46,36 @@ def by_row(compiled: Callable[..., None], *given: Any, threads: int | None = Non
     in_parts(run, len(given[0]), threads)
 
 
+# So many rows are worth the lanes of seecr.compiled.lanes, and tables made for these.
+MANY = 64
+
+
 @dataclass(eq=False)
 class ByRow:
     """Arrays with a row for each of n poses or searches: all fields of a dataclass."""
 
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """All arrays by name."""
+        return vars(self)
+
     def only(self, rows: NDArray[np.integer] | NDArray[np.bool_]) -> Self:
         """Some rows."""
-        return replace(self, **{name: each[rows] for name, each in vars(self).items()})
+        return replace(self, **{name: each[rows] for name, each in self.columns().items()})
 
     def and_more(self, other: Self) -> Self:
         """The rows of both."""
-        its = vars(other)
-        return replace(self, **{k: np.concatenate([v, its[k]]) for k, v in vars(self).items()})
+        its = other.columns()
+        return replace(self, **{k: np.concatenate([v, its[k]]) for k, v in self.columns().items()})
 
     def put(self, rows: NDArray[np.integer] | NDArray[np.bool_], other: Self) -> None:
         """Overwrite rows with those of another."""
-        for mine, its in zip(vars(self).values(), vars(other).values(), strict=True):
-            mine[rows] = its
+        its = other.columns()
+        for name, mine in self.columns().items():
+            mine[rows] = its[name]
 
     def copy(self) -> Self:
         """The same with arrays of its own."""
-        return replace(self, **{name: each.copy() for name, each in vars(self).items()})
+        return replace(self, **{name: each.copy() for name, each in self.columns().items()})
 
 
 @dataclass(eq=False)
@@ -98,6 +107,56 @@ class Tables:
         return replace(self, cables=cables)
 
 
+class Alike(Tables):
+    """Tables whose rows differ in their lengths and poses alone, and if at all in their loads.
+
+    A row of ``cables`` takes ten times as much memory as what tells it from the others, and longer
+    to write than its equilibrium to find. So the full arrays are made when they are asked for.
+    """
+
+    cable: Array
+    paid: Array
+    one_load: Array
+
+    @classmethod
+    def of(cls, cable: Array, paid: Array, load: Array, **rest: Any) -> Alike:
+        """``cable`` (1, m, N_COLUMNS); ``paid`` (n, m, 2) rest lengths and gaps; load (1 or n)."""
+        out = cls.__new__(cls)
+        vars(out).update(cable=cable, paid=paid, one_load=load, **rest)
+        return out
+
+    def __getattr__(self, name: str) -> Array:
+        if name not in ("cables", "load") or "paid" not in vars(self):
+            raise AttributeError(name)
+        n = len(self.paid)
+        if name == "cables":
+            out = np.repeat(self.cable, n, axis=0)
+            out[..., REST : GAP + 1] = self.paid
+        else:
+            out = np.repeat(self.one_load, n // len(self.one_load), axis=0)
+        vars(self)[name] = out
+        return out
+
+
+def told_apart(tables: Tables) -> tuple[Array, Array, Array]:
+    """What tells rows apart: cables, rest lengths and gaps (n, m, 2), and loads.
+
+    Cables and loads have one row where all are alike. Full arrays count where they were made, since
+    they may have been written to.
+    """
+    own = vars(tables)
+    cables = own.get("cables", own.get("cable"))
+    load = own.get("load", own.get("one_load"))
+    paid = cables[..., REST : GAP + 1].copy() if "cables" in own else own["paid"]
+    return cables, paid, load
+
+
+def rest_lengths_of(tables: Tables) -> Array:
+    """Rest lengths (n, m) [m] of the cables."""
+    own = vars(tables)
+    return np.asarray(own["cables"][..., REST] if "cables" in own else own["paid"][..., 0])
+
+
 @lru_cache(maxsize=8)
 def _screws_of(robot: Robot, poses_bytes: bytes, n: int) -> Array:
     if not robot.joints:
@@ -111,6 +170,8 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
     robot = setup.robot
     poses = np.array(setup.commands.pose, order="C")  # a copy: see seecr.compiled.jit
     n, m = len(poses), robot.n_cables
+    if n >= MANY and not setup.laws:
+        return _alike(setup, poses)
     cables, load = np.zeros((n, m, N_COLUMNS)), np.zeros((n, N_LOAD))
     _write(setup, QUANTITIES, cables, load, blank=True)
     if setup.laws:
@@ -118,6 +179,28 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
     return Tables(
         cables=cables, load=load, poses=poses, screws=_screws_of(robot, poses.tobytes(), n),
         length=robot.length, scale=_load_scale(setup), reach=_reach(cables), n_dof=robot.n_dof,
+    )  # fmt: skip
+
+
+def _alike(setup: Setup, poses: Array) -> Alike:
+    """The same for many rows: their cables differ in their lengths alone."""
+    from seecr.compiled.lanes import pair_lengths  # takes a while to import
+
+    robot, n = setup.robot, len(poses)
+    pushed = setup.commands.loads is not None or setup.wrench.any()
+    cable = np.zeros((1, robot.n_cables, N_COLUMNS))
+    load = np.zeros((n if pushed else 1, N_LOAD))
+    names = {name for name, item in QUANTITIES.items() if item.column is not None}
+    _write_values(setup, names, cable, load, blank=True)
+    if pushed:
+        _write_values(setup, {"wrench"}, cable, load)
+    _write_load(setup, load)
+    paid, reach = np.empty((n, robot.n_cables, 2)), np.empty(n)
+    spans = np.array(setup.geometric_lengths(setup.commands.pose))
+    pair_lengths(np.ascontiguousarray(setup.rest_lengths()), spans, paid, reach)
+    return Alike.of(
+        cable, paid, load, poses=poses, screws=_screws_of(robot, poses.tobytes(), n),
+        length=robot.length, scale=_load_scale(setup), reach=reach, n_dof=robot.n_dof,
     )  # fmt: skip
 
 
@@ -156,6 +239,19 @@ def _write(
 
     In ``blank`` tables zeros are not written, since they are there already.
     """
+    _write_values(setup, names, cables, load, blank=blank)
+    if not _OF_LENGTHS.isdisjoint(names):
+        rest = setup.rest_lengths()
+        cables[..., REST] = rest
+        cables[..., GAP] = setup.geometric_lengths(setup.commands.pose) - rest
+    if not _OF_LOAD.isdisjoint(names):
+        _write_load(setup, load)
+
+
+def _write_values(
+    setup: Setup, names: Collection[str], cables: Array, load: Array, *, blank: bool = False
+) -> None:
+    """Write quantities that go to their columns and entries as they are."""
     for name in names:
         item = QUANTITIES[name]
         value = np.asarray(getattr(setup, name))
@@ -166,15 +262,14 @@ def _write(
             cables[..., item.column : item.column + per_cable.shape[-1]] = per_cable
         if item.entry is not None:
             load[:, item.entry : item.entry + value.shape[-1]] = value
-    if not _OF_LENGTHS.isdisjoint(names):
-        rest = setup.rest_lengths()
-        cables[..., REST] = rest
-        cables[..., GAP] = setup.geometric_lengths(setup.commands.pose) - rest
-    if not _OF_LOAD.isdisjoint(names):
-        mass, centre = setup.carried()
-        load[:, FORCE_OF_WEIGHT : FORCE_OF_WEIGHT + 3] = mass[:, None] * setup.gravity
-        load[:, CENTRE_OF_MASS : CENTRE_OF_MASS + 3] = centre
-        load[:, UP : UP + 3] = _hanging(setup)
+
+
+def _write_load(setup: Setup, load: Array) -> None:
+    """Write weights with their centres and the vertical; one row where all rows have the same."""
+    mass, centre = (each[: len(load)] for each in setup.carried())
+    load[:, FORCE_OF_WEIGHT : FORCE_OF_WEIGHT + 3] = mass[:, None] * setup.gravity
+    load[:, CENTRE_OF_MASS : CENTRE_OF_MASS + 3] = centre
+    load[:, UP : UP + 3] = _hanging(setup)
 
 
 def _linearise(setup: Setup, strains: Array, cables: Array) -> None:
@@ -202,15 +297,25 @@ def _reach(cables: Array) -> Array:
 
 def _load_scale(setup: Setup) -> Array:
     """Load [N] of each pose: weight, external force, and moment over the robot's length."""
+    weight = setup.weight()
+    if not setup.wrench.any() and weight.min(initial=np.inf) > 0.0:
+        return weight
     force = np.linalg.norm(setup.wrench[:, :3], axis=1)
     moment = np.linalg.norm(setup.wrench[:, 3:], axis=1) / setup.robot.length
-    scale = setup.weight() + force + moment
+    scale = weight + force + moment
     # an unloaded platform is measured against the force at a strain of 1e-3
     return np.where(scale > 0.0, scale, 1e-3 * float(np.max(setup.ea)))
 
 
 def take(tables: Tables, rows: NDArray[np.integer] | slice) -> Tables:
     """Some rows of the tables."""
+    if isinstance(tables, Alike) and vars(tables).keys().isdisjoint(("cables", "load")):
+        load = tables.one_load
+        return Alike.of(
+            tables.cable, tables.paid[rows], load[rows] if len(load) > 1 else load,
+            poses=tables.poses[rows], screws=tables.screws[rows], length=tables.length,
+            scale=tables.scale[rows], reach=tables.reach[rows], n_dof=tables.n_dof,
+        )  # fmt: skip
     return Tables(
         tables.cables[rows], tables.load[rows], tables.poses[rows], tables.screws[rows],
         tables.length, tables.scale[rows], tables.reach[rows], tables.n_dof,

@@ -389,11 +389,12 @@ def test_gravity_given_is_gravity_of_the_robot(cogiro: seecr.Robot) -> None:
 
 
 def test_a_batch_is_its_rows(parallel: seecr.Robot) -> None:
+    """To rounding: many rows descend in lanes, which add in another order."""
     poses = np.array([[x, 0.25, 0.1, 1, 0, 0, 0] for x in np.linspace(0.17, 0.63, 120)])
     whole = seecr.solve(parallel, poses)
     for i in (0, 50, 119):
         one = seecr.solve(parallel, poses[i])
-        assert np.array_equal(one.deviation[0], whole.deviation[i])
+        assert np.abs(one.deviation[0] - whole.deviation[i]).max() < 1e-14
     assert len(whole) == 120 and whole.pose.shape == (120, 7)
 
 
