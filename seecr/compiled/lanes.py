@@ -52,21 +52,22 @@ N = 16
 _ARM, _WAY, _BEFORE, _STRETCH, _RATE, _CABLE = (N * k for k in (0, 3, 6, 7, 8, 9))
 # Rows of a lane: its problem (arm of the centre of mass, weight, external force, load, squared
 # reach); the trial state; what is summed at it (gradient, lower triangle of the stiffness, tension
-# over length, that times the arms, halves of the force's own stiffness, energy, least tension); the
+# over length, that times the arms, halves of the force's own stiffness, energy, tension next to
+# slackness); the
 # last state accepted with its energy; and what solve_one keeps. END is 0 while a descent goes on, 1
 # when it has converged, and 2 when it is left to solve_one.
 (
     _CENTRE, _WEIGHT, _FORCE, _SCALE, _REACH, _PLACE, _TURN, _LESS,
     _GRADIENT, _HESSIAN, _TURNING, _MOMENT, _HALVES, _ENERGY, _LEAST,
     _AT_PLACE, _AT_TURN, _AT_ENERGY,
-    _SIZE, _RADIUS, _SHIFT, _COUNT, _IDLES, _LATES, _SHORTS, _STEP, _SPAN, _WORK, _TOP, _BACK,
-    _FAILED, _END, _ALL,
+    _SIZE, _RADIUS, _SHIFT, _COUNT, _IDLES, _LATES, _SHORTS, _STEP, _MOVE, _VALUE, _AT_VALUE,
+    _SPAN, _WORK, _TOP, _BACK, _FAILED, _END, _ALL,
 ) = accumulate((
     3 * N, 3 * N, 3 * N, N, N, 3 * N, 4 * N, 9 * N,
     6 * N, 21 * N, N, 3 * N, 3 * N, N, N,
     3 * N, 4 * N, N,
-    N, N, N, N, N, N, N, 6 * N, N, N, N, N,
-    N, N,
+    N, N, N, N, N, N, N, 6 * N, 6 * N, 4 * N, 4 * N,
+    N, N, N, N, N, N,
 ), initial=0)  # fmt: skip
 
 
@@ -133,10 +134,9 @@ def _add_cable(S, C, P):
         rate = C[_RATE + i]
         tension = rate * stretch
         P[i] = tension
-        taut = 1.0 if stretch >= 0.0 else 0.0
+        least, taut = abs(tension), 1.0 if stretch >= 0.0 else 0.0
         rate, tension = taut * rate, taut * tension
         S[_ENERGY + i] += 0.5 * tension * stretch
-        least = tension if taut > 0.0 else 1e300
         S[_LEAST + i] = least if least < S[_LEAST + i] else S[_LEAST + i]
         turning, ux, uy, uz = tension * inverse, lx * inverse, ly * inverse, lz * inverse
         mx, my, mz = b * uz - c * uy, c * ux - a * uz, a * uy - b * ux
@@ -208,7 +208,7 @@ def _end_sums(S, per):
 
 
 @jit_lanes
-def _accept(S, largest, limit):
+def _accept(S, per, largest, limit, free):
     """Accept the trial states that solve_one would accept, and see which descents end.
 
     From a state that is not accepted a lane goes BACK by a step of no length, and evaluates the
@@ -219,7 +219,8 @@ def _accept(S, largest, limit):
         g0, g1, g2, g3 = S[g], S[g + N], S[g + 2 * N], S[g + 3 * N]
         g4, g5 = S[g + 4 * N], S[g + 5 * N]
         force, torque = g0 * g0 + g1 * g1 + g2 * g2, g3 * g3 + g4 * g4 + g5 * g5
-        trial = math.sqrt(force if force > torque else torque)
+        larger = force if force > torque else torque
+        trial = math.sqrt(larger if free else force + torque)
         there = g0 * S[s] + g1 * S[s + N] + g2 * S[s + 2 * N]
         there += g3 * S[s + 3 * N] + g4 * S[s + 4 * N] + g5 * S[s + 5 * N]
         top, other = abs(S[h]), abs(S[h + 2 * N])
@@ -256,8 +257,11 @@ def _accept(S, largest, limit):
         x, y, z = S[_PLACE + i], S[_PLACE + N + i], S[_PLACE + 2 * N + i]
         lost = falls & (x * x + y * y + z * z > S[_REACH + i])
         lost |= (count >= limit) & ~done
-        # certified only if no taut cable's tension is mere rounding: solve_one looks closer
-        lost |= done & falls & (S[_LEAST + i] < IDLE * scale)
+        # no cable may be within rounding of its rest length, where it has stiffness on one side
+        # only: solve_one looks closer. A load stiffens its platform by about itself over the
+        # length, so that what is left of the residual may move that by its part of the length.
+        idle = IDLE * scale + 10.0 * size / scale * top / per
+        lost |= done & falls & (S[_LEAST + i] < idle)
         S[_SIZE + i], S[_RADIUS + i], S[_TOP + i] = size, radius, top
         S[_COUNT + i], S[_IDLES + i], S[_LATES + i] = count, idles, lates
         S[_END + i] = 2.0 if lost else (1.0 if done & falls else 0.0)
@@ -326,6 +330,9 @@ def _step(S):
         s = _STEP + i
         S[s], S[s + N], S[s + 2 * N], S[s + 3 * N], S[s + 4 * N] = x0, x1, x2, x3, x4
         S[s + 5 * N] = x5
+        s = _MOVE + i
+        S[s], S[s + N], S[s + 2 * N], S[s + 3 * N], S[s + 4 * N] = x0, x1, x2, x3, x4
+        S[s + 5 * N] = x5
         span = span if span <= radius else radius
         S[_SPAN + i] = 0.0 if back else span
         S[_WORK + i] = g0 * x0 + g1 * x1 + g2 * x2 + g3 * x3 + g4 * x4 + g5 * x5
@@ -350,21 +357,105 @@ def _mirror(S, i, space):
     mirrored_step(gradient, hessian, S[_RADIUS + i], step)
     work = 0.0
     for r in range(6):
-        S[_STEP + r * N + i] = step[r]
+        S[_STEP + r * N + i] = S[_MOVE + r * N + i] = step[r]
         work += gradient[r] * step[r]
     S[_SPAN + i], S[_WORK + i] = norm(step), work
+
+
+# Platforms on up to three slides and then a hinge through their origin: planar robots, and those
+# that only translate. None of their axes turns as they move.
+
+
+@jit_lanes
+def _onto_joints(S, axes):
+    """From the platform's own gradient and stiffness to those along slides and about the hinge.
+
+    They take the first four places. Axes that are missing are zero; there, and in the last two
+    places, the stiffness is the largest there is, which decides nothing.
+    """
+    a, b, c = axes[0, 0], axes[0, 1], axes[0, 2]
+    d, e, f = axes[1, 0], axes[1, 1], axes[1, 2]
+    u, v, w = axes[2, 0], axes[2, 1], axes[2, 2]
+    x, y, z = axes[3, 0], axes[3, 1], axes[3, 2]
+    no0, no1 = 1.0 - (a * a + b * b + c * c), 1.0 - (d * d + e * e + f * f)
+    no2, no3 = 1.0 - (u * u + v * v + w * w), 1.0 - (x * x + y * y + z * z)
+    for i in range(N):
+        g, h = _GRADIENT + i, _HESSIAN + i
+        g0, g1, g2 = S[g], S[g + N], S[g + 2 * N]
+        S[g], S[g + N] = a * g0 + b * g1 + c * g2, d * g0 + e * g1 + f * g2
+        S[g + 2 * N] = u * g0 + v * g1 + w * g2
+        S[g + 3 * N] = x * S[g + 3 * N] + y * S[g + 4 * N] + z * S[g + 5 * N]
+        S[g + 4 * N], S[g + 5 * N] = 0.0, 0.0
+        xx, xy, yy = S[h], S[h + N], S[h + 2 * N]
+        xz, yz, zz = S[h + 3 * N], S[h + 4 * N], S[h + 5 * N]
+        p, q, r = xx * a + xy * b + xz * c, xy * a + yy * b + yz * c, xz * a + yz * b + zz * c
+        h0, h1, h3 = a * p + b * q + c * r, d * p + e * q + f * r, u * p + v * q + w * r
+        p, q, r = xx * d + xy * e + xz * f, xy * d + yy * e + yz * f, xz * d + yz * e + zz * f
+        h2, h4 = d * p + e * q + f * r, u * p + v * q + w * r
+        p, q, r = xx * u + xy * v + xz * w, xy * u + yy * v + yz * w, xz * u + yz * v + zz * w
+        h5 = u * p + v * q + w * r
+        p = x * S[h + 6 * N] + y * S[h + 10 * N] + z * S[h + 15 * N]
+        q = x * S[h + 7 * N] + y * S[h + 11 * N] + z * S[h + 16 * N]
+        r = x * S[h + 8 * N] + y * S[h + 12 * N] + z * S[h + 17 * N]
+        h6, h7, h8 = a * p + b * q + c * r, d * p + e * q + f * r, u * p + v * q + w * r
+        p = S[h + 9 * N] * x + S[h + 13 * N] * y + S[h + 18 * N] * z
+        q = S[h + 13 * N] * x + S[h + 14 * N] * y + S[h + 19 * N] * z
+        r = S[h + 18 * N] * x + S[h + 19 * N] * y + S[h + 20 * N] * z
+        h9 = x * p + y * q + z * r
+        top, other = abs(h0), abs(h2)
+        top = other if other > top else top
+        other = abs(h5)
+        top = other if other > top else top
+        other = abs(h9)
+        top = other if other > top else top
+        S[h], S[h + N], S[h + 2 * N], S[h + 3 * N] = h0 + no0 * top, h1, h2 + no1 * top, h3
+        S[h + 4 * N], S[h + 5 * N], S[h + 6 * N], S[h + 7 * N] = h4, h5 + no2 * top, h6, h7
+        S[h + 8 * N], S[h + 9 * N] = h8, h9 + no3 * top
+        for k in range(10, 21):
+            S[h + k * N] = 0.0
+        S[h + 14 * N], S[h + 20 * N] = top, top
+
+
+@jit_inner
+def _start_joints(S, i, axes, values, per):
+    """The state of lane i at values (4,) of its joints."""
+    half = 0.5 * per * values[3]
+    S[_TURN + i] = math.cos(half)
+    for k in range(3):
+        S[_PLACE + k * N + i] = 0.0
+        for j in range(3):
+            S[_PLACE + k * N + i] += axes[j, k] * values[j]
+        S[_TURN + (1 + k) * N + i] = math.sin(half) * axes[3, k]
+    for k in range(4):
+        S[_VALUE + k * N + i] = values[k]
+
+
+@jit_lanes
+def _move_joints(S, axes):
+    """The joints' values where trial states are accepted, and the motions of the steps."""
+    for k in range(4):
+        for i in range(N):
+            value, step = S[_VALUE + k * N + i], S[_STEP + k * N + i]
+            value = S[_AT_VALUE + k * N + i] if S[_BACK + i] > 0.0 else value
+            S[_AT_VALUE + k * N + i], S[_VALUE + k * N + i] = value, value + step
+    for k in range(3):
+        a, b, c, x = axes[0, k], axes[1, k], axes[2, k], axes[3, k]
+        for i in range(N):
+            slides = a * S[_STEP + i] + b * S[_STEP + N + i] + c * S[_STEP + 2 * N + i]
+            S[_MOVE + k * N + i] = slides
+            S[_MOVE + (3 + k) * N + i] = x * S[_STEP + 3 * N + i]
 
 
 @jit_lanes
 def _advance(S, per):
     """The trial states after the steps."""
     for i in range(N):
-        S[_PLACE + i] = S[_AT_PLACE + i] + S[_STEP + i]
-        S[_PLACE + N + i] = S[_AT_PLACE + N + i] + S[_STEP + N + i]
-        S[_PLACE + 2 * N + i] = S[_AT_PLACE + 2 * N + i] + S[_STEP + 2 * N + i]
-        a = 0.5 * per * S[_STEP + 3 * N + i]
-        b = 0.5 * per * S[_STEP + 4 * N + i]
-        c = 0.5 * per * S[_STEP + 5 * N + i]
+        S[_PLACE + i] = S[_AT_PLACE + i] + S[_MOVE + i]
+        S[_PLACE + N + i] = S[_AT_PLACE + N + i] + S[_MOVE + N + i]
+        S[_PLACE + 2 * N + i] = S[_AT_PLACE + 2 * N + i] + S[_MOVE + 2 * N + i]
+        a = 0.5 * per * S[_MOVE + 3 * N + i]
+        b = 0.5 * per * S[_MOVE + 4 * N + i]
+        c = 0.5 * per * S[_MOVE + 5 * N + i]
         # cosine and sin(h)/h of half the angle, at most 5, from their series for its quarter, which
         # are exact to double precision there, by doubling twice
         t = (a * a + b * b + c * c) * 0.0625
@@ -467,11 +558,13 @@ _RAISES = 60
 
 @jit_allocating
 def descend_abreast(
-    cables, paid, load, poses, starts, length, scale, radius, reach, limit,
-    outcome, count, residual, energy, deviation, pull,
+    cables, paid, load, poses, starts, axes, start_values, length, scale, radius, reach, limit,
+    outcome, count, residual, energy, deviation, values, pull,
 ):  # fmt: skip
     """Descend from ``starts`` (n, 7), or from the commanded poses if that is (0, 7).
 
+    ``axes`` (4, 3) are those of three slides and a hinge, zero where there is none, and
+    ``start_values`` (n, 4) and ``values`` (n, 4) their values [m]; a free platform has (n, 0).
     ``cables`` is (n, m, N_COLUMNS), or (1, m, N_COLUMNS) where all poses have the same; ``load``
     and ``scale`` likewise. ``paid`` (n, m, 2) are rest lengths and gaps. All outputs are filled
     where a descent converges, ``pull`` (n, m) with tensions [N] that are negative where a cable is
@@ -481,7 +574,7 @@ def descend_abreast(
     S, C, P = np.zeros(_ALL), np.zeros((m, _CABLE)), np.zeros((m, N))
     T, D = np.zeros(_ALL), np.zeros((m, _CABLE))
     rows, staged, following, going = np.full(N, -1), N, 0, 0
-    space = (np.zeros(6), np.zeros((6, 6)), np.zeros(6))
+    space, free = (np.zeros(6), np.zeros((6, 6)), np.zeros(6)), values.shape[1] == 0
     while True:
         for i in range(N if following < n else 0):
             if rows[i] >= 0 or following == n:
@@ -494,6 +587,8 @@ def descend_abreast(
             for k in range(_SIZE, _ALL, N):
                 S[k + i] = 0.0
             S[_AT_ENERGY + i], S[_SIZE + i], S[_RADIUS + i] = 0.0, np.inf, radius
+            if not free:
+                _start_joints(S, i, axes, start_values[following], per)
             for c in range(m):
                 for k in range(0, _CABLE, N):
                     C[c, k + i] = D[c, k + staged]
@@ -505,7 +600,9 @@ def descend_abreast(
         for c in range(m):
             _add_cable(S, C[c], P[c])
         _end_sums(S, per)
-        _accept(S, 20.0 * radius, limit)
+        if not free:
+            _onto_joints(S, axes)
+        _accept(S, per, 20.0 * radius, limit, free)
         for _ in range(_RAISES):
             _step(S)
             failed = 0.0
@@ -520,6 +617,8 @@ def descend_abreast(
                 S[_SHORTS + i] = S[_SHORTS + i] + 1.0 if short else 0.0
                 if S[_SHORTS + i] >= PATIENCE:
                     _mirror(S, i, space)
+        if not free:
+            _move_joints(S, axes)
         _advance(S, per)
         for i in range(N):
             row = rows[i]
@@ -534,6 +633,8 @@ def descend_abreast(
                 energy[row] = S[_AT_ENERGY + i]
                 for k in range(7):
                     deviation[row, k] = S[_AT_PLACE + k * N + i]
+                for k in range(values.shape[1]):
+                    values[row, k] = S[_AT_VALUE + k * N + i]
                 for c in range(m):
                     pull[row, c] = P[c, i]
 

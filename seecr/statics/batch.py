@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from itertools import pairwise
 from threading import Event
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,13 +126,11 @@ class Abreast(Evaluation):
     def columns(self) -> dict[str, NDArray[Any]]:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
-    def only(self, rows: NDArray[np.integer] | NDArray[np.bool_]) -> Evaluation:
-        own = {name: each for name, each in vars(self).items() if name != "tables"}
-        out = Abreast.__new__(Abreast)
-        some = np.flatnonzero(rows) if rows.dtype == bool else rows
-        vars(out).update(
-            {name: each[rows] for name, each in own.items()}, tables=take(self.tables, some)
-        )
+    def only(self, rows: NDArray[np.integer] | NDArray[np.bool_]) -> Self:
+        at = np.arange(len(self.outcome))[rows]
+        out = type(self).__new__(type(self))
+        own = {name: each[at] for name, each in vars(self).items() if name != "tables"}
+        vars(out).update(own, tables=take(self.tables, at))
         return out
 
     @property
@@ -145,20 +143,20 @@ class Abreast(Evaluation):
 
     def there(self) -> Evaluation:
         out = Evaluation.at_commands(self.tables)
-        out.deviation[:] = self.deviation
+        out.deviation[:], out.values[:] = self.deviation, self.values
         return out
 
     def __getattr__(self, name: str) -> Array:
         if name not in {field.name for field in fields(Evaluation)} or "tables" not in vars(self):
             raise AttributeError(name)
-        if name == "hessian":
+        if name == "hessian" and self.tables.screws.shape[1] == 0:
             vars(self)[name] = stiffness_in_lanes(self.tables, self.deviation)
-        elif name in ("values", "guess"):
-            nothing = Evaluation.at_commands(self.tables)
-            vars(self).update(values=nothing.values, guess=nothing.guess)
+        elif name == "guess":
+            vars(self)[name] = np.zeros((*self.cables_pull.shape, 3))
         else:
             at = evaluate(self.tables, self, threads=None)
-            vars(self).update({k: getattr(at, k) for k in ("gradient", "states", "slopes")})
+            for each in ("gradient", "hessian", "states", "slopes"):
+                vars(self).setdefault(each, getattr(at, each))
         return np.asarray(vars(self)[name])
 
 
@@ -181,12 +179,12 @@ def descend(
     whose descent takes another way are left to the compiled loop.
     """
     if not staged and are_for_lanes(tables):
-        found = descend_in_lanes(tables, start, limit, threads)
+        found = descend_in_lanes(tables, start, start_values, limit, threads)
         left = np.flatnonzero(found.outcome < 0)
         if len(left):
-            first = None if start is None else start[left]
+            first, values = (None if s is None else s[left] for s in (start, start_values))
             some = take(tables, left)
-            alone = _descend_alone(some, first, limit, threads, None, staged, None)
+            alone = _descend_alone(some, first, limit, threads, values, staged, None)
             found.put(left, alone, evaluate(some, alone))
         out = Abreast.of(tables, found)
         _refuse_no_length(tables, out)
