@@ -574,6 +574,8 @@ def descend_abreast(
     S, C, P = np.zeros(_ALL), np.zeros((m, _CABLE)), np.zeros((m, N))
     T, D = np.zeros(_ALL), np.zeros((m, _CABLE))
     rows, staged, following, going = np.full(N, -1), N, 0, 0
+    # rounding grows along narrow valleys: a descent so long may end on either side of the limit
+    most = limit // 2
     space, free = (np.zeros(6), np.zeros((6, 6)), np.zeros(6)), values.shape[1] == 0
     while True:
         for i in range(N if following < n else 0):
@@ -602,7 +604,7 @@ def descend_abreast(
         _end_sums(S, per)
         if not free:
             _onto_joints(S, axes)
-        _accept(S, per, 20.0 * radius, limit, free)
+        _accept(S, per, 20.0 * radius, most, free)
         for _ in range(_RAISES):
             _step(S)
             failed = 0.0

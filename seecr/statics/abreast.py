@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from seecr.compiled.columns import EXTERNAL_MOMENT
 from seecr.parallel import in_parts
 from seecr.pose import Array
-from seecr.statics.tables import MANY, Tables, told_apart
+from seecr.statics.tables import Tables, are_many, told_apart
 
 # Axes and levers that differ by less than this are the same but for rounding.
 _EVEN = 1e-12
@@ -22,27 +22,27 @@ class Rested:
     Attributes:
         outcome: -1 where the descent is left to the compiled loop.
         count: evaluations. residual: relative to the load. energy: [J].
-        deviation: (n, 7). values: (n, d) of joints. pull: (n, m) tensions [N], negative where a
+        deviation: (n, 7). values: (n, d) of joints. pulls: (n, m) tensions [N], negative where a
             cable is slack.
     """
 
     def __init__(self, n: int, m: int, d: int) -> None:
         self.outcome, self.count = np.full(n, -1), np.zeros(n, dtype=np.int64)
         self.residual, self.energy = np.empty(n), np.empty(n)
-        self.deviation, self.pull = np.empty((n, 7)), np.empty((n, m))
+        self.deviation, self.pulls = np.empty((n, 7)), np.empty((n, m))
         self.values = np.zeros((n, d))
 
-    def put(self, rows: NDArray[np.intp], found: Any, check: Any) -> None:
+    def put(self, rows: NDArray[np.intp], found: Any, check: Any, pulls: Array) -> None:
         """Overwrite rows with what the compiled loop found, and with an evaluation there."""
         self.outcome[rows], self.count[rows] = found.outcome, found.count
-        self.deviation[rows], self.pull[rows] = check.deviation, check.pull
+        self.deviation[rows], self.pulls[rows] = check.deviation, pulls
         self.values[rows] = check.values
         self.residual[rows], self.energy[rows] = check.residual, check.energy
 
 
 def are_for_lanes(tables: Tables) -> bool:
     """Whether lanes know all that the cables, loads and joints of some tables do; and many rows."""
-    if len(tables) < MANY or _places(tables) is None:
+    if not are_many(len(tables)) or _places(tables) is None:
         return False
     from seecr.compiled.lanes import OUT_OF_SCOPE  # takes a while to import
 
@@ -94,7 +94,7 @@ def descend_in_lanes(
             load[part] if len(load) > 1 else load, tables.poses[part], starts[part], axes,
             first[part], tables.length, tables.scale[part], 0.5 * tables.length,
             tables.reach[part], limit, out.outcome[part], out.count[part], out.residual[part],
-            out.energy[part], out.deviation[part], values[part], out.pull[part],
+            out.energy[part], out.deviation[part], values[part], out.pulls[part],
         )  # fmt: skip
 
     in_parts(run, n, threads)

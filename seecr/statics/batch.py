@@ -94,11 +94,6 @@ class Evaluation(ByRow):
         """(n, m) [N] tensions."""
         return np.asarray(self.states[..., TENSION])
 
-    @property
-    def pull(self) -> Array:
-        """(n, m) [N] tensions, negative where a cable is slack and has none."""
-        return np.where((self.states[..., SLACK] > 0.5) & (self.tension == 0.0), -1.0, self.tension)
-
     def there(self) -> Evaluation:
         """Nothing evaluated yet, with the platform and its catenaries where they are here."""
         out = Evaluation.empty(*self.slopes.shape)
@@ -114,13 +109,13 @@ class Abreast(Evaluation):
     """
 
     tables: Tables
-    cables_pull: Array
+    pulls: Array
+    alone: NDArray[np.bool_]  # (n,) rows that lanes left to the compiled loop
 
     @classmethod
-    def of(cls, tables: Tables, found: Rested) -> Abreast:
+    def of(cls, tables: Tables, found: Rested, alone: NDArray[np.bool_]) -> Abreast:
         out = cls.__new__(cls)
-        vars(out).update(vars(found), tables=tables)
-        vars(out)["cables_pull"] = vars(out).pop("pull")
+        vars(out).update(vars(found), tables=tables, alone=alone)
         return out
 
     def columns(self) -> dict[str, NDArray[Any]]:
@@ -135,11 +130,7 @@ class Abreast(Evaluation):
 
     @property
     def tension(self) -> Array:
-        return np.maximum(self.cables_pull, 0.0)
-
-    @property
-    def pull(self) -> Array:
-        return self.cables_pull
+        return np.maximum(self.pulls, 0.0)
 
     def there(self) -> Evaluation:
         out = Evaluation.at_commands(self.tables)
@@ -152,7 +143,7 @@ class Abreast(Evaluation):
         if name == "hessian" and self.tables.screws.shape[1] == 0:
             vars(self)[name] = stiffness_in_lanes(self.tables, self.deviation)
         elif name == "guess":
-            vars(self)[name] = np.zeros((*self.cables_pull.shape, 3))
+            vars(self)[name] = np.zeros((*self.pulls.shape, 3))
         else:
             at = evaluate(self.tables, self, threads=None)
             for each in ("gradient", "hessian", "states", "slopes"):
@@ -180,13 +171,16 @@ def descend(
     """
     if not staged and are_for_lanes(tables):
         found = descend_in_lanes(tables, start, start_values, limit, threads)
-        left = np.flatnonzero(found.outcome < 0)
+        is_left = found.outcome < 0
+        left = np.flatnonzero(is_left)
         if len(left):
             first, values = (None if s is None else s[left] for s in (start, start_values))
             some = take(tables, left)
             alone = _descend_alone(some, first, limit, threads, values, staged, None)
-            found.put(left, alone, evaluate(some, alone))
-        out = Abreast.of(tables, found)
+            check = evaluate(some, alone)
+            slack = check.states[..., SLACK] > 0.5
+            found.put(left, alone, check, np.where(slack, -1.0, check.tension))
+        out = Abreast.of(tables, found, is_left)
         _refuse_no_length(tables, out)
         return out
     return _descend_alone(tables, start, limit, threads, start_values, staged, guess)

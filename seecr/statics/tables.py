@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Self
@@ -47,7 +48,23 @@ def by_row(compiled: Callable[..., None], *given: Any, threads: int | None = Non
 
 
 # So many rows are worth the lanes of seecr.compiled.lanes, and tables made for these.
-MANY = 64
+_MANY = 64
+_singly: set[str] = set()
+
+
+def are_many(n: int) -> bool:
+    """Whether n rows are worth lanes, and tables made for these."""
+    return n >= _MANY and not _singly
+
+
+@contextmanager
+def one_by_one() -> Iterator[None]:
+    """Rows are solved one after the other, however many they are: to compare with."""
+    _singly.add("asked for")
+    try:
+        yield
+    finally:
+        _singly.clear()
 
 
 @dataclass(eq=False)
@@ -145,8 +162,8 @@ def told_apart(tables: Tables) -> tuple[Array, Array, Array]:
     they may have been written to.
     """
     own = vars(tables)
-    cables = own.get("cables", own.get("cable"))
-    load = own.get("load", own.get("one_load"))
+    cables = own["cables"] if "cables" in own else own["cable"]
+    load = own["load"] if "load" in own else own["one_load"]
     paid = cables[..., REST : GAP + 1].copy() if "cables" in own else own["paid"]
     return cables, paid, load
 
@@ -170,7 +187,7 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
     robot = setup.robot
     poses = np.array(setup.commands.pose, order="C")  # a copy: see seecr.compiled.jit
     n, m = len(poses), robot.n_cables
-    if n >= MANY and not setup.laws:
+    if are_many(n) and not setup.laws:
         return _alike(setup, poses)
     cables, load = np.zeros((n, m, N_COLUMNS)), np.zeros((n, N_LOAD))
     _write(setup, QUANTITIES, cables, load, blank=True)

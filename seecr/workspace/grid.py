@@ -170,8 +170,8 @@ STATUSES = tuple(Status)
 
 def codes_of(status: NDArray[np.object_]) -> NDArray[np.int8]:
     """The code of each of some statuses (n,) of a solution, an index of :data:`STATUSES`."""
-    out = np.empty(len(status), np.int8)
-    for one in set(status):
+    out = np.zeros(len(status), np.int8)
+    for one in set(status[status != STATUSES[0]]):
         out[status == one] = STATUSES.index(one)
     return out
 
