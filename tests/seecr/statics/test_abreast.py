@@ -1,0 +1,203 @@
+"""Many poses descend in lanes: the same rests as one by one, whoever finds them, in any threads."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_robots import random_poses, random_robot
+
+import seecr
+from seecr.compiled.columns import EXTERNAL_MOMENT
+from seecr.compiled.lanes import OUT_OF_SCOPE
+from seecr.description.joints import pose_of_values, values_of_pose
+from seecr.effects.setup import plain_setup
+from seecr.pose import quat_from_rotvec, quat_multiply
+from seecr.statics import batch
+from seecr.statics.abreast import are_for_lanes
+from seecr.statics.batch import Abreast
+from seecr.statics.tables import assemble, one_by_one, take
+
+N = 1500
+
+
+def shipped(name: str, ea: float | None = None) -> seecr.Robot:
+    robot = seecr.load_robot(seecr.model_path(name))
+    return robot if ea is None else replace(robot, ea=np.full(robot.n_cables, ea))
+
+
+def poses_of(robot: seecr.Robot, n: int = N, seed: int = 0) -> np.ndarray:
+    """Poses between the exit points, half of them turned; on joints, values about the middle."""
+    rng = np.random.default_rng(seed)
+    points = np.concatenate([robot.exit_points, robot.reference_pose[None, :3]])
+    low, high = points.min(axis=0), points.max(axis=0)
+    if robot.joints:
+        middle = values_of_pose(robot, robot.reference_pose[None])[0]
+        reach = np.where(robot.hinges, 0.3, 0.25 * np.max(high - low))
+        return pose_of_values(robot, middle + reach * rng.uniform(-1, 1, (n, robot.n_dof)))[0]
+    turn = quat_from_rotvec(0.2 * rng.normal(size=(n, 3)) * (rng.uniform(size=(n, 1)) < 0.5))
+    quat = quat_multiply(turn, np.tile(robot.reference_pose[3:], (n, 1)))
+    places = low + rng.uniform(0.1, 0.9, (n, 3)) * (high - low)
+    return np.concatenate([places, quat], axis=1)
+
+
+ROBOTS: dict[str, Callable[[], seecr.Robot]] = {
+    "taut": lambda: shipped("demobot_cogiro"),
+    "slack": lambda: shipped("demobot_parallel"),
+    "very soft": lambda: shipped("ipanema", 300.0),
+    "very stiff": lambda: shipped("demobot_cogiro", 1e7),
+    "slack and stiff": lambda: shipped("demobot_parallel", 1e5),
+    "planar": lambda: shipped("planar_vertical"),
+    "planar and level": lambda: shipped("planar_horizontal"),
+    "planar, two cables": lambda: shipped("planar_two_cable"),
+    "only translates": lambda: shipped("camera"),
+}
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_lanes_rest_where_the_descent_of_one_does(name: str) -> None:
+    check_same(ROBOTS[name](), poses_of(ROBOTS[name]()))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_lanes_of_robots_nobody_has_seen(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, ("free", "planar")[seed % 2])
+    check_same(robot, random_poses(rng, robot, 400))
+
+
+def check_same(robot: seecr.Robot, poses: np.ndarray) -> None:
+    """Most of the poses rest in lanes, and all as they do one by one, but for rounding."""
+    many = seecr.solve(robot, poses)
+    with one_by_one():
+        single = seecr.solve(robot, poses)
+    assert isinstance(many.evaluation, Abreast) and not isinstance(single.evaluation, Abreast)
+    assert many.evaluation.alone.mean() < 0.5
+    assert np.array_equal(many.status, single.status)
+    rests = many.converged
+    assert rests.sum() > 0.5 * len(poses)
+    # the residual that both may leave, over the stiffness that the load itself gives
+    near = np.repeat([robot.length, 1.0], 3) * 1e-9
+    assert np.all(np.abs(many.deviation - single.deviation)[rests] < near)
+    pulls = np.abs(many.tensions - single.tensions)[rests]
+    assert np.all(pulls < 1e-7 * robot.usual_load + 1e-9 * many.tensions[rests].max())
+    assert np.array_equal(many.slack[rests], single.slack[rests])
+    assert np.all(many.residual[rests] < 1e-9)
+    joules = 1e-9 * robot.usual_load * robot.length
+    assert np.allclose(many.energy[rests], single.energy[rests], rtol=1e-9, atol=joules)
+    assert np.array_equal(many.rest_lengths, single.rest_lengths)
+    stiffness = np.abs(many.stiffness - single.stiffness)[rests].max(axis=(1, 2))
+    assert np.all(stiffness < 1e-6 * np.abs(single.stiffness)[rests].max(axis=(1, 2)))
+
+
+def test_what_lanes_leave_is_solved_by_itself() -> None:
+    """Falls, saddles, and rests where a cable is as long as its rest length are none of theirs."""
+    robot = shipped("demobot_parallel")
+    poses = poses_of(robot)
+    found = seecr.solve(robot, poses)
+    assert isinstance(found.evaluation, Abreast)
+    alone = found.evaluation.alone
+    assert 0 < alone.sum() < 0.1 * N
+    assert not found.converged[alone].all() and found.converged[~alone].all()
+    with one_by_one():
+        again = seecr.solve(robot, poses).rows(alone)
+    assert np.array_equal(again.deviation, found.deviation[alone], equal_nan=True)
+    assert np.array_equal(again.iterations, found.iterations[alone])
+
+
+def test_few_poses_do_not_descend_in_lanes() -> None:
+    robot = shipped("demobot_cogiro")
+    assert not isinstance(seecr.solve(robot, poses_of(robot, 20)).evaluation, Abreast)
+
+
+@pytest.mark.parametrize("column", OUT_OF_SCOPE)
+def test_a_column_that_lanes_do_not_know_keeps_them_out(column: int) -> None:
+    robot = shipped("demobot_cogiro")
+    tables = assemble(plain_setup(robot, seecr.Commands(poses_of(robot, 100))))
+    assert are_for_lanes(tables)
+    tables.cables[7, 3, column] = 1e-9
+    assert not are_for_lanes(tables)
+
+
+def test_a_moment_keeps_lanes_out() -> None:
+    robot = shipped("demobot_cogiro")
+    tables = assemble(plain_setup(robot, seecr.Commands(poses_of(robot, 100))))
+    tables.load[99, EXTERNAL_MOMENT + 2] = 1e-9
+    assert not are_for_lanes(tables)
+
+
+def test_cables_that_differ_from_row_to_row_descend_in_lanes() -> None:
+    """Written to, tables count as they are: each row with its own stiffness."""
+    robot = shipped("demobot_cogiro")
+    tables = assemble(plain_setup(robot, seecr.Commands(poses_of(robot, 100))))
+    soft = assemble(plain_setup(replace(robot, ea=0.5 * robot.ea), seecr.Commands(tables.poses)))
+    mixed = take(tables, np.arange(100))
+    mixed.cables[::2] = soft.cables[::2]
+    found = batch.descend(mixed)
+    assert isinstance(found, Abreast)
+    expected = np.where(
+        np.arange(100)[:, None] % 2 == 0,
+        batch.descend(soft).deviation, batch.descend(tables).deviation,
+    )  # fmt: skip
+    assert np.array_equal(found.deviation, expected)
+
+
+def test_external_forces_and_starts_reach_the_lanes() -> None:
+    robot = shipped("demobot_cogiro")
+    poses, rng = poses_of(robot), np.random.default_rng(1)
+    wrench = np.zeros((N, 6))
+    wrench[:, :3] = rng.uniform(-1.0, 1.0, (N, 3))
+    start = poses + np.concatenate([rng.uniform(-0.01, 0.01, (N, 3)), np.zeros((N, 4))], axis=1)
+    many = seecr.solve(robot, poses, wrench=wrench, start=start)
+    with one_by_one():
+        single = seecr.solve(robot, poses, wrench=wrench, start=start)
+    assert isinstance(many.evaluation, Abreast)
+    assert np.array_equal(many.status, single.status)
+    assert np.nanmax(np.abs(many.deviation - single.deviation)) < 1e-10
+    assert np.nanmax(np.abs(many.deviation - seecr.solve(robot, poses).deviation)) > 1e-5
+
+
+@pytest.mark.parametrize("name", ["slack", "planar"])
+def test_digits_do_not_depend_on_threads(name: str) -> None:
+    robot = ROBOTS[name]()
+    poses = poses_of(robot)
+    one, *others = (seecr.solve(robot, poses, threads=k) for k in (1, 2, 3, 7))
+    for other in others:
+        for of in ("deviation", "tensions", "residual", "energy", "iterations"):
+            assert np.array_equal(getattr(one, of), getattr(other, of), equal_nan=True)
+
+
+def test_rows_of_what_lanes_found_are_those_rows() -> None:
+    robot = shipped("demobot_parallel")
+    found = seecr.solve(robot, poses_of(robot))
+    some = found.rows([5, 900, 3])
+    assert np.array_equal(some.evaluation.states, found.evaluation.states[[5, 900, 3]])
+    assert np.array_equal(some.stiffness, found.stiffness[[5, 900, 3]])
+    assert np.array_equal(some.tables.cables, found.tables.cables[[5, 900, 3]])
+
+
+@pytest.mark.slow
+def test_the_second_start_compiles_nothing() -> None:
+    """The lanes of all numbers of cables are one function, and it is kept on disk."""
+    code = """
+import numpy as np, seecr
+from numba.core import event
+compiled = []
+class Listener(event.Listener):
+    def on_start(self, what): compiled.append(what)
+    def on_end(self, what): pass
+event.register("numba:compile", Listener())
+for name in ("demobot_cogiro", "planar_vertical"):
+    robot = seecr.load_robot(seecr.model_path(name))
+    found = seecr.solve(robot, np.tile(robot.reference_pose, (200, 1)))
+    found.smallest_eigenvalue
+    assert found.evaluation.alone.mean() < 0.5
+print(len(compiled))
+"""
+    for _ in range(2):
+        told = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+    assert told.stdout.strip() == b"0"
