@@ -336,7 +336,10 @@ def _step(S):
         span = span if span <= radius else radius
         S[_SPAN + i] = 0.0 if back else span
         S[_WORK + i] = g0 * x0 + g1 * x1 + g2 * x2 + g3 * x3 + g4 * x4 + g5 * x5
-        raised = 4.0 * shift if 4.0 * shift > 1e-6 * S[_TOP + i] else 1e-6 * S[_TOP + i] + 1e-300
+        # where all cables are slack there is no stiffness to compare with
+        loose = math.sqrt(g0 * g0 + g1 * g1 + g2 * g2 + g3 * g3 + g4 * g4 + g5 * g5) / radius
+        least = 1e-6 * (S[_TOP + i] if S[_TOP + i] > 0.0 else loose) + 1e-300
+        raised = 4.0 * shift if 4.0 * shift > least else least
         fails = ~(low > 0.0) & ~back
         going = S[_END + i] == 0.0
         S[_FAILED + i] = 1.0 if going & fails else 0.0
