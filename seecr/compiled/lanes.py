@@ -18,7 +18,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from seecr.compiled.algebra import norm
+from seecr.compiled.algebra import norm, rotated_less
 from seecr.compiled.columns import (
     ANCHOR,
     CENTRE_OF_MASS,
@@ -37,12 +37,13 @@ from seecr.compiled.columns import (
     IDLE,
     N_COLUMNS,
     REST,
+    SINGULAR,
     SINGULAR_PART,
     TOLERANCE,
     WINCH_SIDE,
 )
 from seecr.compiled.jit import jit, jit_allocating, jit_inner, jit_lanes
-from seecr.compiled.newton import FINE, LATE, PATIENCE, SHORT, mirrored_step
+from seecr.compiled.newton import FINE, LATE, PATIENCE, SHORT, escape, mirrored_step
 
 N = 16
 """Number of lanes."""
@@ -53,9 +54,9 @@ _ARM, _WAY, _BEFORE, _STRETCH, _RATE, _CABLE = (N * k for k in (0, 3, 6, 7, 8, 9
 # Rows of a lane: its problem (arm of the centre of mass, weight, external force, load, squared
 # reach); the trial state; what is summed at it (gradient, lower triangle of the stiffness, tension
 # over length, that times the arms, halves of the force's own stiffness, energy, tension next to
-# slackness); the
-# last state accepted with its energy; and what solve_one keeps. END is 0 while a descent goes on, 1
-# when it has converged, and 2 when it is left to solve_one.
+# slackness); the last state accepted with its energy; and what solve_one keeps. END is 0 while a
+# descent goes on, 1 when it has converged, and 2 when it is left to solve_one; _FREE when it has
+# come to rest where it is free to move, which is _UNSURE first.
 (
     _CENTRE, _WEIGHT, _FORCE, _SCALE, _REACH, _PLACE, _TURN, _LESS,
     _GRADIENT, _HESSIAN, _TURNING, _MOMENT, _HALVES, _ENERGY, _LEAST,
@@ -69,6 +70,13 @@ _ARM, _WAY, _BEFORE, _STRETCH, _RATE, _CABLE = (N * k for k in (0, 3, 6, 7, 8, 9
     N, N, N, N, N, N, N, 6 * N, 6 * N, 4 * N, 4 * N,
     N, N, N, N, N, N,
 ), initial=0)  # fmt: skip
+_FREE, _UNSURE = 3.0, 4.0
+
+
+@jit_lanes
+def _larger(a, b):
+    """The built-in asks for nan, which takes a branch."""
+    return a if a > b else b
 
 
 @jit_lanes
@@ -219,20 +227,12 @@ def _accept(S, per, largest, limit, free):
         g0, g1, g2, g3 = S[g], S[g + N], S[g + 2 * N], S[g + 3 * N]
         g4, g5 = S[g + 4 * N], S[g + 5 * N]
         force, torque = g0 * g0 + g1 * g1 + g2 * g2, g3 * g3 + g4 * g4 + g5 * g5
-        larger = force if force > torque else torque
-        trial = math.sqrt(larger if free else force + torque)
+        trial = math.sqrt(_larger(force, torque) if free else force + torque)
         there = g0 * S[s] + g1 * S[s + N] + g2 * S[s + 2 * N]
         there += g3 * S[s + 3 * N] + g4 * S[s + 4 * N] + g5 * S[s + 5 * N]
-        top, other = abs(S[h]), abs(S[h + 2 * N])
-        top = other if other > top else top
-        other = abs(S[h + 5 * N])
-        top = other if other > top else top
-        other = abs(S[h + 9 * N])
-        top = other if other > top else top
-        other = abs(S[h + 14 * N])
-        top = other if other > top else top
-        other = abs(S[h + 20 * N])
-        top = other if other > top else top
+        top = _larger(_larger(abs(S[h]), abs(S[h + 2 * N])), abs(S[h + 5 * N]))
+        top = _larger(_larger(top, abs(S[h + 9 * N])), abs(S[h + 14 * N]))
+        top = _larger(top, abs(S[h + 20 * N]))
         scale, size, span, radius = S[_SCALE + i], S[_SIZE + i], S[_SPAN + i], S[_RADIUS + i]
         energy, shift, again = S[_AT_ENERGY + i], S[_SHIFT + i], S[_BACK + i] > 0.0
         count = S[_COUNT + i] + (0.0 if again else 1.0)
@@ -274,39 +274,38 @@ def _accept(S, per, largest, limit, free):
 
 
 @jit_lanes
+def _pivot(square, low):
+    """One over the root of a pivot, of 1 if that is not positive; and the lowest pivot so far."""
+    low = square if square < low else low
+    return 1.0 / math.sqrt(square if square > 0.0 else 1.0), low
+
+
+@jit_lanes
 def _step(S):
     """Newton's steps where the shifted stiffness is positive definite; FAILED where it is not."""
     for i in range(N):
         h, shift = _HESSIAN + i, S[_SHIFT + i]
-        low = 1e300
-        t = S[h] + shift
-        low = t if t < low else low
-        d0 = 1.0 / math.sqrt(t if t > 0.0 else 1.0)
+        d0, low = _pivot(S[h] + shift, 1e300)
         l10, l20, l30 = S[h + N] * d0, S[h + 3 * N] * d0, S[h + 6 * N] * d0
         l40, l50 = S[h + 10 * N] * d0, S[h + 15 * N] * d0
         t = S[h + 2 * N] + shift - l10 * l10
-        low = t if t < low else low
-        d1 = 1.0 / math.sqrt(t if t > 0.0 else 1.0)
+        d1, low = _pivot(t, low)
         l21, l31 = (S[h + 4 * N] - l20 * l10) * d1, (S[h + 7 * N] - l30 * l10) * d1
         l41, l51 = (S[h + 11 * N] - l40 * l10) * d1, (S[h + 16 * N] - l50 * l10) * d1
         t = S[h + 5 * N] + shift - l20 * l20 - l21 * l21
-        low = t if t < low else low
-        d2 = 1.0 / math.sqrt(t if t > 0.0 else 1.0)
+        d2, low = _pivot(t, low)
         l32 = (S[h + 8 * N] - l30 * l20 - l31 * l21) * d2
         l42 = (S[h + 12 * N] - l40 * l20 - l41 * l21) * d2
         l52 = (S[h + 17 * N] - l50 * l20 - l51 * l21) * d2
         t = S[h + 9 * N] + shift - l30 * l30 - l31 * l31 - l32 * l32
-        low = t if t < low else low
-        d3 = 1.0 / math.sqrt(t if t > 0.0 else 1.0)
+        d3, low = _pivot(t, low)
         l43 = (S[h + 13 * N] - l40 * l30 - l41 * l31 - l42 * l32) * d3
         l53 = (S[h + 18 * N] - l50 * l30 - l51 * l31 - l52 * l32) * d3
         t = S[h + 14 * N] + shift - l40 * l40 - l41 * l41 - l42 * l42 - l43 * l43
-        low = t if t < low else low
-        d4 = 1.0 / math.sqrt(t if t > 0.0 else 1.0)
+        d4, low = _pivot(t, low)
         l54 = (S[h + 19 * N] - l50 * l40 - l51 * l41 - l52 * l42 - l53 * l43) * d4
         t = S[h + 20 * N] + shift - l50 * l50 - l51 * l51 - l52 * l52 - l53 * l53 - l54 * l54
-        low = t if t < low else low
-        d5 = 1.0 / math.sqrt(t if t > 0.0 else 1.0)
+        d5, low = _pivot(t, low)
         g = _GRADIENT + i
         g0, g1, g2, g3 = S[g], S[g + N], S[g + 2 * N], S[g + 3 * N]
         g4, g5 = S[g + 4 * N], S[g + 5 * N]
@@ -344,19 +343,35 @@ def _step(S):
         going = S[_END + i] == 0.0
         S[_FAILED + i] = 1.0 if going & fails else 0.0
         S[_SHIFT + i] = raised if going & fails else shift
-        S[_END + i] = 2.0 if (S[_END + i] == 1.0) & fails else S[_END + i]
+        S[_END + i] = _UNSURE if (S[_END + i] == 1.0) & fails else S[_END + i]
+
+
+@jit_inner
+def _take_hessian(S, i, hessian):
+    """Fill the stiffness (6, 6) of lane i."""
+    k = _HESSIAN + i
+    for r in range(6):
+        for c in range(r + 1):
+            hessian[r, c] = hessian[c, r] = S[k]
+            k += N
+
+
+@jit_allocating
+def _judge(S, i, space):
+    """End lane i, which balances but is not stable, as free to move if that is what it is."""
+    _gradient, hessian, step = space
+    _take_hessian(S, i, hessian)
+    free = escape(hessian, S[_TOP + i], S[_RADIUS + i], step) == SINGULAR
+    S[_END + i] = _FREE if free else 2.0
 
 
 @jit_allocating
 def _mirror(S, i, space):
     """The other step of solve_one for lane i, where a shift has shortened several in turn."""
     gradient, hessian, step = space
-    k = _HESSIAN + i
+    _take_hessian(S, i, hessian)
     for r in range(6):
         gradient[r] = S[_GRADIENT + r * N + i]
-        for c in range(r + 1):
-            hessian[r, c] = hessian[c, r] = S[k]
-            k += N
     mirrored_step(gradient, hessian, S[_RADIUS + i], step)
     work = 0.0
     for r in range(6):
@@ -405,12 +420,7 @@ def _onto_joints(S, axes):
         q = S[h + 13 * N] * x + S[h + 14 * N] * y + S[h + 19 * N] * z
         r = S[h + 18 * N] * x + S[h + 19 * N] * y + S[h + 20 * N] * z
         h9 = x * p + y * q + z * r
-        top, other = abs(h0), abs(h2)
-        top = other if other > top else top
-        other = abs(h5)
-        top = other if other > top else top
-        other = abs(h9)
-        top = other if other > top else top
+        top = _larger(_larger(abs(h0), abs(h2)), _larger(abs(h5), abs(h9)))
         S[h], S[h + N], S[h + 2 * N], S[h + 3 * N] = h0 + no0 * top, h1, h2 + no1 * top, h3
         S[h + 4 * N], S[h + 5 * N], S[h + 6 * N], S[h + 7 * N] = h4, h5 + no2 * top, h6, h7
         S[h + 8 * N], S[h + 9 * N] = h8, h9 + no3 * top
@@ -530,10 +540,8 @@ def _turn_cable(S, C):
     for i in range(N):
         w, x, y, z = S[_TURN + i], S[_TURN + N + i], S[_TURN + 2 * N + i], S[_TURN + 3 * N + i]
         a, b, c = C[_ARM + i], C[_ARM + N + i], C[_ARM + 2 * N + i]
-        cx, cy, cz = y * c - z * b, z * a - x * c, x * b - y * a
-        a += 2.0 * (w * cx + y * cz - z * cy)
-        b += 2.0 * (w * cy + z * cx - x * cz)
-        c += 2.0 * (w * cz + x * cy - y * cx)
+        dx, dy, dz = rotated_less(w, x, y, z, a, b, c)
+        a, b, c = a + dx, b + dy, c + dz
         C[_ARM + i], C[_ARM + N + i], C[_ARM + 2 * N + i] = a, b, c
         a = S[_PLACE + i] + a + C[_WAY + i]
         b = S[_PLACE + N + i] + b + C[_WAY + N + i]
@@ -549,10 +557,8 @@ def _turn_centre(S):
     for i in range(N):
         w, x, y, z = S[_TURN + i], S[_TURN + N + i], S[_TURN + 2 * N + i], S[_TURN + 3 * N + i]
         a, b, c = S[_CENTRE + i], S[_CENTRE + N + i], S[_CENTRE + 2 * N + i]
-        cx, cy, cz = y * c - z * b, z * a - x * c, x * b - y * a
-        S[_CENTRE + i] = a + 2.0 * (w * cx + y * cz - z * cy)
-        S[_CENTRE + N + i] = b + 2.0 * (w * cy + z * cx - x * cz)
-        S[_CENTRE + 2 * N + i] = c + 2.0 * (w * cz + x * cy - y * cx)
+        dx, dy, dz = rotated_less(w, x, y, z, a, b, c)
+        S[_CENTRE + i], S[_CENTRE + N + i], S[_CENTRE + 2 * N + i] = a + dx, b + dy, c + dz
 
 
 # Most raises of a shift in one step, before a lane is left to solve_one.
@@ -570,8 +576,8 @@ def descend_abreast(
     ``start_values`` (n, 4) and ``values`` (n, 4) their values [m]; a free platform has (n, 0).
     ``cables`` is (n, m, N_COLUMNS), or (1, m, N_COLUMNS) where all poses have the same; ``load``
     and ``scale`` likewise. ``paid`` (n, m, 2) are rest lengths and gaps. All outputs are filled
-    where a descent converges, ``pull`` (n, m) with tensions [N] that are negative where a cable is
-    slack; elsewhere the outcome is -1.
+    where a descent comes to rest, ``pull`` (n, m) with tensions [N] that are negative where a cable
+    is slack; elsewhere the outcome is -1.
     """
     n, m, per = poses.shape[0], paid.shape[1], 1.0 / length
     S, C, P = np.zeros(_ALL), np.zeros((m, _CABLE)), np.zeros((m, N))
@@ -616,7 +622,8 @@ def descend_abreast(
             if failed == 0.0:
                 break
         for i in range(N):
-            # only once the shift is found: shorts are counted by steps
+            if S[_END + i] == _UNSURE:
+                _judge(S, i, space)
             if rows[i] >= 0 and S[_END + i] + S[_BACK + i] + S[_FAILED + i] == 0.0:
                 short = S[_SHIFT + i] > 0.0 and S[_SPAN + i] < SHORT * S[_RADIUS + i]
                 S[_SHORTS + i] = S[_SHORTS + i] + 1.0 if short else 0.0
@@ -632,8 +639,8 @@ def descend_abreast(
             rows[i], going = -1, going - 1
             count[row] = int(S[_COUNT + i])
             outcome[row] = -1
-            if S[_END + i] == 1.0:
-                outcome[row] = CONVERGED
+            if S[_END + i] != 2.0:
+                outcome[row] = CONVERGED if S[_END + i] == 1.0 else SINGULAR
                 residual[row] = S[_SIZE + i] / S[_SCALE + i]
                 energy[row] = S[_AT_ENERGY + i]
                 for k in range(7):
@@ -656,11 +663,7 @@ def stiffness_abreast(cables, paid, load, poses, deviation, length, scale, hessi
             _add_cable(S, C[c], P[c])
         _end_sums(S, per)
         for i in range(min(N, n - first)):
-            k = _HESSIAN + i
-            for r in range(6):
-                for c in range(r + 1):
-                    hessian[first + i, r, c] = hessian[first + i, c, r] = S[k]
-                    k += N
+            _take_hessian(S, i, hessian[first + i])
 
 
 @jit

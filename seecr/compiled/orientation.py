@@ -173,9 +173,11 @@ def straight_balance_batch(
     """The balance of platforms on straight cables at k displaced poses: matrix tau = load.
 
     ``rows`` (k,) says which of the n rows each displacement (k, d) [m] is for, rotations times the
-    length. Fills matrices (k, d, m) and loads (k, d) [N], torques over the length.
+    length. Fills matrices (k, d, m) and loads (k, d) [N], torques over the length. Cables and loads
+    have n rows, or one where all are alike.
     """
     m, d = cables.shape[1], loads.shape[1]
+    own_cables, own_load = cables.shape[0] > 1, load.shape[0] > 1
     joints, still, values = screws.shape[1], np.zeros(7), np.zeros(d)
     space = make_turning_space(m, d, joints, joints)  # nothing is turned
     place, trial_values = space[7], space[8]
@@ -185,7 +187,8 @@ def straight_balance_batch(
         advance(
             still, values, away[r], length, screws[row], poses[row], place, trial_values, space[0]
         )
-        balance_straight(cables[row], load[row], poses[row], place, length, space)
+        cable, pushed = cables[row if own_cables else 0], load[row if own_load else 0]
+        balance_straight(cable, pushed, poses[row], place, length, space)
         for k in range(d):
             loads[r, k] = space[4][k]
             for i in range(m):

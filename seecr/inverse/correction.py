@@ -373,9 +373,10 @@ class _Search:
         held, tables = self._held(self.given)
         found, aimed, settled = held.fine.copy(), self.given.pose.copy(), held.fine.copy()
         lost = np.flatnonzero(~held.fine)
-        strained = self.limits.strained(tables)
-        high = np.where(held.fine[:, None], self.limits.high, strained.high)
+        high = self.limits.high
         if len(lost):
+            strained = self.limits.strained(tables)
+            high = np.where(held.fine[:, None], high, strained.high)
             near = replace(self, limits=strained)
             best = near._nearest(lost, tables.scale, fix_position)
             aimed[lost], found[lost], settled[lost] = best.poses, best.found, best.settled

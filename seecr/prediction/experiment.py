@@ -222,7 +222,7 @@ class Experiment:
             near = None
         tables, found = self._solve(setup, near)
         pose = batch.platform_poses(tables, found.deviation)
-        readings = read(effects, setup, pose, found.states[..., TENSION])
+        readings = read(effects, setup, pose, found.tension)
         sensors = sensors_among(effects)
         kept = {"pose": pose}
         return Prediction(setup, tables, found, readings, False, sensors, kept=kept)

@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 from seecr.compiled.columns import (
     ANCHOR,
+    COMPLIANCE,
+    CREEP,
+    CREEP_RATE,
     EA,
     EXIT,
     FRICTION,
@@ -23,10 +26,11 @@ from seecr.compiled.columns import (
     TENSION,
     UP,
     WEIGHT,
+    WINCH_SIDE,
 )
 from seecr.pose import Array
 from seecr.statics import batch
-from seecr.statics.tables import ByRow, Tables, by_row, take, ways
+from seecr.statics.tables import ByRow, Tables, by_row, rest_lengths_of, take, told_apart, ways
 
 # Newton steps to the tightness of a cable.
 _TIGHTNESS = 60
@@ -198,11 +202,12 @@ def straight_balance(tables: Tables, rows: NDArray[np.intp], away: Array) -> tup
     """
     from seecr.compiled.orientation import straight_balance_batch  # takes a while to import
 
-    (m, d), k = (tables.cables.shape[1], tables.n_dof), len(rows)
+    (m, d), k = (rest_lengths_of(tables).shape[1], tables.n_dof), len(rows)
     matrices, loads = np.empty((k, d, m)), np.empty((k, d))
     # Numba would compile everything once more for views
     rows, moves = np.ascontiguousarray(rows), np.ascontiguousarray(away)
-    given = tables.cables, tables.load, tables.poses, tables.screws
+    cables, _paid, load = told_apart(tables)
+    given = cables, load, tables.poses, tables.screws
     by_row(
         lambda of, by, *out: straight_balance_batch(*given, of, by, tables.length, *out),
         rows, moves, matrices, loads,
@@ -218,7 +223,22 @@ _ROUNDS = 5
 
 def bridged_lengths(tables: Tables) -> Array:
     """(n, m) [m] lengths of straight, unstrained cables at the poses of tables."""
-    return np.asarray(tables.cables[..., REST] + tables.cables[..., GAP])
+    return np.asarray(told_apart(tables)[1].sum(axis=2))
+
+
+def is_plain(tables: Tables) -> bool:
+    """Whether cables are straight, with linear laws: all that lanes know."""
+    from seecr.compiled.lanes import OUT_OF_SCOPE  # takes a while to import
+
+    return not told_apart(tables)[0][..., list(OUT_OF_SCOPE)].any()
+
+
+def plain_rest(tables: Tables, tensions: Array) -> Array:
+    """Rest lengths (n, m) [m] with which cables that are plain have tensions (n, m) [N]."""
+    law = told_apart(tables)[0]
+    soft = law[..., COMPLIANCE] + law[..., WINCH_SIDE] / law[..., EA]
+    grown = 1.0 + law[..., CREEP] + (1.0 / law[..., EA] + law[..., CREEP_RATE]) * tensions
+    return np.asarray((bridged_lengths(tables) - soft * tensions) / grown)
 
 
 def least_of_heavy(tables: Tables) -> Array:

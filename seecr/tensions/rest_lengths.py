@@ -23,10 +23,13 @@ from seecr.tensions.balance import (
     bridged_lengths,
     first_tensions,
     here,
+    is_plain,
     linearised,
     next_rest,
+    plain_rest,
     rest_after,
     rest_for,
+    straight_balance,
     with_rest,
 )
 from seecr.tensions.distribution import distribute
@@ -64,6 +67,8 @@ def hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int = _ROU
     Tensions are near ``aim`` (n, m) within limits (m,) or (n, m) [N]. Cables with weight pull at
     least about what they weigh, unless the pose can only be held with less.
     """
+    if is_plain(tables):
+        return _hold_plain(tables, aim, *(np.broadcast_to(one, aim.shape) for one in (low, high)))
     limits = limits_of(tables, low, high)
     out = _hold(tables, aim, *limits, rounds, rest_for(tables, first_tensions(tables, limits[0])))
     if bends(tables) and tables.cables.shape[1] >= tables.n_dof:
@@ -166,6 +171,16 @@ def _hold(tables: Tables, aim: Array, least: Array, most: Array, rounds: int, re
     inside = (out.tensions >= least - room) & (out.tensions <= most + room)
     out.fine |= (start.residual < TOLERANCE) & inside.all(axis=1)
     return _loosened(tables, out, least)
+
+
+def _hold_plain(tables: Tables, aim: Array, least: Array, most: Array) -> Held:
+    """The same for straight cables with linear laws: neither needs rounds."""
+    n = len(tables)
+    matrix, load = straight_balance(tables, np.arange(n), np.zeros((n, tables.n_dof)))
+    tensions, _possible = distribute(matrix, load, aim, least, most)
+    lack = np.einsum("ndm,nm->nd", matrix, tensions) - load
+    fine = batch.residual_size(lack) < TOLERANCE * tables.scale
+    return _loosened(tables, Held(plain_rest(tables, tensions), tensions, fine), least)
 
 
 def _loosened(tables: Tables, held: Held, least: Array) -> Held:
