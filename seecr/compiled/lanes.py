@@ -14,7 +14,6 @@ constant places for all else.
 from __future__ import annotations
 
 import math
-from itertools import accumulate
 
 import numpy as np
 
@@ -63,13 +62,13 @@ _ARM, _WAY, _BEFORE, _STRETCH, _RATE, _CABLE = (N * k for k in (0, 3, 6, 7, 8, 9
     _AT_PLACE, _AT_TURN, _AT_ENERGY,
     _SIZE, _RADIUS, _SHIFT, _COUNT, _IDLES, _LATES, _SHORTS, _STEP, _MOVE, _VALUE, _AT_VALUE,
     _SPAN, _WORK, _TOP, _BACK, _FAILED, _END, _ALL,
-) = accumulate((
-    3 * N, 3 * N, 3 * N, N, N, 3 * N, 4 * N, 9 * N,
-    6 * N, 21 * N, N, 3 * N, 3 * N, N, N,
-    3 * N, 4 * N, N,
-    N, N, N, N, N, N, N, 6 * N, 6 * N, 4 * N, 4 * N,
-    N, N, N, N, N, N,
-), initial=0)  # fmt: skip
+) = (N * np.cumsum([
+    0, 3, 3, 3, 1, 1, 3, 4, 9,
+    6, 21, 1, 3, 3, 1, 1,
+    3, 4, 1,
+    1, 1, 1, 1, 1, 1, 1, 6, 6, 4, 4,
+    1, 1, 1, 1, 1, 1,
+])).tolist()  # fmt: skip
 _FREE, _UNSURE = 3.0, 4.0
 
 
