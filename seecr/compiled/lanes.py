@@ -3,7 +3,8 @@
 A lane takes the steps of ``solve_one`` one by one, with its trust region and its tests, so that it
 arrives where that arrives. What a lane cannot do it leaves to ``solve_one``, which begins again
 from the start: cables that are not straight and linear, moments, steps away from saddles, falls,
-and whatever does not end in a certified equilibrium.
+and whatever does not end in a certified equilibrium. That includes rests free to move: along such a
+direction rounding decides where a descent ends.
 
 LLVM turns a loop over the lanes into vector instructions if its body has no branches, if the number
 of lanes is a constant, and if rows of numbers are seen not to overlap. So the numbers of all lanes
@@ -36,13 +37,12 @@ from seecr.compiled.columns import (
     IDLE,
     N_COLUMNS,
     REST,
-    SINGULAR,
     SINGULAR_PART,
     TOLERANCE,
     WINCH_SIDE,
 )
 from seecr.compiled.jit import jit, jit_allocating, jit_inner, jit_lanes
-from seecr.compiled.newton import FINE, LATE, PATIENCE, SHORT, escape, mirrored_step
+from seecr.compiled.newton import FINE, LATE, PATIENCE, SHORT, mirrored_step
 
 N = 16
 """Number of lanes."""
@@ -54,8 +54,7 @@ _ARM, _WAY, _BEFORE, _STRETCH, _RATE, _CABLE = (N * k for k in (0, 3, 6, 7, 8, 9
 # reach); the trial state; what is summed at it (gradient, lower triangle of the stiffness, tension
 # over length, that times the arms, halves of the force's own stiffness, energy, tension next to
 # slackness); the last state accepted with its energy; and what solve_one keeps. END is 0 while a
-# descent goes on, 1 when it has converged, and 2 when it is left to solve_one; _FREE when it has
-# come to rest where it is free to move, which is _UNSURE first.
+# descent goes on, 1 when it has converged, and 2 when it is left to solve_one.
 (
     _CENTRE, _WEIGHT, _FORCE, _SCALE, _REACH, _PLACE, _TURN, _LESS,
     _GRADIENT, _HESSIAN, _TURNING, _MOMENT, _HALVES, _ENERGY, _LEAST,
@@ -69,7 +68,6 @@ _ARM, _WAY, _BEFORE, _STRETCH, _RATE, _CABLE = (N * k for k in (0, 3, 6, 7, 8, 9
     1, 1, 1, 1, 1, 1, 1, 6, 6, 4, 4,
     1, 1, 1, 1, 1, 1,
 ])).tolist()  # fmt: skip
-_FREE, _UNSURE = 3.0, 4.0
 
 
 @jit_lanes
@@ -342,7 +340,7 @@ def _step(S):
         going = S[_END + i] == 0.0
         S[_FAILED + i] = 1.0 if going & fails else 0.0
         S[_SHIFT + i] = raised if going & fails else shift
-        S[_END + i] = _UNSURE if (S[_END + i] == 1.0) & fails else S[_END + i]
+        S[_END + i] = 2.0 if (S[_END + i] == 1.0) & fails else S[_END + i]
 
 
 @jit_inner
@@ -353,15 +351,6 @@ def _take_hessian(S, i, hessian):
         for c in range(r + 1):
             hessian[r, c] = hessian[c, r] = S[k]
             k += N
-
-
-@jit_allocating
-def _judge(S, i, space):
-    """End lane i, which balances but is not stable, as free to move if that is what it is."""
-    _gradient, hessian, step = space
-    _take_hessian(S, i, hessian)
-    free = escape(hessian, S[_TOP + i], S[_RADIUS + i], step) == SINGULAR
-    S[_END + i] = _FREE if free else 2.0
 
 
 @jit_allocating
@@ -575,7 +564,7 @@ def descend_abreast(
     ``start_values`` (n, 4) and ``values`` (n, 4) their values [m]; a free platform has (n, 0).
     ``cables`` is (n, m, N_COLUMNS), or (1, m, N_COLUMNS) where all poses have the same; ``load``
     and ``scale`` likewise. ``paid`` (n, m, 2) are rest lengths and gaps. All outputs are filled
-    where a descent comes to rest, ``pull`` (n, m) with tensions [N] that are negative where a cable
+    where a descent converges, ``pull`` (n, m) with tensions [N] that are negative where a cable
     is slack; elsewhere the outcome is -1.
     """
     n, m, per = poses.shape[0], paid.shape[1], 1.0 / length
@@ -621,8 +610,7 @@ def descend_abreast(
             if failed == 0.0:
                 break
         for i in range(N):
-            if S[_END + i] == _UNSURE:
-                _judge(S, i, space)
+            # only once the shift is found: shorts are counted by steps
             if rows[i] >= 0 and S[_END + i] + S[_BACK + i] + S[_FAILED + i] == 0.0:
                 short = S[_SHIFT + i] > 0.0 and S[_SPAN + i] < SHORT * S[_RADIUS + i]
                 S[_SHORTS + i] = S[_SHORTS + i] + 1.0 if short else 0.0
@@ -638,8 +626,8 @@ def descend_abreast(
             rows[i], going = -1, going - 1
             count[row] = int(S[_COUNT + i])
             outcome[row] = -1
-            if S[_END + i] != 2.0:
-                outcome[row] = CONVERGED if S[_END + i] == 1.0 else SINGULAR
+            if S[_END + i] == 1.0:
+                outcome[row] = CONVERGED
                 residual[row] = S[_SIZE + i] / S[_SCALE + i]
                 energy[row] = S[_AT_ENERGY + i]
                 for k in range(7):

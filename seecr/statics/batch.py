@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from itertools import pairwise
 from threading import Event
@@ -123,10 +124,22 @@ class Abreast(Evaluation):
 
     def only(self, rows: NDArray[np.integer] | NDArray[np.bool_]) -> Self:
         at = np.arange(len(self.outcome))[rows]
+        return self._with(take(self.tables, at), lambda each: each[at])
+
+    def copy(self) -> Self:
+        return self._with(self.tables, lambda each: each.copy())
+
+    def _with(self, tables: Tables, of: Callable[[NDArray[Any]], NDArray[Any]]) -> Self:
+        """The same with other arrays: all that there are so far."""
         out = type(self).__new__(type(self))
-        own = {name: each[at] for name, each in vars(self).items() if name != "tables"}
-        vars(out).update(own, tables=take(self.tables, at))
+        own = {name: of(each) for name, each in vars(self).items() if name != "tables"}
+        vars(out).update(own, tables=tables)
         return out
+
+    def put(self, rows: NDArray[np.integer] | NDArray[np.bool_], other: Evaluation) -> None:
+        super().put(rows, other)  # type: ignore[arg-type]
+        self.pulls[rows] = np.where(other.states[..., SLACK] > 0.5, -1.0, other.tension)
+        self.alone[rows] = True
 
     @property
     def tension(self) -> Array:

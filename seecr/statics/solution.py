@@ -312,9 +312,9 @@ class Solution(Result):
             return self.evaluation
         # a cable that is exactly as long as its rest length has stiffness on one side only
         there = self.evaluation.only(rows)
-        hessian = self.evaluation.hessian.copy()
-        hessian[rows] = batch.without_idle(take(self.tables, rows), there).hessian
-        return replace(self.evaluation, hessian=hessian)
+        out = self.evaluation.copy()
+        out.hessian[rows] = batch.without_idle(take(self.tables, rows), there).hessian
+        return out
 
     @cached_property
     def _softest(self) -> tuple[Array, Array]:

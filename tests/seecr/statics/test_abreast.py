@@ -95,14 +95,14 @@ def check_same(robot: seecr.Robot, poses: np.ndarray) -> None:
 
 
 def test_what_lanes_leave_is_solved_by_itself() -> None:
-    """Falls, and rests where a cable is as long as its rest length, are none of theirs."""
+    """Falls, rests free to move, and those where a cable is as long as its rest length."""
     robot = shipped("demobot_parallel")
     poses = poses_of(robot)
     found = seecr.solve(robot, poses)
     assert isinstance(found.evaluation, Abreast)
     alone = found.evaluation.alone
     assert 0 < alone.sum() < 0.1 * N
-    assert found.evaluation.at_rest[~alone].all()
+    assert not found.converged[alone].all() and found.converged[~alone].all()
     with one_by_one():
         again = seecr.solve(robot, poses).rows(alone)
     assert np.array_equal(again.deviation, found.deviation[alone], equal_nan=True)
@@ -178,6 +178,18 @@ def test_rows_of_what_lanes_found_are_those_rows() -> None:
     assert np.array_equal(some.evaluation.states, found.evaluation.states[[5, 900, 3]])
     assert np.array_equal(some.stiffness, found.stiffness[[5, 900, 3]])
     assert np.array_equal(some.tables.cables, found.tables.cables[[5, 900, 3]])
+
+
+def test_a_copy_with_other_rows_in_it_is_whole() -> None:
+    robot = shipped("demobot_parallel")
+    found, other = (seecr.solve(robot, poses_of(robot, 200, seed)).evaluation for seed in (0, 1))
+    rows, changed = np.array([3, 150]), found.copy()
+    changed.put(rows, other.only(rows))
+    for of in ("tension", "deviation", "states", "hessian", "residual"):
+        expected = getattr(found, of).copy()
+        expected[rows] = getattr(other, of)[rows]
+        assert np.array_equal(getattr(changed, of), expected)
+        assert not np.array_equal(getattr(changed, of), getattr(found, of))
 
 
 @pytest.mark.slow
