@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from own_effects import Hose
+from hoses import Hose
 
 import crosscheck
 import seecr

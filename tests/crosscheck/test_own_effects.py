@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from hoses import Heavier, Hose
 from made_data import measured
-from own_effects import Heavier, Hose
 
 import crosscheck
 import seecr
@@ -19,7 +19,7 @@ from crosscheck.cli import main
 from seecr.effects import registry
 
 ROBOT = seecr.load_robot("demobot_cogiro")
-FILE = Path(__file__).parents[1] / "support" / "own_effects.py"
+FILE = Path(__file__).parents[1] / "support" / "hoses.py"
 
 
 @pytest.fixture(autouse=True)
