@@ -54,13 +54,17 @@ def print_comparison(
     found: Comparison, exceeded: Sequence[Exceeded], limited: bool, out: Path,
     console: Console | None = None,
 ) -> None:  # fmt: skip
-    """Print the tables, the verdict, what exceeds its limit, and where the files are."""
+    """Print the verdict, what exceeds its limit, the tables, and where the files are."""
     show(_on_terminal(found, exceeded, limited, out), console)
 
 
 def _on_terminal(
     found: Comparison, exceeded: Sequence[Exceeded], limited: bool, out: Path
 ) -> Iterator[Block]:
+    yield Line(found.sentence, "green" if found.is_noise else "bold yellow")
+    yield Items([item.words for item in exceeded], style="bold red")
+    if limited and not exceeded:
+        yield Line("All limits hold.", "green")
     yield Items(found.notes, "note: ", "dim")
     if found.coordinates:
         yield _coordinates(found)
@@ -72,10 +76,6 @@ def _on_terminal(
     yield Items(_unsolved(found)[:_MOST_UNSOLVED], style="bold yellow")
     if (more := len(found.unsolved) - _MOST_UNSOLVED) > 0:
         yield Line(f"{counted(more, 'more row')} without an equilibrium")
-    yield Line(found.sentence, "green" if found.is_noise else "bold yellow")
-    yield Items([item.words for item in exceeded], style="bold red")
-    if limited and not exceeded:
-        yield Line("All limits hold.", "green")
     yield Line(f"Results in {out}/", "dim")
 
 

@@ -78,7 +78,6 @@ def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None)
 
 
 def _on_terminal(found: Diagnosis, out: Path) -> Iterator[Block]:
-    yield Items(found.sight.lines() if found.sight is not None else (), style="dim")
     yield Line(f"{found.verdict}: {found.reason}", _STYLE[found.verdict])
     yield Items(found.notes, "note: ", "dim")
     if found.verdict is not DiagnosisVerdict.NO_VERDICT:
@@ -95,6 +94,7 @@ def _on_terminal(found: Diagnosis, out: Path) -> Iterator[Block]:
             yield Line(f"note: {within}", "dim")
         yield from candidate_lines(found)
         yield Items(equals_of(found), style="dim")
+    yield Items(found.sight.lines() if found.sight is not None else (), style="dim")
     yield Items(found.measure_further, "measure next: ")
     yield Line(f"Results in {out}/ (open diagnosis.html)", "dim")
 
