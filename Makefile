@@ -42,10 +42,11 @@ docs: ## write the pages and pictures made from the sources, and build the site:
 	$(BIN)/python scripts/draw_fall.py
 	$(BIN)/python -m sphinx -q -W --keep-going -c docs -d build/read . build/site
 
-paper: ## every figure and number of docs/paper.md; three minutes
+paper: ## every figure and number of docs/paper.md; ten minutes
 	$(BIN)/python scripts/make_paper.py
 	$(BIN)/python scripts/link_words.py
 	$(BIN)/python scripts/explain_figure_12.py
+	$(BIN)/python scripts/paper_control.py
 
 pictures: ## docs/pictures by the viewer and a browser; the pages, light and dark, wide and narrow, in pages/
 	$(BIN)/python scripts/render_pictures.py

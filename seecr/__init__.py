@@ -19,6 +19,10 @@ from seecr.lazy import lazily, pictured
 
 if TYPE_CHECKING:
     from seecr.commands import Commands, Loads
+    from seecr.controlled.control import control
+    from seecr.controlled.plant import SensorNoise
+    from seecr.controlled.result import Control, Controlled
+    from seecr.controlled.schemes import Feedback, FeedForward, Scheme
     from seecr.description.mjcf import load_robot, model_names, model_path
     from seecr.description.robot import Joint, Robot
     from seecr.effects import (
@@ -80,6 +84,10 @@ _MODULES = {
     "equilibrium.saddles": ("Barrier", "barriers"),
     "workspace.margins": ("held_chance", "kept_chance", "boundary"),
     "commands": ("Commands", "Loads",),
+    "controlled.control": ("control",),
+    "controlled.plant": ("SensorNoise",),
+    "controlled.result": ("Control", "Controlled"),
+    "controlled.schemes": ("FeedForward", "Feedback", "Scheme"),
     "effects": (
         "Effect", "Knowledge", "Readings", "Term", "Terms", "catalogue", "effect_named",
         "introduce", "layout_of", "parameter",
@@ -114,13 +122,15 @@ _MODULES = {
 _WHERE = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
-    "BarBalance", "BarManifold", "BarRest", "Barrier", "Commands", "Correction", "Effect",
-    "Experiment", "Export", "InputError", "InputFileError", "Joint", "Jump", "Knowledge", "Loads",
-    "Midlines", "MissingPackageError", "Model", "NoRestError", "Prediction", "Readings", "Robot",
-    "RobotError", "SeecrError", "Setup", "SlackSpan", "Solution", "Spread", "Status", "Term",
+    "BarBalance", "BarManifold", "BarRest", "Barrier", "Commands", "Control", "Controlled",
+    "Correction", "Effect", "Experiment", "Export", "FeedForward", "Feedback", "InputError",
+    "InputFileError", "Joint", "Jump", "Knowledge", "Loads", "Midlines", "MissingPackageError",
+    "Model", "NoRestError", "Prediction", "Readings", "Robot", "RobotError", "Scheme",
+    "SeecrError", "SensorNoise", "Setup", "SlackSpan", "Solution", "Spread", "Status", "Term",
     "Terms", "Workspace", "Zone", "bar_balances", "bar_equilibria", "bar_manifold", "bar_tilt",
-    "barriers", "boundary", "catalogue", "correct", "default_axes", "effect_named", "equilibria",
-    "export", "feasible", "held_chance", "introduce", "kept_chance", "layout_of", "load_model",
+    "barriers", "boundary", "catalogue", "control", "correct", "default_axes", "effect_named",
+    "equilibria", "export", "feasible", "held_chance", "introduce", "kept_chance", "layout_of",
+    "load_model",
     "load_robot", "midline_point", "midline_points", "model_names", "model_path", "new_model",
     "parameter", "placed", "predict", "sensitivities", "slack_spans", "slack_zones",
     "solution_manifold", "solve", "spread_of", "tension_margin", "tracked", "with_history",

@@ -22,11 +22,11 @@ TABLE = (
     "seecr: files folders pose arguments result units",
     "seecr: description commands columns importing",
     "seecr: effects statics prediction",
-    "seecr: tensions equilibrium inverse workspace exported",
+    "seecr: tensions equilibrium inverse workspace exported controlled",
     "seecr: show cli",
     "crosscheck: errors given",
     "crosscheck: settle model measurements twin",
-    "crosscheck: fit suite importing inference preparation",
+    "crosscheck: fit controlled suite importing inference preparation",
     "crosscheck: comparison planning",
     "crosscheck: calibration add diagnosis",
     "crosscheck: show cli",
@@ -127,8 +127,12 @@ USERS = {
     "crosscheck numba": "",
     "seecr importlib.import_module": "seecr: cli.group lazy",
     "crosscheck importlib.import_module": "",
-    "seecr rerun": "seecr.show: layout map_recording plots scene stream sweep_recording",
-    "crosscheck rerun": "crosscheck.show: case_recording error_recordings misfit",
+    "seecr rerun": (
+        "seecr.show: control_recording layout map_recording plots scene stream sweep_recording"
+    ),
+    "crosscheck rerun": (
+        "crosscheck.show: case_recording control_recording error_recordings misfit"
+    ),
 }
 
 

@@ -9,10 +9,25 @@ from typing import Any
 import explain_figure_12
 import make_paper
 import numpy as np
+import paper_control
 import paper_search
 import paper_stiffness
 import pytest
 from kept_figures import keep_figures
+
+PAGES = (make_paper, explain_figure_12, paper_control)
+
+
+@pytest.mark.slow
+def test_the_tables_of_control_are_current() -> None:
+    """But for the twins, which take minutes."""
+    page = make_paper.PAGE.read_text(encoding="utf-8")
+    for name, head, made in (
+        ("control", paper_control.HEAD, paper_control.sweep_rows()),
+        ("control errors", paper_control.ERROR_HEAD, paper_control.error_rows()),
+    ):
+        now = make_paper.with_table(page, name, head, made)
+        assert now == page, "run: python scripts/paper_control.py"
 
 
 @pytest.mark.slow
@@ -44,11 +59,13 @@ def test_every_figure_is_on_the_page() -> None:
         assert (make_paper.PICTURES / f"{name}.png").exists()
     # one command remakes them, with that of what would explain figure 12
     shown = set(re.findall(r"pictures/paper/([\w-]+)\.png", page))
-    assert shown == {*make_paper.FIGURES, "figure-12-explained"} and "`make paper`" in page
+    assert (
+        shown == {*make_paper.FIGURES, "figure-12-explained", "control"} and "`make paper`" in page
+    )
     recipe = (
         (make_paper.ROOT / "Makefile").read_text().partition("\npaper:")[2].partition("\n\n")[0]
     )
-    assert all(f"scripts/{one.__name__}.py" in recipe for one in (make_paper, explain_figure_12))
+    assert all(f"scripts/{one.__name__}.py" in recipe for one in PAGES)
 
 
 @pytest.fixture

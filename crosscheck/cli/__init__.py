@@ -17,6 +17,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     ),
     "import": ("importing", "Convert recordings of other programs into measurements."),
     "effects": ("effects", "List the catalogue of effects, and how to check each by hand."),
+    "control": ("control", "Schemes of control in MuJoCo, with time, beside seecr control."),
     "twin": ("twin", "Make measurements with a hidden effect, with MuJoCo as the truth."),
 }
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.suite.agreement import gap
+from crosscheck.suite.control import SCHEMES, slow_control
 from crosscheck.suite.verdicts import Outcome
 from crosscheck.twin.hidden import CONTAINED, choose
 from crosscheck.twin.lab import trajectory
@@ -36,11 +37,16 @@ from seecr.prediction.experiment import Experiment
 GROUP, PREFIX = "effects", "effect-"
 LOADS = "known_loads"
 """In place of an effect: payloads and wrenches, different ones in each row."""
+CONTROL = "control"
+"""In place of an effect: schemes of control, in MuJoCo with time."""
 ROBOTS = ("demobot_cogiro", "demobot_parallel")
 _LARGE = "cogiro_large"
 
 # Both are exact to within rounding, so the limits are those of plain robots: [m], [rad], [N].
 POSITION_M, ORIENTATION_RAD, TENSION_N = 1e-8, 1e-7, 1e-6
+# What control comes to has moved until then: the limits are those after settling [m], [rad], and
+# what they make of tensions, by the stiffness of DemoBot's cables [N].
+_MOVED_M, _MOVED_RAD, _MOVED_N = 1e-6, 1e-5, 1e-2
 # Tensions scale with the weight: the limit is for DemoBot's and for smaller weights [N].
 _WEIGHT_N = 0.4 * 9.81
 # Chains with so many segments, extrapolated, are that close to the catenary.
@@ -50,7 +56,7 @@ _POINTS, _REACH = 4, 0.3
 # Creep is slow: seecr takes the tension as constant between waypoints, the truth as linear in time.
 _CREEP_TIME_S = 2000.0
 # These take tens of times as long as any other: chains of many links.
-_LONG = ("cable_weight",)
+_LONG = ("cable_weight", CONTROL)
 
 
 class Counterpart(Enum):
@@ -98,6 +104,8 @@ class EffectCase:
     @property
     def name(self) -> str:
         """The name on the terminal, in files and for ``--case``."""
+        if self.effect == CONTROL:
+            return f"{CONTROL}-{self.model.stem}"
         return f"{PREFIX}{self.model.stem}-{self.effect}"
 
     @property
@@ -106,8 +114,8 @@ class EffectCase:
         return Counterpart.OURS if self.effect in _OURS else Counterpart.MUJOCO
 
     def __len__(self) -> int:
-        """Number of commanded poses."""
-        return len(self.commands)
+        """Number of commanded poses, or of schemes of control."""
+        return len(SCHEMES) if self.effect == CONTROL else len(self.commands)
 
     @property
     def robot(self) -> Robot:
@@ -189,13 +197,20 @@ class EffectResult:
     @property
     def tension_limit(self) -> float:
         """Allowed difference of tensions [N]."""
-        return TENSION_N * max(1.0, self.case.robot.weight / _WEIGHT_N)
+        limit = _MOVED_N if self.case.effect == CONTROL else TENSION_N
+        return limit * max(1.0, self.case.robot.weight / _WEIGHT_N)
+
+    @property
+    def limits(self) -> tuple[float, float, float]:
+        """Allowed differences [m], [rad], [N]."""
+        if self.case.effect == CONTROL:
+            return _MOVED_M, _MOVED_RAD, self.tension_limit
+        return POSITION_M, ORIENTATION_RAD, self.tension_limit
 
     @property
     def outcome(self) -> Outcome:
         """How the comparison ended."""
-        limits = (POSITION_M, ORIENTATION_RAD, self.tension_limit)
-        near = all(part <= limit for part, limit in zip(self.worst, limits, strict=True))
+        near = all(part <= limit for part, limit in zip(self.worst, self.limits, strict=True))
         if not near:
             return Outcome.DIFFER
         return Outcome.NOT_CONVERGED if self.unsolved else Outcome.AGREE
@@ -232,13 +247,17 @@ def effect_cases(robots: Sequence[str | Path] = ROBOTS, seed: int = 0) -> list[E
 
 
 def shipped_effect_cases(seed: int = 0) -> list[EffectCase]:
-    """All effects and known loads on DemoBots, and sag on a robot where it is large."""
-    return [*effect_cases(seed=seed), EffectCase(model_path(_LARGE), "cable_weight", seed)]
+    """All effects, known loads and control on DemoBots, and sag on a robot where it is large."""
+    control = [EffectCase(model_path(robot), CONTROL, seed) for robot in ROBOTS]
+    sag = EffectCase(model_path(_LARGE), "cable_weight", seed)
+    return [*effect_cases(seed=seed), *control, sag]
 
 
 def run_effect(case: EffectCase) -> EffectResult:
     """Settle one effect in MuJoCo, solve it with seecr, and compare the readings."""
     began = time.perf_counter()
+    if case.effect == CONTROL:
+        return _run_control(case, began)
     plain = Experiment(case.robot, case.commands).predict()
     commands = replace(case.commands, loads=case.loads)
     experiment = Experiment(case.robot, commands)
@@ -257,6 +276,15 @@ def run_effect(case: EffectCase) -> EffectResult:
         float(np.max(moved)),
         time.perf_counter() - began,
     )
+
+
+def _run_control(case: EffectCase, began: float) -> EffectResult:
+    """Move the robot in MuJoCo under each scheme, and compare where it comes to rest."""
+    moved, rests, pulls = slow_control(case.robot, case.seed)
+    apart = gap(moved, rests)
+    known = np.isfinite(apart[0])
+    away = float(np.max(gap(rests, rests[:1])[0]))  # between schemes
+    return EffectResult(case, *apart, pulls, known, away, time.perf_counter() - began)
 
 
 def run_effects(
@@ -316,8 +344,11 @@ def effects_line(results: Sequence[EffectResult]) -> str:
     robots = {model for model in every if every.count(model) > 1} or set(every)
     alone = [f"{r.case.effect} on {r.case.model.stem}" for r in results
              if r.case.model not in robots]  # fmt: skip
-    effects = {result.case.effect for result in results} - {LOADS}
-    loads = " and known loads" if any(result.case.effect == LOADS for result in results) else ""
+    found = {result.case.effect for result in results}
+    effects = found - {LOADS, CONTROL}
+    what = [counted(len(effects), "effect")] if effects or CONTROL not in found else []
+    what += ["known loads"] if LOADS in found else []
+    what += ["schemes of control"] if CONTROL in found else []
     bad = [result.case.name for result in results if result.outcome is not Outcome.AGREE]
     verdict = "all agree"
     if bad:
@@ -327,7 +358,7 @@ def effects_line(results: Sequence[EffectResult]) -> str:
     orientation = max(result.worst[1] for result in results)
     tension = max(result.worst[2] for result in results)
     return (
-        f"{counted(len(effects), 'effect')}{loads} on {counted(len(robots), 'robot')}"
+        f"{' and '.join(what)} on {counted(len(robots), 'robot')}"
         f"{''.join(f', {name}' for name in alone)} against "
         f"{_counterparts(results)}: {verdict}; worst {worst.worst[0]:.1e} m "
         f"({worst.case.name}), {orientation:.1e} rad, {tension:.1e} N."
@@ -337,11 +368,11 @@ def effects_line(results: Sequence[EffectResult]) -> str:
 def _counterparts(results: Sequence[EffectResult]) -> str:
     """How many effects are compared with what, in words."""
     kinds = {
-        kind: {r.case.effect for r in results if r.case.against is kind} - {LOADS}
+        kind: {r.case.effect for r in results if r.case.against is kind} - {LOADS, CONTROL}
         for kind in Counterpart
     }
     parts = [f"{kind.value} ({len(names)})" for kind, names in kinds.items() if names]
-    return " and ".join(parts)
+    return " and ".join(parts) or Counterpart.MUJOCO.value
 
 
 def against_line(results: Sequence[EffectResult]) -> str:
@@ -358,10 +389,13 @@ def against_line(results: Sequence[EffectResult]) -> str:
 def effect_text(result: EffectResult) -> str:
     """One effect's differences, the allowed ones, and the size of the effect itself."""
     position, orientation, tension = result.worst
+    most, turn, pull = result.limits
+    control = result.case.effect == CONTROL
+    who = "schemes differ" if control else "the effect moves a reading"
     parts = [
         f"position {position:.1e} m, orientation {orientation:.1e} rad, tension {tension:.1e} N",
-        f"allowed {POSITION_M:.0e} m, {ORIENTATION_RAD:.0e} rad, {result.tension_limit:.0e} N",
-        f"the effect moves a reading by {result.moved_m:.1e} m",
+        f"allowed {most:.0e} m, {turn:.0e} rad, {pull:.0e} N",
+        f"{who} by {result.moved_m:.1e} m",
     ]
     if result.unsolved:
         parts.append(

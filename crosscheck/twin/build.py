@@ -77,7 +77,7 @@ def build(true: TrueRobot, segments: int = 1) -> tuple[mujoco.MjModel, Places]:
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = true.gravity
-    _add_platform(spec, true, segments)
+    add_platform(spec, true, segments)
     for i in range(true.n_cables):
         _add_exit(spec, true, i)
         _add_chain(spec, true, i, segments)
@@ -106,7 +106,11 @@ def _slides(true: TrueRobot) -> bool:
     return behind or (true.compliance > 0 and true.pulley_radius > 0)
 
 
-def _add_platform(spec: mujoco.MjSpec, true: TrueRobot, segments: int) -> None:
+def add_platform(spec: mujoco.MjSpec, true: TrueRobot, segments: int) -> None:
+    """The platform on its joints, with its mass, centre and anchor points b0, b1, ...
+
+    Its inertia is that of a ball of the robot's length: it shifts no equilibrium.
+    """
     robot = true.robot
     position, quat = robot.reference_pose[:3], robot.reference_pose[3:]
     body = spec.worldbody.add_body(name="platform", pos=position, quat=quat)

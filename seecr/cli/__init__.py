@@ -11,6 +11,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "map": ("workspace", "Workspace: where the platform can be held, and where it comes to rest."),
     "correct": ("correct", "Find the commands that bring the platform to the wanted poses."),
     "new": ("new", "Write a robot's MJCF from a table of points, or from CASPR or WireX."),
+    "control": ("control", "What the robot does under different schemes of control."),
     "export": ("export", "Write a calibrated robot as MJCF."),
 }
 

@@ -108,7 +108,7 @@ def command(
     # fewer cables than degrees of freedom hold no orientation of one's choice
     turns = wanted.any_orientation and machine.n_cables < machine.n_dof
     limits = float("inf") if highest is None else highest
-    near = _aim(aim, machine.n_cables)
+    near = aim_of(aim, machine.n_cables)
     commands_of_it = ("corrected.csv", "corrected.toml", "table.csv")
     made = options.made_by(machine.source, poses, model)
     where: dict[str, Any] = {"read": with_toml(poses), "made": made}
@@ -165,7 +165,7 @@ def _wanted(
     return CommandFile(replace(found, run=each), None, tuple(map(str, each)), notes)
 
 
-def _aim(text: str, cables: int) -> str | list[float] | float:
+def aim_of(text: str, cables: int) -> str | list[float] | float:
     """The name of an aim, or tensions [N]."""
     from math import isfinite
 

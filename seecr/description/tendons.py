@@ -198,8 +198,10 @@ def spring_of(
     """
     stiffness = float(model.tendon_stiffness[i])
     low, high = (float(end) for end in model.tendon_lengthspring[i])
-    if np.any(model.tendon_stiffnesspoly[i]) or model.tendon_springyield[i] != 0.0:
-        what = "a polynomial stiffness" if model.tendon_springyield[i] == 0.0 else "a springyield"
+    # MuJoCo 4 has it, 3 has not
+    yields = getattr(model, "tendon_springyield", np.zeros(model.ntendon))[i] != 0.0
+    if np.any(model.tendon_stiffnesspoly[i]) or yields:
+        what = "a springyield" if yields else "a polynomial stiffness"
         found.refuse("tendon", name, f"has {what}; expected one number [N/m], its stiffness")
         return None
     if not stiffness > 0:

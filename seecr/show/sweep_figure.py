@@ -48,7 +48,7 @@ def sweep_figure(
     Lines are interrupted between runs (n,), standard deviations are bands, zones of slack cables
     are shaded; without zones slack cables change half way between poses.
     """
-    at, label = _along(solution, commanded, "wanted" if wanted else "commanded")
+    at, label = along(solution, commanded, "wanted" if wanted else "commanded")
     mark: dict[str, Any] = {"marker": "o", "markersize": 2.5, "linewidth": 1.1}
     if label in _NUMBERS:
         mark["linewidth"] = 0.5
@@ -79,7 +79,7 @@ def sweep_figure(
     return drawn
 
 
-def _along(solution: Solution, commanded: bool, word: str) -> tuple[Array, str]:
+def along(solution: Solution, commanded: bool, word: str) -> tuple[Array, str]:
     """The horizontal axis: the coordinate along which the sweep goes, else the line of the file."""
     if commanded and len(solution) > 1:
         steps = np.diff(solution.command, axis=0)

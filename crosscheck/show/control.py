@@ -1,0 +1,73 @@
+"""What schemes of control did in MuJoCo: traces as CSV, a figure, and recordings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crosscheck.controlled.result import TimedControl, TimedScheme
+from seecr.columns.csv import table_text
+from seecr.pose import Array, pose_difference
+from seecr.result import COORDINATES, Record, named
+from seecr.show.colours import COLOURS
+from seecr.show.control import LEAST, schemes_json
+from seecr.show.figures import figure
+
+
+def timed_json(result: TimedControl) -> dict[str, Record]:
+    """``schemes`` in ``control.json``: as of seecr control, with what MuJoCo did as ``timed``."""
+    out = schemes_json(result.at_rest)
+    for name, one in result.schemes.items():
+        out[name]["timed"] = one.records()
+    return out
+
+
+def trace_csv(one: TimedScheme) -> str:
+    """What happened under a scheme, one row for each instant, in SI units."""
+    trace, m = one.trace, [str(k + 1) for k in range(one.trace.told.shape[1])]
+    return table_text({
+        "t_s": trace.t, "pose": trace.row, "held": trace.held.astype(int),
+        **named("want_{}", COORDINATES, one.rest.solution.command[trace.row]),
+        **named("pose_{}", COORDINATES, trace.pose), **named("read_{}", COORDINATES, trace.read),
+        **named("told_{}_m", m, trace.told), **named("paid_{}_m", m, trace.paid),
+        **named("tension_{}_N", m, trace.tensions),
+    })  # fmt: skip
+
+
+def away_mm(one: TimedScheme) -> Array:
+    """(k,) [mm] from the pose that is wanted at each instant."""
+    wanted = one.rest.solution.command[one.trace.row]
+    away = pose_difference(one.trace.pose, wanted)[:, :3]
+    return np.asarray(1e3 * np.linalg.norm(away, axis=1))
+
+
+def timed_figure(path: Path, result: TimedControl) -> None:
+    """Errors of all schemes over time; tensions and lengths of each."""
+    every = list(result.schemes.values())
+    count = 1 + 2 * len(every)
+    with figure(path, count, 1, sharex=True, figsize=(7.4, 1.9 * count)) as axes:
+        ax = axes[0, 0]
+        for k, one in enumerate(every):
+            shade = COLOURS[k % len(COLOURS)]
+            off = np.maximum(away_mm(one), LEAST)
+            ax.plot(one.trace.t, off, color=shade, linewidth=1.0, label=one.rest.scheme)
+        ax.set_yscale("log")
+        ax.set_ylabel("from the wanted\nposition [mm]")
+        ax.set_title(f"{result.at_rest.robot.name} in MuJoCo")
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+        for k, one in enumerate(every):
+            _cables(axes[1 + 2 * k, 0], one, one.trace.tensions, "tension [N]")
+            home = result.at_rest.robot.rest_lengths
+            _cables(axes[2 + 2 * k, 0], one, 1e3 * (one.trace.paid - home), "winches [mm]")
+        axes[-1, 0].set_xlabel("time [s]")
+
+
+def _cables(ax: Any, one: TimedScheme, values: Array, what: str) -> None:
+    for k, name in enumerate(one.rest.solution.robot.cable_names):
+        shade = COLOURS[k % len(COLOURS)]
+        ax.plot(one.trace.t, values[:, k], color=shade, linewidth=0.8, label=name)
+    ax.set_ylabel(f"{one.rest.scheme}\n{what}")
+    if len(one.rest.solution.robot.cable_names) <= len(COLOURS):
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)

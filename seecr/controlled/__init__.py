@@ -1,0 +1,1 @@
+"""Schemes of control on a robot that may not be the one that the controller believes."""

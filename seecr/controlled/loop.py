@@ -1,0 +1,293 @@
+"""A scheme on the true robot, step by step: it turns winches, the robot rests, sensors read.
+
+The reading of a step is used d steps later. Each wanted pose has a loop of its own, that begins
+with what is fed forward there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.commands import Commands
+from seecr.controlled.belief import Belief
+from seecr.controlled.linear import (
+    Complex,
+    largest_delay,
+    largest_gain,
+    loop_eigenvalues,
+    spectral_radius,
+)
+from seecr.controlled.plant import Plant, Rows
+from seecr.controlled.schemes import Feedback, Scheme
+from seecr.description.robot import ABSURD, Robot
+from seecr.inverse.lengths import REACHED
+from seecr.pose import Array
+from seecr.statics.solution import Solution
+
+# Steps of Newton's method to where a loop would settle.
+_NEWTON = 40
+# A loop is settled when its commands change by no more than this many standard deviations of what
+# noise makes of them: one in a million is larger by chance.
+_SIGMAS = 5.0
+# It goes on until they change by less than this part of that, for its last digits.
+_FINE = 1e-3
+# Singular values below this part of the largest are rounding.
+_SMALL = 1e-9
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """How a feedback runs: gain, steps of delay, most steps, and parts of the pose that are read.
+
+    Attributes:
+        seen: (6,) of position and orientation.
+    """
+
+    gain: float
+    delay: int
+    steps: int
+    seen: tuple[bool, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What a scheme did at n wanted poses.
+
+    Attributes:
+        told: (n, m) [m] last told lengths; NaN where the scheme has no command.
+        solution: (n,) where that led.
+        error: (k + 1, n, 6 + m) of the readings, but for noise, after each step; NaN after the end.
+        steps: (n,) that the loop took until it was settled; -1 where it did not.
+        travel: (n, m) [m] that each winch turned at this row and on the way to it.
+        eigenvalues: of the loop where it settles, for each row; None where no lengths hold the pose
+            and for schemes without feedback.
+    """
+
+    told: Array
+    solution: Solution
+    error: Array
+    steps: NDArray[np.int64]
+    travel: Array
+    eigenvalues: tuple[Complex | None, ...]
+
+    def radii(self, tuning: Tuning) -> Array:
+        """Spectral radii (n,); NaN where there is no loop that could settle."""
+        known = [
+            np.nan if one is None else spectral_radius(one, tuning.gain, tuning.delay)
+            for one in self.eigenvalues
+        ]
+        return np.array(known)
+
+    def largest_gains(self, tuning: Tuning) -> Array:
+        """(n,) gains below which the loop settles."""
+        return np.array([
+            np.nan if one is None else largest_gain(one, tuning.delay) for one in self.eigenvalues
+        ])  # fmt: skip
+
+    def largest_delays(self, tuning: Tuning) -> list[int | None]:
+        """Most steps of delay with which the gain holds; None where it holds with none."""
+        return [None if e is None else largest_delay(e, tuning.gain) for e in self.eigenvalues]
+
+
+class Loop:
+    """The feedbacks of a scheme at all n wanted poses, with what they believe.
+
+    Attributes:
+        gains: G (n, k, 6 + m) of all feedbacks together.
+        rest: (n, k) the state that changes nothing. start: that at first: the same, or that of the
+            reference pose for a loop alone.
+    """
+
+    def __init__(self, scheme: Scheme, belief: Belief, tuning: Tuning) -> None:
+        self.scheme, self.belief, self.tuning = scheme, belief, tuning
+        loops, seen = scheme.feedbacks, np.array(tuning.seen)
+        self.gains = np.concatenate([one.gains(belief, seen) for one in loops], axis=1)
+        each = [one.rest(belief) for one in loops]
+        self.rest = np.concatenate(each, axis=1)
+        self._by_tension = bool(self.gains[..., 6:].any())
+        self._ends = np.cumsum([one.shape[1] for one in each])[:-1]
+        self.start = self.rest
+        if scheme.from_home:
+            self.start = np.concatenate([one.start(belief) for one in loops], axis=1)
+
+    def change(self, state: Array) -> Array:
+        """(n, m) [m] of the told lengths in a state (n, k)."""
+        return np.asarray(sum(one.change(self.belief, part) for one, part in self._parts(state)))
+
+    def rates(self, state: Array) -> Array:
+        """B (n, m, k), of the told lengths by the state (n, k)."""
+        each = [one.rates(self.belief, part) for one, part in self._parts(state)]
+        return np.concatenate(each, axis=2)
+
+    def _parts(self, state: Array) -> Iterator[tuple[Feedback, Array]]:
+        parts = np.split(state, self._ends, axis=1)
+        return zip(self.scheme.feedbacks, parts, strict=True)
+
+    def error(self, readings: tuple[Array, Array], rows: Rows) -> Array:
+        """(r, 6 + m) [m, rad, N] of readings of rows (r,)."""
+        return self.belief.error(*readings, rows, self._by_tension)
+
+    def matrices(self, by_told: Array, rows: Rows, state: Array) -> Array:
+        """M = G S B (r, k, k) of rows (r,), with S (r, 6 + m, m) of the readings by told lengths.
+
+        The loop is x <- x - gain M x, about where it settles, a state (n, k).
+        """
+        return np.asarray(self.gains[rows] @ by_told @ self.rates(state)[rows])
+
+    def eigenvalues(self, by_told: Array, rows: Rows, state: Array) -> list[Complex]:
+        """Of these matrices, for the states that a row's loop ever has."""
+        pairs = zip(self.matrices(by_told, rows, state), self.gains[rows], strict=True)
+        return [loop_eigenvalues(*pair) for pair in pairs]
+
+    def quiet(self, noise: Array) -> Array:
+        """(n,) [m] by which told lengths may change in a loop that is settled.
+
+        Args:
+            noise: (6 + m,) one standard deviation of the readings.
+        """
+        moves = self.tuning.gain * (self.rates(self.rest) @ self.gains) * noise
+        each = np.linalg.norm(moves, axis=2).max(axis=1)
+        return np.asarray(np.maximum(REACHED, _SIGMAS * each))
+
+
+def can_be_told(robot: Robot, lengths: Array) -> NDArray[np.bool_]:
+    """(n,) whether winches can pay out lengths (n, m) [m]: some, and not ten times the frame."""
+    known = (lengths > 0.0) & (lengths < ABSURD * robot.reach)
+    return np.asarray(known.all(axis=1))
+
+
+def loop_of(scheme: Scheme, belief: Belief, commands: Commands, tuning: Tuning) -> Loop | None:
+    """The loop of a scheme about what it feeds forward; None without feedback."""
+    return Loop(scheme, belief.aiming_at(commands.pose), tuning) if scheme.feedbacks else None
+
+
+def run(scheme: Scheme, belief: Belief, plant: Plant, tuning: Tuning) -> Course:
+    """What a scheme does at the wanted poses of a belief, on a true robot."""
+    commands, found = scheme.forward.commands(belief)
+    robot, n = belief.robot, len(belief.commands)
+    forward = robot.rest_lengths + commands.change(robot)
+    told = np.where(found[:, None], forward, np.nan)
+    loop = loop_of(scheme, belief, commands, tuning)
+    first, turned, pose = told.copy(), np.zeros_like(told), belief.commands.pose.copy()
+    error = np.full((tuning.steps + 1 if loop else 0, n, 6 + robot.n_cables), np.nan)
+    steps, values = np.where(found, 0 if loop is None else -1, -1), dict[int, Complex | None]()
+    rows = np.flatnonzero(found)
+    for at in [] if loop is None else _groups(rows, plant):
+        assert loop is not None
+        track = _Track(loop, plant, told, at)
+        first[at] = track.told
+        track.go()
+        told[at], steps[at], turned[at] = track.told, track.steps(), track.turned
+        pose[at] = track.pose()
+        error[: len(track.errors), at] = np.array(track.errors)
+        values |= track.eigenvalues()
+    home = np.where(np.isnan(told), forward, told)
+    turned += np.abs(first - belief.commands.before(home, robot.rest_lengths))
+    solution = plant.led(commands, found) if loop is None else plant.solution(told, pose)
+    return Course(told, solution, error, steps, turned, tuple(values.get(k) for k in range(n)))
+
+
+def _groups(rows: Rows, plant: Plant) -> list[Rows]:
+    """Rows whose loops run together: with history each begins where the one before ended."""
+    return [np.array([row]) for row in rows] if plant.has_history else [rows][: len(rows)]
+
+
+class _Track:
+    """The steps of some rows (r,) together.
+
+    Attributes:
+        told: (r, m) [m] now. rest: where that led. turned: (r, m) [m] by steps, to and fro.
+        errors: (r, 6 + m) after each step, without noise.
+    """
+
+    def __init__(self, loop: Loop, plant: Plant, forward: Array, rows: Rows) -> None:
+        self.loop, self.plant, self.rows = loop, plant, rows
+        self.forward = forward[rows]
+        self.wanted = plant.commands.pose[rows]
+        self.turned, self.last = np.zeros_like(self.forward), np.zeros(len(rows), dtype=np.int64)
+        self.ended = np.zeros(len(rows), dtype=bool)
+        self.state = loop.start.copy()
+        self.told = self._told()
+        home = np.broadcast_to(plant.robot.reference_pose, self.wanted.shape)
+        self.rest = plant.rest(rows, self.told, home if loop.scheme.from_home else self.wanted)
+        self.errors = [loop.error(self.rest.readings, rows)]
+
+    def _told(self) -> Array:
+        return np.asarray(self.forward + self.loop.change(self.state)[self.rows])
+
+    def go(self) -> None:
+        """All steps, until nothing changes any more."""
+        loop, tuning, rows = self.loop, self.loop.tuning, self.rows
+        noise = self.plant.noise.of(self.plant.robot.n_cables)
+        quiet = loop.quiet(noise)[rows]
+        read: list[Array] = []
+        moved = 0
+        for step in range(1, tuning.steps + 1):
+            read.append(loop.error(self.plant.noisy(*self.rest.readings), rows))
+            before = self.told
+            if len(read) > tuning.delay:
+                self._turn(read[-1 - tuning.delay])
+            change = np.abs(self.told - before)
+            self.turned += change
+            self.last[change.max(axis=1) > quiet] = step
+            moved = step if np.any(change.max(axis=1) > _FINE * quiet) else moved
+            self.rest = self.plant.rest(rows, self.told, self.pose())
+            self.errors.append(loop.error(self.rest.readings, rows))
+            if not noise.any() and step - moved > tuning.delay:
+                return
+
+    def _turn(self, error: Array) -> None:
+        """Change the state by an error (r, 6 + m) as it was read.
+
+        Rows that do not rest stay, and those whose winches have come to an end.
+        """
+        going = self.rest.at_rest & np.isfinite(error).all(axis=1) & ~self.ended
+        by = (self.loop.gains[self.rows] @ np.where(going[:, None], error, 0.0)[..., None])[..., 0]
+        before = self.state[self.rows].copy()
+        self.state[self.rows] -= self.loop.tuning.gain * by
+        self.ended |= ~can_be_told(self.plant.robot, self._told())
+        self.state[self.rows[self.ended]] = before[self.ended]
+        self.told = self._told()
+
+    def pose(self) -> Array:
+        """Where rows (r, 7) are, or are wanted where they rest nowhere."""
+        pose = self.rest.pose
+        known = np.asarray(np.isfinite(pose).all(axis=1))
+        return np.where(known[:, None], pose, self.wanted)
+
+    def steps(self) -> NDArray[np.int64]:
+        """(r,) steps until settled, -1 where the loop is not."""
+        settled = (len(self.errors) - 1 - self.last > self.loop.tuning.delay) & self.rest.at_rest
+        return np.where(settled & ~self.ended, self.last, -1)
+
+    def eigenvalues(self) -> dict[int, Complex | None]:
+        """Of each row's loop where it would settle, by row; Newton's method leads there."""
+        loop, rows, kept = self.loop, self.rows, (self.state.copy(), self.told)
+        gains, rest, pose = loop.gains[rows], self.rest, self.pose()
+        lost = self.steps() < 0  # from where those have come, no way may lead back
+        self.state[rows[lost]], pose[lost] = loop.start[rows[lost]], self.wanted[lost]
+        self.told = self._told()
+        range_of = gains @ np.linalg.pinv(gains, rcond=_SMALL)
+        for _ in range(_NEWTON):
+            rest = self.plant.rest(rows, self.told, pose, keep=False)
+            error = loop.error(rest.readings, rows)
+            fine = np.asarray(rest.at_rest & np.isfinite(error).all(axis=1))
+            pose[fine] = rest.pose[fine]
+            off = (gains @ np.where(fine[:, None], error, 0.0)[..., None])[..., 0]
+            by_told = np.where(fine[:, None, None], rest.by_told, 0.0)
+            matrix = range_of @ loop.matrices(by_told, rows, self.state) @ range_of
+            step = (np.linalg.pinv(matrix, rcond=_SMALL) @ off[..., None])[..., 0]
+            self.state[rows] -= step
+            before, self.told = self.told, self._told()
+            left = (off[..., None] - matrix @ step[..., None])[..., 0]
+            near = fine & (np.abs(self.told - before).max(axis=1) < REACHED)
+            near &= np.abs(left).max(axis=1) < REACHED
+            if near.all() or not fine.any():
+                break
+        found = loop.eigenvalues(by_told, rows, self.state)
+        self.state, self.told = kept
+        return {int(r): e if ok else None for r, e, ok in zip(rows, found, near, strict=True)}

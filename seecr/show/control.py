@@ -1,0 +1,121 @@
+"""What schemes of control did: rows for files, and a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from seecr.columns.csv import table_text
+from seecr.controlled.result import Control, Controlled
+from seecr.pose import Array
+from seecr.result import Record
+from seecr.show.colours import COLOURS
+from seecr.show.figures import figure
+from seecr.show.files import SweepRows
+from seecr.show.sweep_figure import along
+
+LEAST = 1e-5
+"""What is nearer to a wanted pose than this [mm, deg] is there: it has no place on an axis of
+decades.
+"""
+_NO_COMMAND = "no_command"
+_STYLES = ("-", "--", ":", "-.")
+
+
+def schemes_json(result: Control) -> dict[str, Record]:
+    """``schemes`` in ``control.json``: of each the rows as in ``sweep.json``, and what it did."""
+    return {name: _scheme_json(one) for name, one in result.schemes.items()}
+
+
+def _scheme_json(one: Controlled) -> Record:
+    rows = SweepRows(one.solution, one.told, wanted=one.solution.command).as_json()
+    for row, told in zip(rows, one.told, strict=True):
+        row["command"] = row["wanted"]
+        if not np.isfinite(told).all():
+            row["status"] = _NO_COMMAND
+    return {"rows": rows, **one.head_json()}
+
+
+def control_csv(result: Control) -> str:
+    """``control.csv``: one row for each pose of each scheme, in SI units."""
+    rows = list(result.records())
+    return table_text({name: [row[name] for row in rows] for name in rows[0]})
+
+
+def control_figure(path: Path, result: Control) -> None:
+    """Errors, tensions and, with feedback, how the loops settle, one line for each scheme."""
+    first = next(iter(result.schemes.values()))
+    at, label = along(first.solution, True, "wanted")
+    loops = any(one.radius is not None for one in result.schemes.values())
+    panels = [_position, *([_orientation] if result.robot.turns else []), _tensions]
+    count = len(panels) + loops
+    with figure(path, count, 1, figsize=(7.4, 2.1 * count)) as axes:
+        for k, panel in enumerate(panels):
+            ax = axes[k, 0]
+            for number, one in enumerate(result.schemes.values()):
+                panel(ax, at, one, _style(number))
+            if panel is not _tensions:
+                _decades(ax)
+            ax.set_xlabel(label if k == len(panels) - 1 else "")
+        handles = axes[0, 0].get_legend_handles_labels()
+        axes[0, 0].legend(*handles, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+        axes[0, 0].set_title(result.robot.name)
+        if loops:
+            _settling(axes[-1, 0], result)
+
+
+def _style(number: int) -> dict[str, Any]:
+    """Of one scheme: colours differ, and where there are many also dashes."""
+    turn = _STYLES[number % len(_STYLES)]
+    return {"color": COLOURS[number % len(COLOURS)], "linestyle": turn, "marker": "o",
+            "markersize": 2.5, "linewidth": 1.2}  # fmt: skip
+
+
+def _position(ax: Any, at: Array, one: Controlled, how: Mapping[str, Any]) -> None:
+    off = 1e3 * np.linalg.norm(one.solution.deviation[:, :3], axis=1)
+    _errors(ax, at, off, one, how)
+    ax.set_ylabel("position error [mm]")
+
+
+def _orientation(ax: Any, at: Array, one: Controlled, how: Mapping[str, Any]) -> None:
+    off = np.degrees(np.linalg.norm(one.solution.deviation[:, 3:], axis=1))
+    _errors(ax, at, off, one, how)
+    ax.set_ylabel("rotation error [°]")
+
+
+def _tensions(ax: Any, at: Array, one: Controlled, how: Mapping[str, Any]) -> None:
+    pulls = np.where(one.rests[:, None], one.solution.tensions, np.nan)
+    for values in (pulls.min(axis=1), pulls.max(axis=1)):
+        ax.plot(at, values, **how)
+    ax.set_ylabel("least and largest\ntension [N]")
+
+
+def _errors(ax: Any, at: Array, values: Array, one: Controlled, how: Mapping[str, Any]) -> None:
+    shown = np.where(one.rests, np.maximum(values, LEAST), np.nan)
+    ax.plot(at, shown, label=one.scheme, **how)
+
+
+def _decades(ax: Any) -> None:
+    """An axis of decades; of nearly one value, with one decade below it to be named."""
+    ax.set_yscale("log")
+    low, high = ax.get_ylim()
+    ax.set_ylim(min(low, 0.03 * high), 2.0 * high)
+
+
+def _settling(ax: Any, result: Control) -> None:
+    """The largest error of the positions read after each step, over the poses where loops hold."""
+    for number, one in enumerate(result.schemes.values()):
+        if one.radius is None:
+            continue
+        off = 1e3 * np.linalg.norm(one.history[:, :, :3], axis=2)
+        known = np.isfinite(off).any(axis=1)
+        most = np.nanmax(np.where(known[:, None], off, 0.0), axis=1)[known]
+        how = {**_style(number), "marker": ""}
+        ax.plot(np.arange(len(most)), np.maximum(most, LEAST), **how)
+    _decades(ax)
+    ax.xaxis.get_major_locator().set_params(integer=True)
+    ax.set_xlabel("step")
+    ax.set_ylabel("largest error\nread [mm]")
