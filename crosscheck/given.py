@@ -13,6 +13,7 @@ import numpy as np
 from crosscheck.errors import CrosscheckError
 from seecr.arguments import finite
 from seecr.description.mjcf import GivenRobot, load_robot, robot_file, robot_of
+from seecr.description.passive import declare
 from seecr.description.robot import Robot
 from seecr.effects import Effect, GivenEffect, Term, Terms, catalogue, class_of
 from seecr.errors import InputError, RobotError
@@ -85,15 +86,19 @@ def names_of(given: GivenNames, argument: str) -> list[str]:
     return list(found)
 
 
-def copy_robot(source: Path, copy: Path) -> None:
+def copy_robot(source: Path, copy: Path, robot: Robot | None = None) -> None:
     """Copy a robot's MJCF to where nothing of what may stand beside it is.
+
+    Lines of ``robot`` that are passive because its user said so are declared in the copy.
 
     Raises:
         CrosscheckError: it needs other files, so that the copy is no robot.
     """
     shutil.copyfile(robot_file(source), copy)
     try:
-        load_robot(copy)
+        own = load_robot(copy)
+        if robot is not None and own.passive_names != robot.passive_names:
+            declare(copy, robot)
     except RobotError:
         raise CrosscheckError(
             f"{source}: needs other files, which a case folder does not have; expected an "
@@ -127,7 +132,9 @@ def file_of(given: GivenRobot) -> Path:
     wanted = "expected one as seecr.load_robot reads it; seecr.export writes its MJCF"
     if robot.source is None:
         raise InputError(f"robot {robot.name} was not read from a file; {wanted}")
-    if isinstance(given, Robot) and not _same_numbers(given, load_robot(robot.source)):
+    if isinstance(given, Robot) and not _same_numbers(
+        given, load_robot(robot.source, given.passive_names)
+    ):
         raise InputError(f"robot {robot.name} has different numbers from {robot.source}; {wanted}")
     return robot.source
 

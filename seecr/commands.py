@@ -195,9 +195,13 @@ class Commands:
         return np.where(self.starts_here[:, None], rows, before)
 
     def nominal_change(self, robot: Robot) -> Array:
-        """Straight lengths at the commanded poses minus those at the reference pose, (n, m) [m]."""
+        """Straight lengths at the commanded poses minus those at the reference pose, (n, m) [m].
+
+        Zero for passive lines.
+        """
         if not self._kept or self._kept[0][0] is not robot:
             change = robot.nominal_lengths(self.pose) - robot.reference_lengths
+            change[:, ~robot.driven] = 0.0  # nothing is paid out for passive lines
             self._kept[:] = [(robot, change)]
         return self._kept[0][1]
 

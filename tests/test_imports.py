@@ -145,8 +145,8 @@ def test_a_package_is_imported_in_its_places_alone(who: str) -> None:
 # The two physics are worth comparing because they share the description of the robot alone, and
 # beside it what winches are told, how things are counted, that numbers are numbers, and files.
 SHARED = rooms_of(
-    "seecr: errors result pose description.robot description.mjcf effects commands counted "
-    "arguments files folders"
+    "seecr: errors result pose description.robot description.mjcf description.mjcf_text "
+    "description.passive effects commands counted arguments files folders"
 )
 # What the effects edit, and the path through commands, are SEECR's side of them.
 PHYSICS = rooms_of(

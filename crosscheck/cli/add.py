@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     "Instead of EFFECT: fit all effects that this diagnosis lists, together.",
 )
 @options.fix
+@options.passive
 @choices.grown_model
 @options.option("--refit", "Refit an effect that the model already has.")
 @options.option("--per [file|run]", "Give EFFECT separate values for each file or run.")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from seecr.cli import notes
-from seecr.cli.options import FILE, F, columns, fix, option, together
+from seecr.cli.options import FILE, columns, fix, option, passive, together, words_option
 
 if TYPE_CHECKING:
     from crosscheck import Addition, Calibrated
@@ -19,24 +19,11 @@ if TYPE_CHECKING:
     from seecr.files import Made
 
 
-def _listed(ctx: click.Context, param: click.Parameter, texts: Sequence[str]) -> tuple[str, ...]:
-    """Words of an option that may be repeated and holds several between commas; its callback."""
-    words = [[word.strip() for word in text.split(",") if word.strip()] for text in texts]
-    for text, found in zip(texts, words, strict=True):
-        if not found:
-            raise click.BadParameter(f"expected {param.metavar}, got {text!r}.", ctx, param)
-    return tuple(word for found in words for word in found)
-
-
-def listed(words: str, said: str) -> Callable[[F], F]:
-    """An option that may be repeated and holds several words between commas, as a tuple."""
-    return option(words, said, multiple=True, callback=_listed)
-
-
 robot_and_data = together(
     click.argument("robot", type=FILE, metavar="ROBOT.xml"),
     click.argument("data", type=FILE, nargs=-1, required=True, metavar="DATA.csv..."),
     fix,
+    passive,
 )
 # what is said of the files in place of their TOML
 sigma = together(
@@ -56,11 +43,11 @@ tolerance = option(
     name="tolerances",
     multiple=True,
 )
-only = listed(
+only = words_option(
     "--only EFFECT,...",
     "Consider only these effects, in addition to those of the model; may be repeated.",
 )
-exclude = listed("--exclude EFFECT,...", "Do not consider these effects.")
+exclude = words_option("--exclude EFFECT,...", "Do not consider these effects.")
 grown_model = option("--model M.toml", "The model; created if it does not exist.", required=True)
 figures = option("--figures DIR", "Folder for the page's figures, as SVG and PNG.")
 

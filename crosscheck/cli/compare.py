@@ -33,7 +33,7 @@ from seecr.cli import options
 @options.own_effects
 @choices.sigma
 @options.option("--model-out M.toml", "Of two models: write the pooled one.")
-@choices.listed("--fail-on moved", "Of two models: exit with status 1 if a value moved.")
+@options.words_option("--fail-on moved", "Of two models: exit with status 1 if a value moved.")
 @choices.figures
 @options.no_recording
 @options.out("crosscheck-comparison")

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 @choices.sigma
 @choices.tolerance
 @options.option("--model-out M.toml", "Write the model with the missing effects added.")
-@choices.listed(
+@options.words_option(
     "--fail-on VERDICT,...",
     "Exit with status 1 if the verdict is one of these, such as unknown_effect,no_verdict.",
 )

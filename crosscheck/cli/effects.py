@@ -15,6 +15,7 @@ from seecr.cli.following import following
 @options.option("--robot ROBOT.xml", "Show plausible sizes for this robot.")
 @options.own_effects
 @options.fix
+@options.passive
 @options.out_file("effects.json")
 @options.as_json
 def command(name: str | None, robot: Path | None, out: Path | None, as_json: bool) -> int:

@@ -23,6 +23,7 @@ from seecr.cli.following import following
     "--robot ROBOT.xml", "The recorded robot, as MJCF or the name of a shipped one.", required=True
 )
 @options.fix
+@options.passive
 @options.option(
     "--commands COMMANDS.csv",
     "Log of commands, with a column t_s or one row per dwell; once for each FILE.",

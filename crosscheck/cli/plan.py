@@ -23,7 +23,8 @@ from seecr.cli.durations import say_duration
 @options.option(
     "--rows N", "Choose this many poses instead of reading a file.", options.WholeNumber(min=6)
 )
-@choices.listed(
+@options.passive
+@options.words_option(
     "--reads KIND,...",
     "What will be measured: position, orientation, tension.  [default: position,orientation, and "
     "tension if its noise is stated]",

@@ -10,7 +10,7 @@ import click
 
 from seecr.cli import options
 from seecr.cli.durations import say_duration
-from seecr.cli.following import following
+from seecr.cli.following import following, passive_lines
 
 if TYPE_CHECKING:
     from crosscheck import Case, CaseResult, Run, Thresholds
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     "Instead of the shipped robots: your own MJCF, along a sweep and at random poses.",
 )
 @options.fix
+@options.passive
 @options.option(
     "--mujoco-robot FILE.xml",
     "With --robot: another MJCF for MuJoCo, to see what a difference between the two does.",
@@ -67,7 +68,8 @@ def command(
     way, and at 200 random poses each; two tilted commands at which the parallel one can rest at two
     poses, each started so that both are reached; three planar robots; a DemoBot with uneven cables
     and one with its centre of mass off; robots of other sizes and kinds, cogiro-large, ipanema and
-    camera, along a sweep and at random poses. Then the group 'effects': every effect on both
+    camera, along a sweep and at random poses; three with a line that no winch drives, a band, a
+    spring that also pushes, a counterweight. Then the group 'effects': every effect on both
     DemoBots, compared with a robot in MuJoCo that really has it (--case effects runs only these).
 
     A pose where the platform is free to move, or has two stable equilibria that both physics
@@ -95,12 +97,14 @@ def command(
 
     if mujoco_robot is not None and robot is None:
         raise click.UsageError("--mujoco-robot needs --robot: the MJCF that SEECR reads")
+    if passive_lines() and robot is None:
+        raise click.UsageError("--passive needs --robot: the shipped robots say it themselves")
     thresholds = load_thresholds(thresholds_file)
     if robot is None:
         chosen = shipped_like(every_shipped(seed), patterns, "--case")
     else:
-        robot_at(robot)  # what is odd about it is told before the work
-        chosen = list(select(user_cases(robot, mujoco_robot, seed=seed), patterns, "--case"))
+        machine = robot_at(robot)
+        chosen = list(select(user_cases(machine, mujoco_robot, seed=seed), patterns, "--case"))
     if list_only:
         _list(chosen)
         return 0

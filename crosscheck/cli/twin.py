@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 )
 @click.argument("robot", type=options.FILE, metavar="ROBOT.xml", required=False)
 @options.fix
+@options.passive
 @options.option(
     "--hide SEED",
     "Seed from which the hidden effects, their sizes and the noise are drawn; the same seed gives "
@@ -109,12 +110,12 @@ def command(
     noise = Sigma.parsed(sigmas)
     from seecr.cli.arguments import robot_at
 
-    robot_at(robot)  # what is odd about it is told before the work
-    commands = load_commands(poses, robot, sigma=noise) if poses is not None else None
+    machine = robot_at(robot)
+    commands = load_commands(poses, machine, sigma=noise) if poses is not None else None
     # whatever is hidden, the bar shows the same: rows of one kind, done or not
     with options.progress_bar("measuring", 1) as advance:
         twin = make_twin(
-            robot, seed, effects=names or None, n_effects=count, out=out, tensions=tensions,
+            machine, seed, effects=names or None, n_effects=count, out=out, tensions=tensions,
             poses=commands, sigma=commands.sigma if commands else noise, maybe_none=maybe_none,
             progress=lambda rows, now: advance(0, "measuring"),
         )  # fmt: skip

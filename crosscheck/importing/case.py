@@ -246,7 +246,7 @@ def import_case(
         stands=np.ones(measured.n_rows, dtype=bool),
     )  # fmt: skip
     off = off_commands(frames, *_rests(robot, takes)) if choices.aligned else []
-    off += unturned(frames, *_rests(robot, takes)) if robot.n_cables >= robot.n_dof else []
+    off += unturned(frames, *_rests(robot, takes)) if robot.n_driven >= robot.n_dof else []
     notes = (*said, *strays, frames.how, *off, _noise(replace(measured, sigma=scatter)), repeats)
     found = Imported(robot, measured, frames, tuple(takes), notes)
     if source is not None:
@@ -261,7 +261,7 @@ def write_case(found: Imported, robot_path: Path, out: Path, made: Made | None =
     read = [file for take in found.takes for file in (take.stream.path, take.held.log.path)]
     with staged(out, read=read, made=made) as folder:
         write_measurements(folder / "measured.csv", found.measured)
-        copy_robot(robot_path, folder / "robot.xml")
+        copy_robot(robot_path, folder / "robot.xml", found.robot)
         rows = found.records()
         columns = {name: [row[name] for row in rows] for name in rows[0]}
         write_text(folder / "dwells.csv", table_text(columns, _WRITTEN))
@@ -331,7 +331,7 @@ def _measured(take: Take, frames: Frames) -> tuple[Measurements, Array]:
         path=take.stream.path, n_cables=rows.n_cables, run=rows.run, t_s=rows.t_s,
         command_pose=rows.command_pose, command_lengths=rows.command_lengths, told=rows.told,
         position=position, quat_wxyz=quat, tensions=rows.tensions, loads=rows.loads,
-        temperature_C=rows.temperature_C,
+        temperature_C=rows.temperature_C, driven=rows.driven,
     ), noise  # fmt: skip
 
 

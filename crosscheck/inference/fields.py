@@ -204,7 +204,8 @@ class _FieldColumns:
         bent = monomials(self.place, 2)[self.row, 1:]
         for k in range(lengths.shape[1]):
             yield Varying.ONE_CABLE, in_units_of_noise(products(lengths[:, [k]], bent))
-        turned = self.state.prediction.setup.commanded_change
+        setup = self.state.prediction.setup
+        turned = setup.commanded_change[:, setup.robot.driven]
         turned = (turned / max(float(np.abs(turned).max(initial=0.0)), 1e-300))[self.row]
         every = lengths[:, :, None] * np.stack([turned, turned**2, turned**3], axis=-1)
         # alike for all winches, and for each by itself

@@ -244,6 +244,7 @@ class Measurements(Result):
         files: their names, if there are several; file: (n,) index of each row's file.
         origins: names by which models know the files, if there are several.
         line: (n,) line in the file (row, for Parquet) of each row.
+        driven: (m,) bool, cables on winches; commanded lengths of the others have no columns.
         unused_columns: names of columns without a known meaning.
         notes: sentences for the reader: what was assumed, filled in or left out.
     """
@@ -280,6 +281,7 @@ class Measurements(Result):
     file: NDArray[np.int64] = _FILLED_IN
     origins: tuple[str, ...] = ()
     line: NDArray[np.int64] = _FILLED_IN
+    driven: Mask = _FILLED_IN
     unused_columns: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -300,6 +302,7 @@ class Measurements(Result):
                 self._set(name, np.any(np.isfinite(values), axis=0))
         filled: dict[str, NDArray[Any]] = {
             "line": np.arange(2, n + 2),
+            "driven": np.ones(m, dtype=bool),
             "stands": np.zeros(n, dtype=bool),
             "file": np.zeros(n, dtype=np.int64),
             "sigma_ratio": np.ones((n, len(fields(Sigma)))),
@@ -457,7 +460,8 @@ class Measurements(Result):
         cables = range(1, self.n_cables + 1)
         yield from _columns(["t_s"], self.t_s)
         yield from _columns([f"cmd_{c}" for c in COORDINATES], self.command_pose)
-        yield from _columns([f"length_{i}_m" for i in cables], self.command_lengths)
+        lengths = [f"length_{i}_m" for i in cables]
+        yield from _columns(lengths, self.command_lengths, self.driven)
         if self.wanted is not None:
             stated = np.asarray(np.isfinite(self.wanted).any(axis=0))
             yield from _columns([f"want_{c}" for c in COORDINATES], self.wanted, stated)

@@ -262,7 +262,7 @@ def _check_angles(pairs: _Pairs) -> list[str]:
             )
     radians = [k for k, unit in units.items() if unit == "rad"]
     # robots that hang on fewer cables than their degrees of freedom may tilt by so much
-    if radians and pairs.robot.n_cables >= pairs.robot.n_dof:
+    if radians and pairs.robot.n_driven >= pairs.robot.n_dof:
         _refuse_degrees(pairs, radians)
     for k in radians:
         off = (pairs.read - pairs.told)[np.isfinite(pairs.read[:, k]), k]

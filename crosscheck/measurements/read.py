@@ -192,6 +192,7 @@ def together(parts: Sequence[Measurements]) -> Measurements:
     whole = Measurements(
         path=Path(" + ".join(names)),
         n_cables=first.n_cables,
+        driven=first.driven,
         run=np.concatenate(
             [np.char.add(f"{n}: ", part.run) for part, n in zip(parts, names, strict=True)]
         ),
@@ -478,6 +479,7 @@ def _of_one_clock(given: Commands, robot: Robot) -> Measurements:
         command_pose=commanded_poses(given.pose, robot=robot) if lengths is None else None,
         command_lengths=lengths,
         told=given.told and lengths is not None,
+        driven=robot.driven,
         t_s=given.time,
         temperature_C=given.temperature,
         loads=given.loads,
@@ -523,6 +525,7 @@ def _load(columns: Columns, robot: Robot, toml: Path | None) -> Measurements:
     data = Measurements(
         path=columns.table.path,
         n_cables=robot.n_cables,
+        driven=robot.driven,
         run=run,
         t_s=t_s,
         began=None if t_s is None else began(columns.table, columns.known["t"].index),

@@ -244,11 +244,11 @@ def choose_poses(
     tried, channels = candidate_poses(room), Reads.of_kinds(robot.n_cables, kinds)
     there_are = _beside_catalogue(effects)
     plan, found = None, 0
-    if robot.n_cables >= robot.n_dof:
+    if robot.n_driven >= robot.n_dof:
         held = held_within(robot, tried, room.bounds)
         plan = _usable(room, held, rows, full, channels, there_are)
         found = 0 if plan is None else plan.problem.data.n_rows
-    if robot.n_cables <= robot.n_dof and found < rows:  # few cables hold little, but rest nearby
+    if robot.n_driven <= robot.n_dof and found < rows:  # few cables hold little, but rest nearby
         plan = _usable(room, tried, rows, full, channels, there_are)
         found = 0 if plan is None else plan.problem.data.n_rows
     if plan is None or found < rows:

@@ -123,6 +123,7 @@ def commands_at(problem: Problem, poses: Array) -> Measurements:
     return Measurements(
         path=data.path,
         n_cables=data.n_cables,
+        driven=data.driven,
         run=np.array([f"added {k + 1}" for k in range(n)]),
         command_pose=None if in_lengths else poses,
         command_lengths=problem.robot.commanded_lengths(poses) if in_lengths else None,

@@ -203,11 +203,12 @@ def near_slack(plan: Planned) -> list[tuple[int, int]]:
     states = plan.base.prediction.found.states
     rest = plan.base.prediction.tables.cables[..., REST]
     stretch = states[..., STRAIN] * rest
-    taut = states[..., TENSION] > 0
+    driven = plan.problem.robot.driven  # bands and springs stretch as they please
+    taut = (states[..., TENSION] > 0) & driven
     if not taut.any():
         return []
     usual = float(np.mean(stretch[taut]))
-    close = (np.abs(stretch) < NEAR_SLACK * usual) & plan.problem.use[:, None]
+    close = (np.abs(stretch) < NEAR_SLACK * usual) & driven & plan.problem.use[:, None]
     return [(int(k), int(i)) for k, i in np.argwhere(close)]
 
 

@@ -150,7 +150,8 @@ class Room:
                 lowest tension that was asked for holds for all.
         """
         rest, (low, high) = found.base.prediction, self.limits
-        least, most = rest.tensions.min(axis=1), rest.tensions.max(axis=1)
+        pulls = rest.tensions[:, self.robot.driven]
+        least, most = pulls.min(axis=1, initial=np.inf), pulls.max(axis=1, initial=0.0)
         good = good & found.problem.use & self.holds(rest.pose)
         good &= most <= (_MOST * usual if high is None else high)
         if low is not None:
@@ -161,7 +162,8 @@ class Room:
     def allows(self, added: Planned) -> bool:
         """Whether no row exceeds the highest tension that was asked for, as a payload may do."""
         high, use = self.limits[1], added.problem.use
-        return high is None or bool((added.base.prediction.tensions[use] <= high).all())
+        pulls = added.base.prediction.tensions[use][:, self.robot.driven]
+        return high is None or bool((pulls <= high).all())
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -171,10 +173,10 @@ class Room:
 
 
 def usual_tension(found: Planned, some: NDArray[np.bool_] | None = None) -> float:
-    """The usual tension [N]: the median over (some) poses of that of the tightest cable."""
+    """The usual tension [N]: the median over (some) poses of that of the tightest driven cable."""
     use = found.problem.use if some is None else found.problem.use & some
-    pulls = found.base.prediction.tensions[use]
-    return float(np.median(pulls.max(axis=1))) if len(pulls) else 0.0
+    pulls = found.base.prediction.tensions[use][:, found.problem.robot.driven]
+    return float(np.median(pulls.max(axis=1, initial=0.0))) if len(pulls) else 0.0
 
 
 def _frame(robot: Robot, floor: float | None, margin: float) -> Array:

@@ -63,6 +63,7 @@ def _lengths(problem: Problem) -> Iterator[str]:
     if read is None or pose is None:
         return
     straight = problem.robot.nominal_lengths(pose)
+    read = np.where(problem.robot.driven, read, straight)  # nobody commands the others
     for name, mine in rows_of_files(problem):
         rows = mine & np.isfinite(straight).all(axis=1)
         apart = misfits(read[rows], straight[rows], problem.sigma.position_m or 0.0)
@@ -214,7 +215,7 @@ class Pulls:
             measured=np.where(known, problem.data.tensions, 0.0),
             expected=np.where(known, at.readings.tensions, 0.0),
             whole=np.asarray(known.all(axis=1)),
-            free=robot.n_cables <= robot.n_dof,
+            free=robot.n_driven <= robot.n_dof,
         )
 
     @cached_property

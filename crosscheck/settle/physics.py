@@ -18,7 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
-from seecr.description.mjcf import not_mjcf, quiet_mujoco, read_model, unsupported_features
+from seecr.description.mjcf import (
+    cable_names,
+    not_mjcf,
+    quiet_mujoco,
+    read_model,
+    unsupported_features,
+)
+from seecr.description.mjcf_text import MjcfText
+from seecr.description.passive import Kinds, kinds_of
 from seecr.errors import InputFileError
 from seecr.pose import Array, pose_difference
 
@@ -170,11 +178,32 @@ class Parts:
     Attributes:
         platform: index of its body.
         exits, anchors: (m,) indices of the sites.
+        pushes: indices of tendons that push, too.
+        pulled: of each tendon with a constant tension its index, those of its sites, and that [N].
+        passive: indices of the cables that no winch drives.
     """
 
     platform: int
     exits: Index
     anchors: Index
+    pushes: tuple[int, ...] = ()
+    pulled: tuple[tuple[int, int, int, float], ...] = ()
+    passive: tuple[int, ...] = ()
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel, platform: int, kinds: Kinds) -> Parts:
+        """Those of a robot whose tendons are its cables, as they are in its file."""
+        sites = model.wrap_objid[: 2 * model.ntendon]
+        on_platform = model.body_weldid[model.site_bodyid[sites]] == platform
+        exits, anchors = sites[~on_platform], sites[on_platform]
+        force = kinds.constant_tension_N
+        pulled = tuple(
+            (int(i), int(exits[i]), int(anchors[i]), float(force[i])) for i in np.flatnonzero(force)
+        )
+        pushes, passive = (
+            tuple(np.flatnonzero(one).tolist()) for one in (kinds.pushes, ~kinds.driven)
+        )
+        return cls(platform, exits, anchors, pushes, pulled, passive)
 
 
 class Physics:
@@ -216,6 +245,7 @@ class Physics:
         self.is_free = int(model.jnt_type[model.body_jntadr[parts.platform]]) == _FREE
         self.ignored = ignored_in(model, parts.platform)
         switch_off(model)
+        self._set_lines()
         own = float(model.body_mass[parts.platform])
         self.mass = own or float(model.body_subtreemass[parts.platform])
         self.mass_unit = 2.0 ** round(float(np.log2(self.mass / _MASS_IN_MUJOCO)))
@@ -234,9 +264,22 @@ class Physics:
         self.force_scale = self._load = 1.0
         self.set_load()
 
+    def _set_lines(self) -> None:
+        """What the tendons are: springs that only pull, that push, or no springs at all."""
+        self.pushes = np.zeros(self.model.ntendon, dtype=bool)
+        self.pushes[list(self.parts.pushes)] = True
+        self.constant = np.zeros(self.model.ntendon)
+        for tendon, _exit, _anchor, force in self.parts.pulled:
+            self.constant[tendon] = force
+            self.model.tendon_stiffness[tendon] = 0.0
+
     @classmethod
-    def of(cls, source: str | Path | mujoco.MjModel) -> Physics:
+    def of(cls, source: str | Path | mujoco.MjModel, passive: Sequence[str] = ()) -> Physics:
         """Compile an MJCF file, or copy a compiled model.
+
+        Args:
+            source: the file or the model.
+            passive: names of lines that no winch drives, besides those that the file names.
 
         Raises:
             InputFileError: there is no such file, it is not MJCF, or not one platform on cables.
@@ -245,9 +288,11 @@ class Physics:
         model = compile_model(source)
         platform = platform_of(model, name)
         check_cables(model, platform, name)
-        sites = model.wrap_objid[: 2 * model.ntendon]
-        on_platform = model.body_weldid[model.site_bodyid[sites]] == platform
-        return cls(model, Parts(platform, sites[~on_platform], sites[on_platform]))
+        text = None if isinstance(source, mujoco.MjModel) else MjcfText(Path(source))
+        kinds, faults = kinds_of(model, cable_names(model), text, passive)
+        if faults:
+            raise InputFileError(f"{name}: {'; '.join(faults)}")
+        return cls(model, Parts.of(model, platform, kinds))
 
     @property
     def n_cables(self) -> int:
@@ -287,10 +332,19 @@ class Physics:
     @property
     def steers(self) -> bool:
         """Whether something has to be done at every step: here, a wrench to be applied."""
-        return bool(np.count_nonzero(self.wrench))
+        return bool(np.count_nonzero(self.wrench)) or bool(self.parts.pulled)
+
+    @property
+    def driven(self) -> NDArray[np.bool_]:
+        """(m,) cables on winches."""
+        out = np.ones(self.n_cables, dtype=bool)
+        out[list(self.parts.passive)] = False
+        return out
 
     def set_cables(self, rest_lengths: Array, ea: Array) -> None:
         """Make each cable a spring that only pulls, of stiffness EA/l0 (paper, step 8).
+
+        Those that push stay such, and those of constant tension no springs.
 
         Args:
             rest_lengths: (m,) [m].
@@ -298,9 +352,10 @@ class Physics:
         """
         rest = self._per_cable("rest_lengths", rest_lengths, "m")
         stiff = self._per_cable("ea", ea, "N")
-        self.model.tendon_lengthspring[:, 0] = 0.0
+        springs = self.constant == 0.0
+        self.model.tendon_lengthspring[:, 0] = np.where(self.pushes, rest, 0.0)
         self.model.tendon_lengthspring[:, 1] = rest
-        self.model.tendon_stiffness[:] = stiff / rest / self.mass_unit
+        self.model.tendon_stiffness[springs] = (stiff / rest)[springs] / self.mass_unit
 
     def set_load(self, wrench: Array | None = None, gravity: Array | None = None) -> None:
         """Set the constant wrench and gravity, and with them the scale of forces.
@@ -337,7 +392,7 @@ class Physics:
     def _own_forces(self) -> float:
         """Scale [N] of the forces of the cables among themselves, used without a load."""
         pull = self.stiffness * self.rest_lengths
-        return float(max(np.sum(self.tensions()), 1e-6 * np.max(pull)))
+        return float(max(np.sum(np.abs(self.tensions())), 1e-6 * np.max(pull)))
 
     def pose(self) -> Array:
         """Pose (7,) of the platform's body as of the last update."""
@@ -364,7 +419,10 @@ class Physics:
         return np.asarray(self.mass_unit * (data.qfrc_applied - data.qfrc_inverse))
 
     def push(self) -> None:
-        """Apply the constant wrench at the present pose, as MuJoCo's generalised force."""
+        """Apply the constant wrench at the present pose, as MuJoCo's generalised force.
+
+        And the pull of lines of constant tension, along each from its anchor to its exit point.
+        """
         # Not by xfrc_applied, which acts at the centre of mass, so that its torque would have to
         # follow the offset as the platform rotates; nor by a constant qfrc_applied, since the free
         # joint's torque is in body axes.
@@ -382,6 +440,13 @@ class Physics:
                 self.body,
                 self.data.qfrc_applied,
             )
+        for _tendon, exit_site, anchor_site, tension in self.parts.pulled:
+            there = self.data.site_xpos[anchor_site]
+            way = self.data.site_xpos[exit_site] - there
+            pull = tension / self.mass_unit / np.linalg.norm(way) * way
+            mujoco.mj_applyFT(
+                self.model, self.data, pull, np.zeros(3), there, self.body, self.data.qfrc_applied
+            )
 
     def relative(self, force: Array) -> float:
         """Norm of a generalised force (d,) relative to the load, with torques over the length."""
@@ -395,8 +460,12 @@ class Physics:
 
     def tensions(self) -> Array:
         """Tensions (m,) [N] as of the last update; exactly 0 if the cable is slack."""
+        return np.asarray(self.stiffness * self.stretches() + self.constant)
+
+    def stretches(self) -> Array:
+        """Stretches of the tendons [m] as of the last update; exactly 0 if slack."""
         stretch = self.data.ten_length - self.rest_lengths
-        return np.asarray(self.stiffness * np.maximum(stretch, 0.0))
+        return np.asarray(np.where(self.pushes, stretch, np.maximum(stretch, 0.0)))
 
     def exit_points(self) -> Array:
         """Exit points A_i (m, 3) [m] in the base frame."""
@@ -406,12 +475,13 @@ class Physics:
         """Potential energy [J] at the present qpos: MuJoCo's springs and gravity.
 
         Gravity counts from the base frame's origin. The external force's potential -F.t is
-        included; a constant torque has none.
+        included, and T l of lines of constant tension; a constant torque has none.
         """
         self.update()
         mujoco.mj_energyPos(self.model, self.data)
         stored = float(self.data.energy[0]) * self.mass_unit
-        return stored - float(self.wrench[:3] @ self.data.xpos[self.body])
+        pulled = float(self.constant @ self.data.ten_length)
+        return stored + pulled - float(self.wrench[:3] @ self.data.xpos[self.body])
 
     def move(self, change: Array) -> None:
         """Move by a generalised displacement (d,), with rotations of a free joint in body axes."""
@@ -458,21 +528,24 @@ class Physics:
 
     @contextmanager
     def frozen_slack(self, taut: NDArray[np.bool_]) -> Iterator[None]:
-        """Let some cables (m,) pull and push and remove the others: smooth, for Newton's method."""
+        """Let some cables (m,) pull and push and remove the others: smooth, for Newton's method.
+
+        Those that push always do.
+        """
         spring, stiffness = self.model.tendon_lengthspring, self.model.tendon_stiffness
         kept = stiffness.copy()
-        stiffness[~taut] = 0.0
+        stiffness[~(taut | self.pushes)] = 0.0
         spring[:, 0] = spring[:, 1]
         try:
             yield
         finally:
-            spring[:, 0] = 0.0
+            spring[:, 0] = np.where(self.pushes, spring[:, 1], 0.0)
             stiffness[:] = kept
 
     def _per_cable(self, name: str, values: Array, unit: str) -> Array:
         array = _finite(name, values, (self.n_cables,))
-        if not np.all(array > 0.0):
-            i = int(np.argmin(array))
+        if not np.all((array > 0.0) | (self.constant > 0.0)):
+            i = int(np.argmin(np.where(self.constant > 0.0, np.inf, array)))
             raise CrosscheckError(
                 f"{name}: expected positive numbers [{unit}], got {array[i]:g} for cable {i + 1}"
             )

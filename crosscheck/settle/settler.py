@@ -8,7 +8,7 @@ dynamics until it rests, which shows that the equilibrium is stable and reached 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
@@ -216,7 +216,7 @@ def _fall_distance(physics: Physics) -> float:
     ea = physics.stiffness * physics.rest_lengths
     exits = physics.exit_points() - physics.data.xpos[physics.body]
     size = float(np.max(np.linalg.norm(exits, axis=-1)))
-    return _FALL * size * (1.0 + physics.force_scale / float(np.min(ea)))
+    return _FALL * size * (1.0 + physics.force_scale / float(np.min(ea[ea > 0.0], initial=np.inf)))
 
 
 # Largest relative residual after the polish, unless rounding alone leaves more.
@@ -364,21 +364,26 @@ class Settler:
         ea: Array | float | None = None,
         tolerance: float = 1e-8,
         max_steps: int = 40_000,
+        passive: Sequence[str] = (),
     ) -> None:
         """Compile the robot.
 
         Args:
             source: MJCF file, or a model compiled from one (it is copied).
-            ea: (m,) or one number [N]; None takes stiffness times rest length of the MJCF.
+            ea: (m,) or one number [N], of the driven cables; None takes stiffness times rest length
+                of the MJCF.
             tolerance: of stage 1; rounding of very stiff cables may raise it.
             max_steps: after which stage 1 gives up.
+            passive: names of lines that no winch drives, besides those that the file names.
 
         Raises:
             InputFileError: the file is not one platform on cables.
         """
-        self.physics = Physics.of(source)
+        self.physics = Physics.of(source, passive)
         own = self.physics.stiffness * self.physics.rest_lengths
-        self.ea = np.array(np.broadcast_to(own if ea is None else ea, own.shape), dtype=float)
+        of_all = ea is not None and np.ndim(ea) > 0
+        given = np.array(np.broadcast_to(own if ea is None else ea, own.shape), dtype=float)
+        self.ea = given if of_all else np.where(self.physics.driven, given, own)
         self.tolerance = tolerance
         self.max_steps = max_steps
 

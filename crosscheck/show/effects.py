@@ -17,7 +17,10 @@ from seecr.effects import BUILT_IN, PLACES, Effect, known, layout_of
 from seecr.result import Record
 from seecr.units import in_unit, parameter_name, shown
 
-EACH = {"one": "", "cable": ", one per cable", "vector": ", x y z", "point": ", x y z per cable"}
+EACH = {
+    "one": "", "cable": ", one per cable", "spring": ", one per cable", "vector": ", x y z",
+    "point": ", x y z per cable",
+}  # fmt: skip
 """What a parameter's size says in words."""
 
 

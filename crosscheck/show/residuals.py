@@ -20,6 +20,7 @@ from crosscheck.show.blocks import (
     section,
 )
 from seecr.counted import counted
+from seecr.description.robot import Robot
 from seecr.units import chance, in_unit, short
 
 
@@ -52,7 +53,7 @@ def facts_of(problem: Problem, *more: tuple[str, str], noise: str = "noise") -> 
         rows += f", {counted(ways, 'way point')}"
     return Facts(
         [
-            ("robot", f"{problem.robot.name}, {counted(problem.robot.n_cables, 'cable')}"),
+            ("robot", _robot_words(problem.robot)),
             ("data", data.name),
             ("rows", rows),
             ("runs", str(len(data.runs))),
@@ -61,6 +62,11 @@ def facts_of(problem: Problem, *more: tuple[str, str], noise: str = "noise") -> 
             *more,
         ]
     )
+
+
+def _robot_words(robot: Robot) -> str:
+    passive = f", passive: {', '.join(robot.passive_names)}" if robot.passive_names else ""
+    return f"{robot.name}, {counted(robot.n_driven, 'cable')}{passive}"
 
 
 def map_section(

@@ -140,6 +140,8 @@ _PLANAR_HALF_WIDTH = 0.15
 _PLANAR_TURN = np.deg2rad(8.0)
 _PLANAR_HEIGHTS = (-0.3, -0.15, 0.2, 0.4)
 # Robots of other sizes and kinds, with only a part of the number of random poses.
+# Files beside the shipped robots, each with a passive line of another kind.
+_PASSIVE = ("band", "spring", "counterweight")
 _OTHERS = ("cogiro_large", "ipanema", "camera")
 _FEWER = 8
 
@@ -159,6 +161,7 @@ class Case:
         poses: (n, 7) commanded.
         has_names: whether thresholds can name its poses: not with another seed or a user's robot.
         starts: (n, 7) start poses of both physics, each row alone; None starts at the commands.
+        passive: names of lines that no winch drives, besides those that the files name.
     """
 
     name: str
@@ -169,6 +172,7 @@ class Case:
     poses: Array
     has_names: bool = True
     starts: Array | None = None
+    passive: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         """Number of commanded poses."""
@@ -227,7 +231,7 @@ def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
         cases += _own_cable_cases(robot, turn, seed, n_random)
     for robot in _OTHERS:
         cases += _other_cases(robot, seed, n_random)
-    return cases
+    return cases + [_passive_case(kind) for kind in _PASSIVE]
 
 
 def user_cases(
@@ -259,9 +263,10 @@ def user_cases(
     model, robot = file_of(robot), robot_of(robot)
     name, other = model.stem, model if mujoco_model is None else robot_file(mujoco_model)
     random = robot_random(robot, _generator(seed, f"{name}-random"), n_random)
+    sweep, of_user = robot_sweep(robot), (False, None, robot.passive_names)
     return [
-        Case(f"{name}-sweep", model, other, None, "sweep", robot_sweep(robot), has_names=False),
-        Case(f"{name}-random", model, other, None, "random", random, has_names=False),
+        Case(f"{name}-sweep", model, other, None, "sweep", sweep, *of_user),
+        Case(f"{name}-random", model, other, None, "random", random, *of_user),
     ]
 
 
@@ -357,6 +362,15 @@ def _other_cases(robot: str, seed: int, n_random: int) -> list[Case]:
         Case(f"{stem}-sweep", path, path, None, "sweep", sweep),
         Case(f"{stem}-random", path, path, None, "random", random, has_names=seed == 0),
     ]
+
+
+def _passive_case(kind: str) -> Case:
+    """A small robot with a line that no winch drives: a band, a spring that pushes, a weight."""
+    from seecr.description.mjcf import load_robot
+
+    path = model_path("camera").parents[1] / "passive_lines" / f"{kind}.xml"
+    poses = robot_sweep(load_robot(path), N_SWEEP // 2)
+    return Case(f"passive-{kind}", path, path, None, "sweep", poses)
 
 
 def _generator(seed: int, name: str) -> np.random.Generator:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -23,15 +24,19 @@ class MujocoRobot:
         pretension: (m,) [m] rest lengths of the MJCF minus the straight lengths at its reference.
     """
 
-    def __init__(self, model: str | Path, ea: float | Array | None = None) -> None:
+    def __init__(
+        self, model: str | Path, ea: float | Array | None = None, passive: Sequence[str] = ()
+    ) -> None:
         """Compile the robot.
 
         Args:
             model: MJCF file.
-            ea: k_c = E S [N], one number or (m,); None takes the MJCF's.
+            ea: k_c = E S [N], one number for all driven cables or (m,); None takes the MJCF's.
+            passive: names of lines that no winch drives, besides those that the file names.
         """
-        self.settler = Settler(model, ea=ea)
+        self.settler = Settler(model, ea=ea, passive=passive)
         physics = self.settler.physics
+        self._at_home = physics.rest_lengths.copy()
         # The compiled model stands at its reference pose, its springs still as in the file.
         self.pretension = physics.rest_lengths - physics.data.ten_length
 
@@ -41,13 +46,16 @@ class MujocoRobot:
         return self.settler.physics.ignored
 
     def rest_lengths(self, poses: Array) -> Array:
-        """Lengths (n, m) [m] paid out for commanded poses (n, 7), from MuJoCo's kinematics."""
+        """Lengths (n, m) [m] paid out for commanded poses (n, 7), from MuJoCo's kinematics.
+
+        Those of passive lines are as in the MJCF.
+        """
         physics = self.settler.physics
         lengths = np.empty((len(poses), physics.n_cables))
         for i, pose in enumerate(poses):
             physics.place(pose)
             lengths[i] = physics.data.ten_length
-        return np.asarray(lengths + self.pretension)
+        return np.where(physics.driven, lengths + self.pretension, self._at_home)
 
     def settle(self, poses: Array, starts: Array | None = None) -> SettlingBatch:
         """Bring the platform to rest with the lengths of commanded poses (n, 7), each by itself.

@@ -204,7 +204,7 @@ class CaseResult(Result):
 
     def mujoco_robot(self) -> MujocoRobot:
         """A new MuJoCo robot for the case, to settle one of its poses again."""
-        return MujocoRobot(self.case.mujoco_model, self.case.mujoco_ea)
+        return MujocoRobot(self.case.mujoco_model, self.case.mujoco_ea, self.case.passive)
 
 
 def worst_of(results: Sequence[CaseResult]) -> tuple[CaseResult, Worst] | None:

@@ -266,11 +266,11 @@ def run_case(case: Case, thresholds: Thresholds, record: Recorder | None = None)
         record: called with the result; returns the name of the recording that it wrote.
     """
     began = time.perf_counter()
-    robot = load_robot(case.model)
+    robot = load_robot(case.model, case.passive)
     if case.ea is not None:
-        robot = replace(robot, ea=np.full(robot.n_cables, case.ea))
+        robot = replace(robot, ea=np.where(robot.driven, case.ea, robot.ea))
     solution, seecr_s = _solve(robot, case)
-    mujoco = MujocoRobot(case.mujoco_model, case.mujoco_ea)
+    mujoco = MujocoRobot(case.mujoco_model, case.mujoco_ea, case.passive)
     _check_same_cables(case, robot, mujoco)
     settling = mujoco.settle(case.poses, case.begins)
     allowance = allowances(thresholds, solution, settling)

@@ -33,12 +33,14 @@ from crosscheck.suite.results import (
 )
 from crosscheck.suite.run import Run, results_json, threshold_cells, verdict_line
 from crosscheck.suite.verdicts import FINDINGS, UNSOLVED, Outcome, Verdict
+from seecr.description.passive import write_pull
 from seecr.errors import InputError, InputFileError
 from seecr.files import path_of, write_text, written
 from seecr.pose import Array
 
 if TYPE_CHECKING:
     from crosscheck.suite.effects import EffectResult
+    from seecr.description.robot import Robot
 
 
 # The suite's results as `junit.xml`, which continuous integration shows as tests.
@@ -224,7 +226,12 @@ def write_worst_pose(results: Sequence[CaseResult], folder: Path) -> str:
     lengths = result.mujoco_rest_lengths[i]
     try:
         write_worst_pose_mjcf(
-            result.case.mujoco_model, qpos, lengths, mujoco.settler.ea, folder / FILE_NAME
+            result.case.mujoco_model,
+            qpos,
+            lengths,
+            mujoco.settler.ea,
+            folder / FILE_NAME,
+            result.robot,
         )
     except InputFileError as error:  # a robot in several files can be run, but not rewritten
         return f"There is no `{FILE_NAME}`: {error}."
@@ -232,8 +239,9 @@ def write_worst_pose(results: Sequence[CaseResult], folder: Path) -> str:
 
 
 def write_worst_pose_mjcf(
-    model_path: str | Path, qpos: Array, rest_lengths: Array, ea: Array, path: str | Path
-) -> None:
+    model_path: str | Path, qpos: Array, rest_lengths: Array, ea: Array, path: str | Path,
+    robot: Robot | None = None,
+) -> None:  # fmt: skip
     """Copy an MJCF with other rest lengths and stiffnesses, and a keyframe ``worst``.
 
     The XML tree is edited, since MuJoCo's own writer keeps six digits only, which moves the
@@ -246,6 +254,7 @@ def write_worst_pose_mjcf(
         rest_lengths: (m,) [m].
         ea: (m,) [N].
         path: the file to write, through a temporary one.
+        robot: which of its lines push, or pull with a constant force; none without it.
 
     Raises:
         InputFileError: the MJCF cannot be read, or does not itself have m tendons.
@@ -257,6 +266,8 @@ def write_worst_pose_mjcf(
         raise InputFileError(f"{model_path}: cannot read this as XML: {error}") from None
     root = tree.getroot()
     _set_springs(root, np.asarray(rest_lengths, float), np.asarray(ea, float), model_path)
+    if robot is not None:
+        _set_kinds(root, robot)
     _make_paths_absolute(root, model_path.resolve().parent)
     for old in root.findall("keyframe"):
         root.remove(old)  # MuJoCo opens the first keyframe; it has to be this one
@@ -278,6 +289,17 @@ def _set_springs(root: ET.Element, rest_lengths: Array, ea: Array, path: Path) -
     for tendon, rest, stiff in zip(tendons, rest_lengths, ea, strict=True):
         tendon.set("springlength", _numbers(np.array([0.0, rest])))
         tendon.set("stiffness", repr(float(stiff / rest)))
+
+
+def _set_kinds(root: ET.Element, robot: Robot) -> None:
+    """Let springs push that do, and pull tendons with a constant force."""
+    for i, tendon in enumerate(root.findall("tendon/spatial")):
+        if robot.pushes[i]:
+            tendon.set("springlength", tendon.get("springlength", "").split()[-1])
+        elif robot.constant_tension_N[i] > 0.0:
+            tendon.set("name", robot.cable_names[i])
+            tendon.set("stiffness", "0")
+            write_pull(root, robot.cable_names[i], float(robot.constant_tension_N[i]))
 
 
 def _make_paths_absolute(root: ET.Element, folder: Path) -> None:

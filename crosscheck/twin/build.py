@@ -50,6 +50,7 @@ class Places:
         node_bodies: (m, N - 1); end_bodies: (m,) point masses on the platform, or (m, 0).
         top_next: (m,) sites next to the exit points along the cables.
         tail: [m] of tendon behind the exit point when the winch's spring is at rest.
+        pushes, pulled: of passive lines, see :class:`crosscheck.settle.physics.Parts`.
     """
 
     platform: int
@@ -65,6 +66,8 @@ class Places:
     end_bodies: Index
     top_next: Index
     tail: float
+    pushes: tuple[int, ...]
+    pulled: tuple[tuple[int, int, int, float], ...]
 
 
 def build(true: TrueRobot, segments: int = 1) -> tuple[mujoco.MjModel, Places]:
@@ -82,6 +85,7 @@ def build(true: TrueRobot, segments: int = 1) -> tuple[mujoco.MjModel, Places]:
         _add_exit(spec, true, i)
         _add_chain(spec, true, i, segments)
         _add_tendons(spec, true, i, segments)
+    _add_passive(spec, true)
     model = spec.compile()
     _hang_springs(model, true)
     return model, _places(model, true, segments)
@@ -128,6 +132,8 @@ def add_platform(spec: mujoco.MjSpec, true: TrueRobot, segments: int) -> None:
             axis=quat_rotate(back, joint.axis),
             pos=quat_rotate(back, joint.point - position),
         )
+    for i, line in enumerate(true.passive):
+        body.add_site(name=f"qb{i}", pos=line.anchor_point)
     hook = body.add_body(name="payload")
     hook.explicitinertial = True
     for i, anchor in enumerate(true.anchor_points):
@@ -227,6 +233,18 @@ def _add_tendons(spec: mujoco.MjSpec, true: TrueRobot, i: int, segments: int) ->
         tendon.stiffness, tendon.springlength = [1.0, 0.0, 0.0], [0.0, 1.0]
 
 
+def _add_passive(spec: mujoco.MjSpec, true: TrueRobot) -> None:
+    """Lines without a winch, after all others: plain springs, or none where a force pulls."""
+    for i, line in enumerate(true.passive):
+        spec.worldbody.add_site(name=f"qa{i}", pos=line.exit_point)
+        tendon = spec.add_tendon(name=f"passive{i}")
+        tendon.wrap_site(f"qa{i}")
+        tendon.wrap_site(f"qb{i}")
+        stiffness = line.ea / line.rest if line.force == 0.0 else 0.0
+        tendon.stiffness = [stiffness, 0.0, 0.0]
+        tendon.springlength = [line.rest if line.pushes else 0.0, line.rest]
+
+
 def _hang_springs(model: mujoco.MjModel, true: TrueRobot) -> None:
     """Preload the springs of exit points and winches with their own weight: they rest at zero."""
     for joint in np.flatnonzero(model.jnt_stiffness > 0):
@@ -268,6 +286,12 @@ def _places(model: mujoco.MjModel, true: TrueRobot, segments: int) -> Places:
         end_bodies=np.array(ends, dtype=int),
         top_next=np.array([number(site, ([*row, f"b{i}"])[0]) for i, row in enumerate(nodes)]),
         tail=tail_of(true),
+        pushes=tuple(m * segments + i for i, line in enumerate(true.passive) if line.pushes),
+        pulled=tuple(
+            (m * segments + i, number(site, f"qa{i}"), number(site, f"qb{i}"), line.force)
+            for i, line in enumerate(true.passive)
+            if line.force > 0.0
+        ),
     )
 
 

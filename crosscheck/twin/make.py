@@ -215,5 +215,5 @@ def _write(twin: Twin, robot_path: Path, out: Path, commands: Path | None) -> No
     read = [commands] if commands is not None and commands.exists() else []
     with staged(out, read=read) as folder:
         write_measurements(folder / "measured.csv", twin.measured)
-        copy_robot(robot_path, folder / "robot.xml")
+        copy_robot(robot_path, folder / "robot.xml", twin.robot)
         write_text(folder / NAME, seal(twin.answer))

@@ -256,7 +256,7 @@ class _Rows:
     """Where n rows ended.
 
     Attributes:
-        pose: (n, 7) equilibria; tensions: (n, m) [N] where cables leave.
+        pose: (n, 7) equilibria; tensions: (n, m) [N] where cables leave, passive lines' last.
         at_rest: (n,) bool, a stable equilibrium was found.
         free: (n,) bool, in equilibrium, but free to move along some direction.
         residual: (n,) residual force relative to the load.
@@ -313,11 +313,13 @@ def measure(
             :func:`crosscheck.twin.measure.waypoints_of` has them by default.
         progress: called with the number of rows done since the last call.
     """
-    true = true_robot(robot, effects)
+    true, driven = true_robot(robot, effects), robot.driven
+    if commands.lengths is not None:
+        commands = replace(commands, lengths=commands.lengths[:, driven])
     path = waypoints_of(true, commands, steps)
     rest, loads = paid_out(true, path, commands.temperature), commands.loads
     if length_errors is not None:
-        rest = rest + length_errors[path.row]
+        rest = rest + length_errors[path.row][:, driven]
     tell = progress or (lambda rows: None)
     settle = _walk if true.has_history else _each
     fine = World(true, segments[-1] if true.cable_weight > 0 else 1)
@@ -325,13 +327,17 @@ def measure(
     if true.cable_weight > 0 and len(segments) > 1:
         coarse = settle(World(true, segments[0]), path, rest, loads, lambda rows: None)
         rows = _extrapolated(coarse, rows, (segments[-1] / segments[0]) ** 2)
-    reading = (rows.pose[:, :3], rows.pose[:, 3:], rows.tensions / true.robot.falls)
+    lengths = np.tile(robot.rest_lengths, (len(rows.pose), 1))
+    lengths[:, driven] = rest[path.is_row]
+    order = np.concatenate([np.flatnonzero(driven), np.flatnonzero(~driven)])
+    rows.tensions[:, order] = rows.tensions.copy()
+    reading = (rows.pose[:, :3], rows.pose[:, 3:], rows.tensions / robot.falls)
     for sensor in true.sensors:
         reading = sensor(reading)
     position, quat, tensions = reading
     return Truth(
         **vars(rows), position=position, quat_wxyz=quat, tension_readings=tensions,
-        rest_lengths=rest[path.is_row],
+        rest_lengths=lengths,
     )  # fmt: skip
 
 
@@ -342,7 +348,8 @@ def _extrapolated(coarse: _Rows, fine: _Rows, ratio: float) -> _Rows:
     pose = np.full_like(fine.pose, np.nan)
     change = part * pose_difference(fine.pose[both], coarse.pose[both])
     pose[both] = pose_add(fine.pose[both], change)
-    tensions = np.maximum(fine.tensions + part * (fine.tensions - coarse.tensions), 0.0)
+    tensions = fine.tensions + part * (fine.tensions - coarse.tensions)
+    tensions = np.where(fine.tensions < 0.0, tensions, np.maximum(tensions, 0.0))  # some push
     at_rest, free = fine.at_rest & coarse.at_rest, fine.free | coarse.free
     return _Rows(pose, tensions, at_rest, free, fine.residual)
 
@@ -350,7 +357,7 @@ def _extrapolated(coarse: _Rows, fine: _Rows, ratio: float) -> _Rows:
 def _each(world: World, path: Waypoints, rest: Array, loads: Loads | None, tell: Progress) -> _Rows:
     """Every row by itself, from its commanded pose."""
     poses, lengths = path.pose[path.is_row], rest[path.is_row]
-    out = _Rows.empty(len(poses), world.n_cables)
+    out = _Rows.empty(len(poses), world.n_lines)
     bare = _without_weight(world)
     for k, pose in enumerate(poses):
         springs = Springs.plain(lengths[k], world.true)
@@ -414,14 +421,14 @@ def _moves_to_rest(world: World) -> bool:
 def _note(world: World, out: _Rows, k: int, found: Descent) -> None:
     out.at_rest[k], out.free[k], out.residual[k] = found.at_rest, found.free, found.residual
     if found.balanced:
-        out.tensions[k] = world.cable_tensions()
+        out.tensions[k] = np.concatenate([world.cable_tensions(), world.passive_tensions()])
         out.pose[k] = world.pose()
 
 
 def _walk(world: World, path: Waypoints, rest: Array, loads: Loads | None, tell: Progress) -> _Rows:
     """All points of the way in order, each from the equilibrium of the last one."""
     true = world.true
-    out = _Rows.empty(int(path.is_row.sum()), world.n_cables)
+    out = _Rows.empty(int(path.is_row.sum()), world.n_lines)
     cables = [Cable(true, float(ea)) for ea in true.ea]
     bare = _without_weight(world)
     found = _NOWHERE

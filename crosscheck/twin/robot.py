@@ -7,7 +7,7 @@ parameters are shared. All numbers are SI; frames and signs are as in the effect
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -22,12 +22,25 @@ Reading = tuple[Array, Array, Array]
 Sensor = Callable[[Reading], Reading]
 
 
+@dataclass(frozen=True, eq=False)
+class PassiveLine:
+    """A line without a winch: a spring, rest length [m] and E S [N], or a constant force [N]."""
+
+    exit_point: Array
+    anchor_point: Array
+    rest: float
+    ea: float
+    pushes: bool
+    force: float
+
+
 @dataclass(eq=False)
 class TrueRobot:
-    """Numbers for MuJoCo's model and the winches; m cables.
+    """Numbers for MuJoCo's model and the winches; m cables, all of them driven.
 
     Attributes:
-        robot: as described.
+        robot: as described, without its passive lines.
+        passive: these.
         exit_points, anchor_points: (m, 3) [m] true positions.
         mass: [kg]; centre_of_mass: (3,) [m]; gravity: (3,) [m/s^2]; wrench: (6,) [N, N m].
         ea: (m,) [N]; quadratic, cubic: of T = EA (eps + quadratic eps^2 + cubic eps^3).
@@ -70,6 +83,7 @@ class TrueRobot:
     zero_temperature: float = 20.0
     run_out: list[tuple[Array, Array, float]] = field(default_factory=list)
     sensors: list[Sensor] = field(default_factory=list)
+    passive: tuple[PassiveLine, ...] = ()
 
     @property
     def n_cables(self) -> int:
@@ -120,7 +134,37 @@ def true_robot(robot: Robot, effects: Sequence[Effect] = ()) -> TrueRobot:
             f"frame_compliance {true.compliance:g} m/N sideways and {true.compliance_up:g} m/N "
             "upwards: MuJoCo cannot simulate this with pulley_radius; expected equal values"
         )
-    return true
+    return true if robot.all_driven else _passive_apart(true)
+
+
+def _passive_apart(true: TrueRobot) -> TrueRobot:
+    """The robot on its driven cables, and the passive lines beside them.
+
+    What winches and their ropes do wrong is of the former alone; points and stiffness are of all.
+    """
+    robot = true.robot
+    if robot.n_driven == 0:
+        raise CrosscheckError(
+            f"robot {robot.name}: no winch drives any of its lines, so commands move nothing; "
+            "expected a cable that is not passive"
+        )
+    driven = robot.driven
+    lines = tuple(
+        PassiveLine(
+            true.exit_points[i], true.anchor_points[i], float(robot.rest_lengths[i]),
+            float(true.ea[i]), bool(robot.pushes[i]), float(robot.constant_tension_N[i]),
+        )
+        for i in np.flatnonzero(~driven)
+    )  # fmt: skip
+    return replace(
+        true, robot=robot.only(driven), passive=lines,
+        run_out=[(sine[driven], cosine[driven], radius) for sine, cosine, radius in true.run_out],
+        **{name: getattr(true, name)[driven] for name in _OF_CABLES},
+    )  # fmt: skip
+
+
+# What every cable has one of.
+_OF_CABLES = ("exit_points", "anchor_points", "ea", "offset", "gain")
 
 
 def _zero_pose(true: TrueRobot, effect: Any) -> None:
@@ -165,6 +209,10 @@ def _add(**parameters: str) -> Callable[[TrueRobot, Any], None]:
 
 def _stiffen(true: TrueRobot, effect: Any) -> None:
     true.ea = true.ea * effect.factor
+
+
+def _stiffen_ropes(true: TrueRobot, effect: Any) -> None:
+    true.ea = np.where(true.robot.driven, effect.factor * true.ea, true.ea)
 
 
 def _wrench(true: TrueRobot, effect: Any) -> None:
@@ -215,7 +263,7 @@ _BODILY: dict[str, Callable[[TrueRobot, Any], None]] = {
     "pulley_radius": _add(pulley_radius="radius"),
     "exit_point_error": _add(exit_points="error"),
     "anchor_point_error": _add(anchor_points="error"),
-    "stiffness": _stiffen,
+    "stiffness": _stiffen_ropes,
     "cable_stiffness": _stiffen,
     "nonlinear_elasticity": _add(quadratic="quadratic", cubic="cubic"),
     "winch_side_length": _add(winch_side="length"),

@@ -36,7 +36,7 @@ class World(Physics):
         self.true, self.segments = true, segments
         model, self.places = build(true, segments)
         places = self.places
-        parts = Parts(places.platform, places.exits, places.anchors)
+        parts = Parts(places.platform, places.exits, places.anchors, places.pushes, places.pulled)
         super().__init__(model, parts, true.robot.length)
         hubs = np.concatenate([places.exit_dofs, places.slider_dofs], axis=1)
         nodes = places.node_dofs.reshape(true.n_cables, -1)
@@ -64,6 +64,11 @@ class World(Physics):
         return self.true.n_cables
 
     @property
+    def n_lines(self) -> int:
+        """Number of cables, and of passive lines after them."""
+        return self.n_cables + len(self.true.passive)
+
+    @property
     def n_platform(self) -> int:
         """Number of the platform's own coordinates, which come first."""
         return self.places.n_platform
@@ -71,7 +76,7 @@ class World(Physics):
     @property
     def steers(self) -> bool:
         """Whether something has to be done at every step: turn sheaves, apply a wrench."""
-        return bool(self.true.pulley_radius or self.wrench.any())
+        return bool(self.true.pulley_radius) or super().steers
 
     def set_springs(self, springs: Springs) -> None:
         """Set rest length, stiffness and weight of all segments.
@@ -214,11 +219,14 @@ class World(Physics):
         return step
 
     def tensions(self) -> Array:
-        """Tensions of all tendons (m N,) [N] as of the last update; 0 where slack."""
-        x = np.maximum(self.data.ten_length - self.model.tendon_lengthspring[:, 1], 0.0)
-        poly = self.model.tendon_stiffnesspoly
+        """Tensions of all tendons [N], passive lines' last, as last updated; 0 where slack."""
+        x, poly = self.stretches(), self.model.tendon_stiffnesspoly
         pull = self.model.tendon_stiffness * x + poly[:, 0] * x**2 + poly[:, 1] * x**3
-        return np.asarray(self.mass_unit * pull)
+        return np.asarray(self.mass_unit * pull + self.constant)
+
+    def passive_tensions(self) -> Array:
+        """Tensions [N] of the passive lines, as of the last update."""
+        return self.tensions()[self.places.tendons.size :]
 
     def cable_tensions(self) -> Array:
         """Tension of each cable (m,) [N] where it leaves its exit point or sheave."""

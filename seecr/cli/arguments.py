@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr import Commands, InputError, Model, Robot, Solution, load_model, load_robot
+from seecr.cli.following import passive_lines
 from seecr.cli.notes import tell
 from seecr.columns.commands import read_commands
 from seecr.columns.plausible import ABSURD, scalar_last
@@ -40,7 +41,7 @@ def robot_at(given: Path, cable: str | None = None) -> Robot:
     Raises:
         RobotError, InputError: no such file and no such name, no such cable.
     """
-    robot = load_robot(given)
+    robot = load_robot(given, passive_lines())
     if cable is None:
         tell((*robot.notes, *strange(robot)))
         return robot
@@ -49,7 +50,7 @@ def robot_at(given: Path, cable: str | None = None) -> Robot:
     except InputError as error:
         known = f"expected {', '.join(CABLES)}, E S"
         raise InputError(str(error).replace("expected E S", known, 1)) from None
-    other = replace(robot, ea=np.full(robot.n_cables, ea))
+    other = replace(robot, ea=np.where(robot.driven, ea, robot.ea))
     tell((*other.notes, *strange(other)))
     return other
 

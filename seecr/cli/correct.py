@@ -106,9 +106,9 @@ def command(
         )
     wanted, tracker = _as_tracked(machine, wanted, own, as_read)
     # fewer cables than degrees of freedom hold no orientation of one's choice
-    turns = wanted.any_orientation and machine.n_cables < machine.n_dof
+    turns = wanted.any_orientation and machine.n_driven < machine.n_dof
     limits = float("inf") if highest is None else highest
-    near = aim_of(aim, machine.n_cables)
+    near = aim_of(aim, machine.n_driven)
     commands_of_it = ("corrected.csv", "corrected.toml", "table.csv")
     made = options.made_by(machine.source, poses, model)
     where: dict[str, Any] = {"read": with_toml(poses), "made": made}

@@ -9,15 +9,25 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import click
+
 if TYPE_CHECKING:
     from seecr import Commands, Model, Robot, Solution
 
 STDIN = "/dev/stdin"
+PASSIVE = "seecr.passive"
+"""Where the running command keeps the lines that ``--passive`` named."""
 _SAVED = "INPUT"  # stands for a file that came through a pipe
 
 
+def passive_lines() -> tuple[str, ...]:
+    """The lines that ``--passive`` of the running command named."""
+    ctx = click.get_current_context(silent=True)
+    return () if ctx is None else tuple(ctx.meta.get(PASSIVE, ()))
+
+
 def following(*words: object) -> str:
-    """The line that names a command, as a shell takes it.
+    """The line that names a command, as a shell takes it, with ``--passive`` as it was given.
 
     What came through a pipe is gone: a file stands in its place. Effects of the user's own files
     are named again.
@@ -25,7 +35,9 @@ def following(*words: object) -> str:
     if words[0] in ("seecr", "crosscheck"):
         from seecr.cli.own_effects import given_effects
 
-        words = (*words, *given_effects())
+        passive = passive_lines()
+        named = ("--passive", ",".join(passive)) if passive else ()
+        words = (*words, *given_effects(), *named)
     if not any(_piped(word) for word in words):
         return f"next: {typed(*words)}"
     line = typed(*(_SAVED if _piped(word) else word for word in words))
@@ -69,7 +81,7 @@ def mapping(machine: Robot, robot: Path, cable: str | None, model: Model | None)
     file = None if model is None else model.path
     if model is None or not with_history(machine, model):
         return following("seecr", "map", robot, *given_with(cable, file))
-    if machine.n_cables < machine.n_dof:  # each pose is solved for, whatever is asked for
+    if machine.n_driven < machine.n_dof:  # each pose is solved for, whatever is asked for
         line = following("seecr", "map", robot, *given_with(cable, None))
         return f"{line}  # without the model: a map knows no history"
     return following("seecr", "map", robot, *given_with(cable, file), "--no-elastic")

@@ -7,7 +7,7 @@ import math
 import re
 import shlex
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from seecr.cli.following import STDIN
+from seecr.cli.following import PASSIVE, STDIN
 from seecr.cli.group import ARGUMENTS
 
 if TYPE_CHECKING:
@@ -201,8 +201,36 @@ own_effects = option(
     expose_value=False,
     callback=_introduced,
 )
+
+
+def words_option(words: str, said: str, **more: Any) -> Callable[[F], F]:
+    """An option that may be repeated and holds several words between commas, as a tuple."""
+    return option(words, said, multiple=True, **{"callback": words_of, **more})
+
+
+def words_of(ctx: click.Context, param: click.Parameter, texts: Sequence[str]) -> tuple[str, ...]:
+    """The words of an option that may be repeated and holds several between commas."""
+    words = [[word.strip() for word in text.split(",") if word.strip()] for text in texts]
+    for text, found in zip(texts, words, strict=True):
+        if not found:
+            raise click.BadParameter(f"expected {param.metavar}, got {text!r}.", ctx, param)
+    return tuple(word for found in words for word in found)
+
+
+def _keep_passive(ctx: click.Context, param: click.Parameter, texts: Sequence[str]) -> None:
+    ctx.meta[PASSIVE] = words_of(ctx, param, texts)
+
+
+passive = words_option(
+    "--passive LINE,...",
+    "Lines that no winch drives (bands, springs), besides those that the robot's file names; may "
+    "be repeated.",
+    callback=_keep_passive,
+    expose_value=False,
+)
 robot = together(
     click.argument("robot", type=FILE, metavar="ROBOT"),
+    passive,
     option(
         "--cable NAME|N",
         "k_c = E S of all cables, instead of that in the robot's file: vectran, fishing, a rope "

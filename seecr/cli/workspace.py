@@ -172,7 +172,7 @@ def _holds_none(found: Workspace, lowest: float, highest: float) -> Exception:
     from seecr.description.robot import ITS_A_POINT
 
     what, stays = "no ", ""
-    if found.robot.n_cables < found.robot.n_dof:
+    if found.robot.n_driven < found.robot.n_dof:
         what, stays = "in no orientation do ", " so that the platform stays"
     cure = "; expected another grid, orientation or wider limits"
     if found.robot.is_point:

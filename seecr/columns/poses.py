@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,19 +23,40 @@ if TYPE_CHECKING:
 
 
 def command_lengths(columns: Columns, robot: Robot) -> Array | None:
-    """Commanded rest lengths (n, m) [m], or None if the file has no such columns."""
+    """Commanded rest lengths (n, m) [m], or None if the file has no such columns.
+
+    Those of passive lines, which have no column, are as the robot is described.
+
+    Raises:
+        InputFileError: a cable without a column, a passive line with one, or no length.
+    """
     given = columns.cables("length")
     if not given:
         return None
-    m = robot.n_cables
-    missing = [f"length_{i}_m" for i in range(1, m + 1) if i not in given]
+    _refuse_passive(columns, robot, given)
+    driven = (np.flatnonzero(robot.driven) + 1).tolist()
+    missing = [f"length_{i}_m" for i in driven if i not in given]
     if missing:
-        raise columns.half_there("length", missing, f"all {m} cables of the robot")
-    lengths, faults = columns.all_numbers([f"length_{i}" for i in given]), Faults()
-    for length, i, rest in zip(lengths.T, given, robot.rest_lengths.tolist(), strict=True):
-        faults.of(_check_length, columns, f"length_{i}", length, rest)
+        every = "" if robot.all_driven else " that a winch drives"
+        raise columns.half_there("length", missing, f"all {len(driven)} cables of the robot{every}")
+    lengths, faults = np.tile(robot.rest_lengths, (columns.n_rows, 1)), Faults()
+    lengths[:, robot.driven] = columns.all_numbers([f"length_{i}" for i in driven])
+    for i in driven:
+        rest = float(robot.rest_lengths[i - 1])
+        faults.of(_check_length, columns, f"length_{i}", lengths[:, i - 1], rest)
     faults.check()
     return lengths
+
+
+def _refuse_passive(columns: Columns, robot: Robot, given: Sequence[int]) -> None:
+    """Refuse columns of lengths of lines that no winch drives, all at once."""
+    odd = [i for i in given if not robot.driven[i - 1]]
+    if odd:
+        one, names = len(odd) == 1, ", ".join(robot.cable_names[i - 1] for i in odd)
+        raise columns.table.error(
+            f"no winch drives {names}: expected no length of {'it' if one else 'them'}, leave out "
+            f"{' '.join(columns.known[f'length_{i}'].name for i in odd)}"
+        )
 
 
 def _check_length(columns: Columns, quantity: str, length: Array, rest: float) -> None:

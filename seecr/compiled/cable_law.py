@@ -29,6 +29,8 @@ from seecr.compiled.columns import (
     HYSTERESIS_NOW,
     HYSTERESIS_STRETCH,
     N_COLUMNS,
+    PULL,
+    PUSHES,
     QUADRATIC,
     RADIUS,
     REST,
@@ -199,13 +201,13 @@ def straight_law(row, stretch, state):
     if is_linear(row):
         state[HYSTERESIS_NOW] = 0.0
         state[STRAIN] = elastic / soft
-        if elastic < 0.0:
+        if elastic < 0.0 and row[PUSHES] == 0.0:
             state[TENSION], state[WINCH_TENSION], state[SLACK] = 0.0, 0.0, 1.0
             return 0.0, 0.0
-        tension = row[EA] * (elastic / soft)
+        tension = row[PULL] + row[EA] * (elastic / soft)
         state[TENSION], state[WINCH_TENSION] = tension, tension
         state[SLACK] = 0.0
-        state[ENERGY] = 0.5 * tension * elastic
+        state[ENERGY] = 0.5 * (tension + row[PULL]) * elastic
         return tension, row[EA] / soft
     length, rate, tension, slope, z = series_length(row, 0.0)
     if stretch < length:

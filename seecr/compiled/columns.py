@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 # Columns of a cable.
-N_COLUMNS = 28
+N_COLUMNS = 30
 (
     EXIT, _, _,  # A in the base frame [m]
     ANCHOR, _, _,  # B in the platform frame [m]
@@ -23,6 +23,8 @@ N_COLUMNS = 28
     FRICTION,  # exponent of the capstan at the exit point
     STUCK,  # tension behind the exit point while the cable does not slip [N]
     EXTRA, EXTRA_SLOPE,  # a user's law, linearised: T += extra + extra_slope eps [N]
+    PUSHES,  # 1 if it is never slack: where it is shorter than its rest length it pushes
+    PULL,  # tension without stretch [N]; with EA = 0 and PUSHES = 1 the tension is constant
 ) = range(N_COLUMNS)  # fmt: skip
 # Columns that a walk along a path fills with the history.
 OF_THE_PAST = (CREEP, CREEP_RATE, STRETCH_BEFORE, HYSTERESIS_BEFORE, STUCK)

@@ -71,7 +71,7 @@ def take_past(row, kept, elapsed, fresh):
     the cable has neither hysteresis nor friction.
     """
     before, now = _shares(elapsed / row[CREEP_TIME])
-    share = row[CREEP_PART] / row[EA]
+    share = row[CREEP_PART] / row[EA] if row[CREEP_PART] > 0.0 else 0.0
     row[CREEP] = kept[_CREPT] * (1.0 - before - now)
     if fresh:
         row[CREEP_RATE] = share * (before + now)

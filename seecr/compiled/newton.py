@@ -26,6 +26,7 @@ from seecr.compiled.columns import (
     IDLE,
     ITERATIONS,
     N_STATE,
+    PUSHES,
     RADIUS,
     REST,
     SINGULAR,
@@ -135,9 +136,10 @@ def escape(hessian, top, radius, step):
 
 
 @jit_inner
-def is_idle(states, i, scale):
+def is_idle(cables, states, i, scale):
     """Whether the tension of a cable is mere rounding: it is as long as its rest length."""
-    return states[i, SLACK] == 0.0 and states[i, TENSION] < IDLE * scale
+    taut = states[i, SLACK] == 0.0 and cables[i, PUSHES] == 0.0
+    return taut and states[i, TENSION] < IDLE * scale
 
 
 @jit_allocating
@@ -148,14 +150,14 @@ def holds_without_idle(cables, load, pose, deviation, length, guess, states, sca
     """
     idle = False
     for i in range(cables.shape[0]):
-        idle = idle or is_idle(states, i, scale)
+        idle = idle or is_idle(cables, states, i, scale)
     if not idle:
         return True
     (_step, factor, _trial, _values, gradient, hessian, other_states, slopes, _guess, current,
      work, ready) = space  # fmt: skip
     rest = cables.copy()
     for i in range(cables.shape[0]):
-        if is_idle(states, i, scale):
+        if is_idle(cables, states, i, scale):
             rest[i, GAP] = -rest[i, REST]
             rest[i, RADIUS] = 0.0
     prepare(rest, load, pose, ready)

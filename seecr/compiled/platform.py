@@ -33,6 +33,8 @@ from seecr.compiled.columns import (
     GAP,
     HYSTERESIS_NOW,
     LIFT,
+    PULL,
+    PUSHES,
     RADIUS,
     REST,
     SLACK,
@@ -96,10 +98,11 @@ def _linear_pull(cables, ready, i, stretch, states):
     """Tension [N] of a linear spring; fills its state."""
     elastic = stretch - cables[i, REST] * cables[i, CREEP]
     states[i, HYSTERESIS_NOW], states[i, STRAIN] = 0.0, elastic * ready[i, YIELD]
-    taut = elastic >= 0.0
-    tension = elastic * ready[i, RATE] if taut else 0.0
+    taut = elastic >= 0.0 or cables[i, PUSHES] == 1.0
+    pull = cables[i, PULL]
+    tension = pull + elastic * ready[i, RATE] if taut else 0.0
     states[i, TENSION] = states[i, WINCH_TENSION] = tension
-    states[i, SLACK], states[i, ENERGY] = 0.0 if taut else 1.0, 0.5 * tension * elastic
+    states[i, SLACK], states[i, ENERGY] = 0.0 if taut else 1.0, 0.5 * (tension + pull) * elastic
     return tension
 
 

@@ -38,6 +38,7 @@ from seecr.compiled.columns import (
     HYSTERESIS,
     LIFT,
     N_STATE,
+    PUSHES,
     REST,
     SLACK,
     SLOPE,
@@ -227,7 +228,7 @@ def _hysteresis_by_rest(row, strain):
 def _straight_change(row, state, gradient, force):
     """dT/dl0 [N/m] of a straight cable; fills ``force`` (3,) [N/m], derivative of its force."""
     force[0] = force[1] = force[2] = 0.0
-    if state[SLACK] != 0.0:
+    if state[SLACK] != 0.0 or row[PUSHES] != 0.0:  # no winch changes what pushes
         return 0.0
     strain = state[STRAIN]
     _length, rate, tension, slope, _z = series_length(row, strain)

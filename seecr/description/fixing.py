@@ -82,6 +82,7 @@ class _Mending:
         self.model, self.root = reading.model, reading.text.root
         self.platform, self.text, self.path = reading.platform, reading.text, reading.path
         self.reference = reference_of(self.model, self.platform)
+        self.kinds = reading.kinds
         self.changes: list[Said] = []
         self.parents = {child: parent for parent in self.root.iter() for child in parent}
 
@@ -151,17 +152,19 @@ class _Mending:
         rest, stiffness = float(model.tendon_lengthspring[i, 1]), float(model.tendon_stiffness[i])
         if way.geoms or any(way.guides):
             straight, before, stretch = self._straighten(i, tendon, way)
+            self._say("tendon", name, f"{_STRAIGHT}{_by_effects(model, way, before)}")
+            if self.kinds.constant_tension_N[i] > 0.0:
+                return
             # E S stays, and the stretch at the reference pose: what is left out is paid out before
             ea, rest = stiffness * rest, straight - stretch
             tendon.set("stiffness", repr(ea / rest))
-            self._say("tendon", name, f"{_STRAIGHT}{_by_effects(model, way, before)}")
-        elif model.tendon_lengthspring[i, 0] != 0.0:
+        elif model.tendon_lengthspring[i, 0] != 0.0 and not self.kinds.pushes[i]:
             self._say(
                 "tendon", name, 'has springlength="0 l0" as it was read, l0 {} m', f"{rest:g}"
             )
         else:
             return
-        tendon.set("springlength", f"0 {rest!r}")
+        tendon.set("springlength", f"{rest if self.kinds.pushes[i] else 0} {rest!r}")
 
     def _straighten(self, i: int, tendon: ET.Element, way: Way) -> tuple[float, float, float]:
         """Two sites instead of the way.

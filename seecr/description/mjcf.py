@@ -25,8 +25,9 @@ from seecr.description.bodies import (
 )
 from seecr.description.findings import Findings
 from seecr.description.mjcf_text import MjcfText
+from seecr.description.passive import Kinds, kinds_of
 from seecr.description.robot import ABSURD, Joint, Robot
-from seecr.description.tendons import TendonCable, cables_of
+from seecr.description.tendons import TendonCable, cables_of, tendon_name
 from seecr.errors import InputError, RobotError, SeecrError, printable
 from seecr.files import no_text, path_of, read_bytes
 from seecr.pose import Array
@@ -214,17 +215,19 @@ def _ignore(message: str) -> None:
     """Discard a warning of MuJoCo's."""
 
 
-def load_robot(path: str | Path) -> Robot:
+def load_robot(path: str | Path, passive: Iterable[str] = ()) -> Robot:
     """Read the cable robot in an MJCF file.
 
     Cables hold one moving body, free or on slides, hinges and balls, with all that is welded to it.
     Each cable is a spatial tendon through two sites, one fixed to the world (the exit point A_i)
     and one on the body (the anchor point B_i), with ``springlength="0 l0"`` and a stiffness. Mass,
     centre of mass and gravity are those of the compiled model. ``Robot.notes`` tells what is left
-    out or read otherwise than written, see docs/formats.md.
+    out or read otherwise than written, see docs/formats.md. Lines that no winch drives are declared
+    in the file, see :mod:`seecr.description.passive`.
 
     Args:
         path: the MJCF file, or the name of a shipped robot.
+        passive: names of further lines that no winch drives.
 
     Returns:
         the robot as numbers, SI.
@@ -238,9 +241,9 @@ def load_robot(path: str | Path) -> Robot:
         ``seecr.load_robot("robot.xml")``
     """
     path = robot_file(path)
-    if is_shipped(path):
+    if is_shipped(path) and not passive:
         return _read_once(path, path.stat().st_mtime_ns)
-    return _read(path)
+    return _read(path, passive)
 
 
 @lru_cache
@@ -252,11 +255,11 @@ def _read_once(path: Path, _written: int) -> Robot:
     return _read(path)
 
 
-def _read(path: Path) -> Robot:
-    return read_file(path).robot()
+def _read(path: Path, passive: Iterable[str] | str = ()) -> Robot:
+    return read_file(path, passive).robot()
 
 
-def read_file(given: str | Path) -> Reading:
+def read_file(given: str | Path, passive: Iterable[str] | str = ()) -> Reading:
     """What of a robot's file is a robot, with objections and notes; see :func:`read_model`.
 
     Raises:
@@ -264,7 +267,7 @@ def read_file(given: str | Path) -> Reading:
         RobotError: the file is missing, or MuJoCo cannot compile it.
     """
     path = robot_file(given)
-    return read_model(_compile(path), path)
+    return read_model(_compile(path), path, passive)
 
 
 @dataclass
@@ -275,7 +278,7 @@ class Reading:
         model: as MuJoCo compiled it. path: of the file.
         found: objections and notes.
         platform: its bodies. cables: without those that are objected to.
-        text: the XML.
+        text: the XML. kinds: of all tendons, passive or driven.
     """
 
     model: mujoco.MjModel
@@ -285,6 +288,7 @@ class Reading:
     cables: list[TendonCable]
     joints: tuple[Joint, ...]
     text: MjcfText
+    kinds: Kinds
 
     def robot(self) -> Robot:
         """The robot.
@@ -313,6 +317,9 @@ class Reading:
             source=self.path,
             left_out=unsupported_features(model, self.platform.body, self.platform.loose),
             falls=np.array([cable.falls for cable in cables]),
+            driven=np.array([cable.driven for cable in cables]),
+            pushes=np.array([cable.pushes for cable in cables]),
+            constant_tension_N=np.array([cable.constant_tension_N for cable in cables]),
             floor=_floor(model, reference_pose[2]),
         )
         _check_sizes(robot, body_name(model, self.platform.body), self.found)
@@ -321,8 +328,11 @@ class Reading:
 
 
 @quiet_mujoco()
-def read_model(model: mujoco.MjModel, path: Path) -> Reading:
+def read_model(model: mujoco.MjModel, path: Path, passive: Iterable[str] | str = ()) -> Reading:
     """What of a compiled model is a robot, with objections and notes.
+
+    Args:
+        model: as compiled. path: of its file. passive: names of further lines without a winch.
 
     Raises:
         RobotError: nothing moves, so that there is nothing else to look at.
@@ -336,12 +346,20 @@ def read_model(model: mujoco.MjModel, path: Path) -> Reading:
     platform = platform_of(model, found)
     check_other_forces(model, platform, found)
     joints = joints_of(model, platform, found)
-    cables = cables_of(model, platform, text, found)
+    kinds, faults = kinds_of(model, cable_names(model), text, passive)
+    for fault in faults:
+        found.refuse("", "", fault)
+    cables = cables_of(model, platform, text, kinds, found)
     if not cables and not found.objections:
         found.refuse(
             "", "", "no cables; expected one <spatial> tendon per cable, through two sites"
         )
-    return Reading(model, path, found, platform, cables, joints, text)
+    return Reading(model, path, found, platform, cables, joints, text, kinds)
+
+
+def cable_names(model: mujoco.MjModel) -> list[str]:
+    """The names of the tendons, or those by their numbers."""
+    return [tendon_name(model, i) for i in range(model.ntendon)]
 
 
 def _robot(path: Path, **numbers: Any) -> Robot:

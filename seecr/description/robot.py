@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +36,9 @@ _MANY = 1000
 
 # What every cable has one of.
 _OF_CABLES = ("exit_points", "anchor_points", "ea", "rest_lengths")
+
+# Default of a field that __post_init__ makes from the others when it is not given.
+_FILLED_IN: Any = None
 
 IDENTITY_POSE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
@@ -87,6 +91,11 @@ class Robot:
         read: sentences about what its file says otherwise than it was read.
         floor: [m] z of the level floor below the platform, a static plane of the file; None without
             one. Statics leave it out; maps end there.
+        driven: (m,) bool, lines on winches; by default all that neither push nor have a constant
+            tension. The others are passive: commands and winches leave their rest lengths alone.
+        pushes: (m,) bool, springs that also push: T = k_c (l/l0 - 1) where they are shorter too.
+        constant_tension_N: (m,) [N] of lines of constant force, such as counterweights, with all
+            falls; 0 for others. They have no stiffness, and their rest length means nothing.
     """
 
     name: str
@@ -106,11 +115,15 @@ class Robot:
     floor: float | None = None
     falls: Array = field(default_factory=lambda: np.ones(0))
     read: tuple[str, ...] = ()
+    driven: NDArray[np.bool_] = _FILLED_IN
+    pushes: NDArray[np.bool_] = _FILLED_IN
+    constant_tension_N: Array = _FILLED_IN
 
     def __post_init__(self) -> None:
         m = np.shape(self.exit_points)[0]
         if np.all(np.asarray(self.falls) == 1.0):  # also where cables were left out
             object.__setattr__(self, "falls", np.ones(m))
+        self._fill_in_kinds(m)
         shapes = {
             "exit_points": (m, 3),
             "anchor_points": (m, 3),
@@ -121,6 +134,7 @@ class Robot:
             "reference_pose": (7,),
             "inertia": (3, 3),
             "falls": (m,),
+            "constant_tension_N": (m,),
         }
         for name, shape in shapes.items():
             value = np.array(getattr(self, name), dtype=float)
@@ -202,6 +216,23 @@ class Robot:
         about = comment or f"{self.name}; written by seecr"
         write_text(path_of(path, "the MJCF to write"), plain_text(self, about))
 
+    def _fill_in_kinds(self, m: int) -> None:
+        """Say of each line whether it pushes and whether a winch drives it, if nobody has said.
+
+        Plain values of another number of lines are those of a robot whose lines were replaced.
+        """
+        for name, plain in (("constant_tension_N", 0.0), ("pushes", False), ("driven", True)):
+            given = getattr(self, name)
+            if given is None or (np.shape(given) != (m,) and np.all(np.equal(given, plain))):
+                given = np.full(m, plain)
+                if name == "driven":
+                    given = ~(self.pushes | (self.constant_tension_N != 0.0))
+            value = np.array(given, dtype=type(plain))
+            if value.shape != (m,):
+                raise InputError(f"robot {self.name}: {name} must be ({m},), got {value.shape}")
+            value.flags.writeable = False
+            object.__setattr__(self, name, value)
+
     def __repr__(self) -> str:
         """The robot in a few lines, for people."""
         words = [f"ball {j.name[:-2]}" if j.ball else f"{j.kind} {j.name}" for j in self.joints]
@@ -218,6 +249,7 @@ class Robot:
                 f"at the reference pose, x y z {place} m, cables are "
                 f"{between(lengths.min(), lengths.max())} m long",
                 f"E S: {between(self.ea.min(), self.ea.max())} N",
+                *(words.partition(": ")[2] for words in self._passive_words()),
             )
         )
 
@@ -237,7 +269,9 @@ class Robot:
         if self.n_cables == 0:
             raise RobotError(f"robot {self.name}: expected at least one cable, got none")
         for i, name in enumerate(self.cable_names):
-            if self.ea[i] <= 0:
+            if fault := self._fault_of_kind(i):
+                raise RobotError(f"robot {self.name}: {name} {fault}")
+            if self.ea[i] <= 0 and self.constant_tension_N[i] == 0.0:
                 raise RobotError(
                     f"robot {self.name}: {name} has stiffness {self.ea[i]:g} N; "
                     "expected stiffness x rest length above zero"
@@ -259,11 +293,81 @@ class Robot:
                 "reference pose; expected them apart"
             )
 
+    def _fault_of_kind(self, i: int) -> str:
+        """What is wrong with a line that pushes or has a constant tension; "" if nothing is."""
+        tension = self.constant_tension_N[i]
+        if tension < 0.0:
+            return f"has a constant tension of {tension:g} N; expected one above zero"
+        if tension > 0.0 and self.ea[i] != 0.0:
+            return (
+                f"has a constant tension and a stiffness x rest length of {self.ea[i]:g} N; "
+                "expected 0, a constant force is no spring"
+            )
+        if self.driven[i] and (tension > 0.0 or self.pushes[i]):
+            what = "has a constant tension" if tension > 0.0 else "pushes"
+            return f"{what} and is driven; expected it passive, no winch drives such a line"
+        return ""
+
+    @property
+    def passive_names(self) -> tuple[str, ...]:
+        """Names of the lines that no winch drives."""
+        return tuple(n for n, on in zip(self.cable_names, self.driven, strict=True) if not on)
+
+    @cached_property
+    def all_driven(self) -> bool:
+        """Whether there are no passive lines."""
+        return bool(self.driven.all())
+
+    def only(self, lines: NDArray[np.bool_]) -> Robot:
+        """The same platform on some of its lines (m,)."""
+        of_lines = (*_OF_CABLES, "falls", "driven", "pushes", "constant_tension_N")
+        some: dict[str, Any] = {name: getattr(self, name)[lines] for name in of_lines}
+        names = zip(self.cable_names, lines, strict=True)
+        return replace(self, cable_names=tuple(n for n, kept in names if kept), **some)
+
+    @property
+    def n_driven(self) -> int:
+        """Number of lines on winches."""
+        return int(self.driven.sum())
+
+    @cached_property
+    def typical(self) -> NDArray[np.bool_]:
+        """(m,) lines whose numbers are the robot's usual ones: the driven, else all springs.
+
+        All, where there is neither.
+        """
+        springs = self.ea > 0.0
+        every = springs if springs.any() else ~springs
+        return self.driven if self.driven.any() else every
+
+    @property
+    def mean_ea(self) -> float:
+        """Mean E S [N] of the lines that are :attr:`typical`."""
+        return float(np.mean(self.ea[self.typical]))
+
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a user of the robot's file should know: :attr:`read`, :attr:`left_out` and such."""
+        """What a user of the robot's file should know.
+
+        On what it was :attr:`read` as, :attr:`left_out`, :attr:`is_point`, and lines that are not
+        :attr:`driven`.
+        """
         point = (f"{self.source or self.name}: {ITS_A_POINT}",) if self.is_point else ()
-        return (*self.read, *point, *self._left_out_words())
+        return (*self.read, *point, *self._left_out_words(), *self._passive_words())
+
+    def _passive_words(self) -> tuple[str, ...]:
+        if self.all_driven:
+            return ()
+        kinds = [self._kind_words(int(i)) for i in np.flatnonzero(~self.driven)]
+        nothing = "" if self.driven.any() else "; commands move nothing"
+        return (f"{self.source or self.name}: no winch drives {', '.join(kinds)}{nothing}",)
+
+    def _kind_words(self, i: int) -> str:
+        name = self.cable_names[i]
+        if self.constant_tension_N[i] > 0.0:
+            return f"{name} (pulls with {self.constant_tension_N[i]:g} N at any length)"
+        kind = "pulls and pushes" if self.pushes[i] else "pulls"
+        return f"{name} ({kind}, rest length {self.rest_lengths[i]:.4g} m throughout)"
 
     def _left_out_words(self) -> tuple[str, ...]:
         if not self.left_out:
@@ -332,7 +436,7 @@ class Robot:
     @property
     def usual_load(self) -> float:
         """Typical cable force [N]: the weight, or without one the force at a strain of 0.1 %."""
-        return self.weight if self.weight > 0.0 else 1e-3 * float(np.mean(self.ea))
+        return self.weight if self.weight > 0.0 else 1e-3 * self.mean_ea
 
     @cached_property
     def length(self) -> float:
@@ -387,7 +491,8 @@ class Robot:
 
         They are the rest lengths at the reference pose plus the difference of straight lengths. If
         the MJCF's rest lengths are the straight lengths at the reference pose, as in the paper
-        (step 3), they are the straight lengths at the commanded pose.
+        (step 3), they are the straight lengths at the commanded pose. Those of passive lines stay.
         """
         offset = self.rest_lengths - self.reference_lengths
-        return self.nominal_lengths(poses) + offset
+        lengths = self.nominal_lengths(poses) + offset
+        return lengths if self.all_driven else np.where(self.driven, lengths, self.rest_lengths)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from seecr.description.passive import write_kinds
 from seecr.pose import quat_conjugate, quat_rotate
 
 if TYPE_CHECKING:
@@ -90,15 +91,15 @@ def dot(robot: Robot) -> str:
 
 def cable(
     tendons: ET.Element, name: str, path: Sequence[tuple[str, dict[str, str]]], rest: float,
-    stiffness: Sequence[float], width: float,
+    stiffness: Sequence[float], width: float, pushes: bool = False,
 ) -> None:  # fmt: skip
-    """A spring that pulls and never pushes, through elements with their attributes.
+    """A spring that pulls, and never pushes unless told to, through elements with attributes.
 
     Its rest length and width are in [m]; to its stiffness [N/m] the coefficients of the square and
     the cube of its stretch are added if it is curved.
     """
     spatial = ET.SubElement(
-        tendons, "spatial", name=name, springlength=numbers_text(0.0, rest),
+        tendons, "spatial", name=name, springlength=numbers_text(rest if pushes else 0.0, rest),
         stiffness=numbers_text(*stiffness), width=numbers_text(width), rgba=_CABLE_COLOUR,
     )  # fmt: skip
     for tag, attributes in path:
@@ -129,5 +130,7 @@ def plain_text(robot: Robot, comment: str) -> str:
         if falls != 1.0:
             path = [("pulley", {"divisor": numbers_text(1.0 / falls)}), *path]
             rest, stiffness = falls * rest, stiffness / falls**2
-        cable(tendons, name, path, rest, [stiffness], 0.01 * robot.length)
+        width = 0.01 * robot.length
+        cable(tendons, name, path, rest, [stiffness], width, bool(robot.pushes[i]))
+    write_kinds(root, robot)
     return text_of(root)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import mujoco
 
     from seecr.description.mjcf_text import MjcfText
+    from seecr.description.passive import Kinds
 
 # MuJoCo's mjtWrap and mjtTrn.
 _JOINT, _PULLEY, _SITE = 1, 2, 3
@@ -25,9 +26,10 @@ _SAME = 1e-9
 
 @dataclass(frozen=True)
 class TendonCable:
-    """One cable: exit and anchor point (3,) [m], E S [N], rest length [m], name and falls.
+    """One cable: exit and anchor point (3,) [m], E S [N], rest length [m], name, falls and kind.
 
     The numbers are those of one straight cable that pulls as all ``falls`` of the line together.
+    The kind is told as of a :class:`seecr.Robot`.
     """
 
     exit: Array
@@ -36,6 +38,9 @@ class TendonCable:
     rest: float
     name: str
     falls: float
+    driven: bool = True
+    pushes: bool = False
+    constant_tension_N: float = 0.0
 
 
 @dataclass
@@ -97,7 +102,7 @@ def _add(
 
 
 def cables_of(
-    model: mujoco.MjModel, platform: Platform, text: MjcfText, found: Findings
+    model: mujoco.MjModel, platform: Platform, text: MjcfText, kinds: Kinds, found: Findings
 ) -> list[TendonCable]:
     """The cables, without those that objections are about."""
     out = []
@@ -111,9 +116,16 @@ def cables_of(
             found.refuse("tendon", name, "holds another moving body; expected one platform alone")
             continue
         straight = _check_way(model, platform, way, name, found)
-        spring = spring_of(model, i, name, text, found)
+        spring = spring_of(model, i, name, text, kinds, found)
         if straight and spring is not None:
-            out.append(_cable(model, platform, way, spring, name, found))
+            cable = _cable(model, platform, way, spring, name)
+            out.append(
+                replace(
+                    cable, driven=bool(kinds.driven[i]), pushes=bool(kinds.pushes[i]),
+                    constant_tension_N=cable.falls * float(kinds.constant_tension_N[i]),
+                )
+            )  # fmt: skip
+            _note_falls(out[-1], found)
     _note_actuators(model, found)
     return out
 
@@ -190,14 +202,18 @@ def _points(
 
 
 def spring_of(
-    model: mujoco.MjModel, i: int, name: str, text: MjcfText, found: Findings
+    model: mujoco.MjModel, i: int, name: str, text: MjcfText, kinds: Kinds, found: Findings
 ) -> tuple[float, float] | None:
-    """Stiffness [N/m] and rest length [m] of a tendon as a cable that pulls only.
+    """Stiffness [N/m] and rest length [m] of a tendon; none and any for a constant tension.
 
     None if there is an objection.
     """
     stiffness = float(model.tendon_stiffness[i])
     low, high = (float(end) for end in model.tendon_lengthspring[i])
+    if kinds.constant_tension_N[i] > 0.0:
+        if stiffness != 0.0:
+            found.note("tendon", name, "has a spring beside its constant tension: it is left out")
+        return 0.0, float(model.tendon_length0[i])
     # MuJoCo 4 has it, 3 has not
     yields = getattr(model, "tendon_springyield", np.zeros(model.ntendon))[i] != 0.0
     if np.any(model.tendon_stiffnesspoly[i]) or yields:
@@ -207,7 +223,7 @@ def spring_of(
     if not stiffness > 0:
         _refuse_no_spring(model, i, name, stiffness, found)
         return None
-    if low == 0.0 < high:
+    if low == 0.0 < high or kinds.pushes[i]:
         return stiffness, high
     written = text.attribute(i, "springlength")
     if low == high > 0.0 and written is None:
@@ -216,15 +232,17 @@ def spring_of(
             "rest length, as MuJoCo does ({} m), and it is a cable that never pushes", f"{high:g}",
         )  # fmt: skip
         return stiffness, high
-    if low == high > 0.0 and written is not None and len(written.split()) == 1:
+    if low == high > 0.0:  # one number is written: two are of a spring that pushes
         found.note(
             "tendon", name, 'has one springlength ({} m), with which it would push as well; read '
-            'as "0 l0", a cable that never pushes', f"{high:g}",
+            'as "0 l0", a cable that never pushes; a spring that does, which no winch drives, has '
+            '"l0 l0"', f"{high:g}",
         )  # fmt: skip
         return stiffness, high
     found.refuse(
         "tendon", name, 'has springlength "{}"; expected two values, "0 l0" with the rest length '
-        "l0 [m], so that the cable pulls and never pushes", f"{low:g} {high:g}",
+        'l0 [m], so that the cable pulls and never pushes, or "l0 l0" for a spring that pushes '
+        "too", f"{low:g} {high:g}",
     )  # fmt: skip
     return None
 
@@ -251,9 +269,8 @@ def _refuse_no_spring(
 
 
 def _cable(
-    model: mujoco.MjModel, platform: Platform, way: Way, spring: tuple[float, float], name: str,
-    found: Findings,
-) -> TendonCable:  # fmt: skip
+    model: mujoco.MjModel, platform: Platform, way: Way, spring: tuple[float, float], name: str
+) -> TendonCable:
     """The cable that pulls as the tendon does.
 
     The length of the tendon is n L, with L between the points and n = sum of 1/divisor (MuJoCo's
@@ -262,14 +279,23 @@ def _cable(
     """
     stiffness, rest = spring
     falls = sum(1.0 / divisor for *_sites, divisor in way.spans)
-    if falls != 1.0:
-        found.note(
-            "tendon", name, f"runs {falls:g} times between its points: read as one cable of "
-            f"{falls**2:g} times its stiffness and {1.0 / falls:g} times its rest length; lengths "
-            f"are that cable's (the winch pays out {falls:g} times as much), tensions the line's",
-        )  # fmt: skip
     exit_point, anchor = _points(model, platform, way.spans[0])
     return TendonCable(exit_point, anchor, falls * stiffness * rest, rest / falls, name, falls)
+
+
+def _note_falls(cable: TendonCable, found: Findings) -> None:
+    """Tell of a line that runs to and fro how it is read."""
+    falls = cable.falls
+    if falls == 1.0:
+        return
+    read = f"{falls**2:g} times its stiffness and {1.0 / falls:g} times its rest length"
+    pays = f" (the winch pays out {falls:g} times as much)" if cable.driven else ""
+    if cable.constant_tension_N > 0.0:
+        read = f"{falls:g} times its constant tension"
+    found.note(
+        "tendon", cable.name, f"runs {falls:g} times between its points: read as one cable of "
+        f"{read}; lengths are that cable's{pays}, tensions the line's",
+    )  # fmt: skip
 
 
 def _note_actuators(model: mujoco.MjModel, found: Findings) -> None:

@@ -90,12 +90,18 @@ class Total:
 Scale = float | Callable[[Robot], float]
 PLACES = ("actuation", "geometry", "cable", "structure", "load", "sensing")
 _AXES = ("x", "y", "z")
-# Components of a parameter: how many, and what each is called.
+# Components of a parameter, by what each is called.
 _SIZES: dict[str, Callable[[int], list[str]]] = {
     "one": lambda m: [""],
     "cable": lambda m: [f"_{i + 1}" for i in range(m)],
+    "spring": lambda m: [f"_{i + 1}" for i in range(m)],
     "vector": lambda m: [f"_{a}" for a in _AXES],
     "point": lambda m: [f"_{i + 1}_{a}" for i in range(m) for a in _AXES],
+}
+# Lines that have a component, where not all have.
+_HAVE: dict[str, Callable[[Robot], NDArray[np.bool_]]] = {
+    "cable": lambda robot: robot.driven,
+    "spring": lambda robot: robot.ea > 0.0,
 }
 
 
@@ -129,8 +135,10 @@ def parameter(
             or a function of the robot, whose ``words`` are told where there is no robot.
         null: value at which the effect is absent.
         bounds: lowest and highest value, numbers or functions of the robot.
-        size: "one" number, one per "cable", a "vector" of 3, or a "point" (3 per cable); what
-            a cable has of its own acts on that cable alone.
+        size: "one" number, one per "cable" on a winch or per "spring" (cables and passive lines,
+            but those of constant tension), a "vector" of 3, or a "point" (3 per line); what a
+            cable has of its own acts on that cable alone. The effect's array has one for every
+            line, null for those without.
         shape: the number only shapes the effect (a time constant, a period): it means nothing
             while the others are null, and the effect says with ``shapes`` where to look.
 
@@ -219,6 +227,29 @@ class Effect:
         return [{}]
 
 
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A field of an effect: the places (k,) that are parameters, of ``width`` with null values."""
+
+    name: str
+    size: str
+    places: NDArray[np.intp]
+    width: int
+    null: float
+
+    @property
+    def count(self) -> int:
+        return len(self.places)
+
+    def whole(self, values: Array) -> Array:
+        """The field's array (width,) with these parameters (k,)."""
+        if self.count == self.width:
+            return values.copy()
+        out = np.full(self.width, self.null)
+        out[self.places] = values
+        return out
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Layout:
     """An effect's parameters for one robot, as one flat vector.
@@ -237,7 +268,7 @@ class Layout:
     upper: Array
     scale: Array
     shape: np.ndarray
-    _parts: tuple[tuple[str, int, str], ...]
+    _parts: tuple[_Part, ...]
 
     @classmethod
     def of(cls, effect: type[Effect], robot: Robot) -> Layout:
@@ -247,7 +278,10 @@ class Layout:
         for item in fields(effect):
             meta = item.metadata
             suffix = f"_{meta['unit']}" if meta["unit"] else ""
-            endings = _SIZES[meta["size"]](robot.n_cables)
+            every = _SIZES[meta["size"]](robot.n_cables)
+            have = _HAVE.get(meta["size"])
+            places = np.arange(len(every)) if have is None else np.flatnonzero(have(robot))
+            endings = [every[k] for k in places]
             given = (meta["null"], *meta["bounds"], meta["scale"])
             numbers = [float(one(robot) if callable(one) else one) for one in given]
             # a shape starts where it may be: bounds go with the robot's size
@@ -255,7 +289,7 @@ class Layout:
                 numbers[0] = min(max(numbers[0], numbers[1]), numbers[2])
             own = (meta["unit"], *numbers, meta["shape"])
             rows += [(f"{item.name}{ending}{suffix}", *own) for ending in endings]
-            parts.append((item.name, len(endings), meta["size"]))
+            parts.append(_Part(item.name, meta["size"], places, len(every), numbers[0]))
         columns: list[Any] = list(zip(*rows, strict=True)) or [()] * 7
         names, units, *values, shape = columns
         null, lower, upper, scale = (np.array(value, float) for value in values)
@@ -275,38 +309,39 @@ class Layout:
 
     def count(self, field: str) -> int:
         """How many numbers a field of the effect has."""
-        return next(count for name, count, _size in self._parts if name == field)
+        return next(part.count for part in self._parts if part.name == field)
 
     @property
     def cable_by_cable(self) -> list[NDArray[np.intp]]:
         """Parameters that every cable has one of, in their order: one (m,) index array each."""
         out, first = [], 0
-        for _name, count, size in self._parts:
-            apart = {"cable": 1, "point": len(_AXES)}.get(size, 0)
-            out += [np.arange(first + k, first + count, apart) for k in range(apart)]
-            first += count
+        for part in self._parts:
+            apart = {"cable": 1, "spring": 1, "point": len(_AXES)}.get(part.size, 0)
+            if part.count == part.width:
+                out += [np.arange(first + k, first + part.count, apart) for k in range(apart)]
+            first += part.count
         return out
 
     @property
     def groups(self) -> dict[str, tuple[str, ...]]:
         """Names of the components of each parameter that has several, by its own: ``shift_m``."""
         out, first = {}, 0
-        for name, count, size in self._parts:
-            unit = self.units[first]
-            if size != "one":
-                key = f"{name}_{unit}" if unit else name
-                out[key] = self.names[first : first + count]
-            first += count
+        for part in self._parts:
+            if part.size != "one" and part.count:
+                unit = self.units[first]
+                key = f"{part.name}_{unit}" if unit else part.name
+                out[key] = self.names[first : first + part.count]
+            first += part.count
         return out
 
     def build(self, vector: Array) -> Effect:
         """The effect with these parameters."""
         values: dict[str, Any] = {}
         first = 0
-        for name, count, size in self._parts:
-            part = np.asarray(vector[first : first + count], float)
-            values[name] = float(part[0]) if size == "one" else part.copy()
-            first += count
+        for part in self._parts:
+            own = np.asarray(vector[first : first + part.count], float)
+            values[part.name] = float(own[0]) if part.size == "one" else part.whole(own)
+            first += part.count
         return self.effect(**values)
 
     def vector_of(self, effect: Effect) -> Array:
@@ -316,27 +351,29 @@ class Layout:
             InputError: something else than numbers, or another number of them.
         """
         vector, first = self.null.copy(), 0
-        for name, count, _size in self._parts:
-            value = getattr(effect, name)
+        for part in self._parts:
+            value = getattr(effect, part.name)
             if value is not None:
-                array = numbers(value, f"effect {self.name}: {name}").ravel()
-                if len(array) != count:
+                array = numbers(value, f"effect {self.name}: {part.name}").ravel()
+                if len(array) == part.width:  # passive lines have no parameter
+                    array = array[part.places]
+                if len(array) != part.count:
                     raise InputError(
-                        f"effect {self.name}: {name}: expected {counted(count, 'number')}, got "
-                        f"{len(array)}"
+                        f"effect {self.name}: {part.name}: expected "
+                        f"{counted(part.count, 'number')}, got {len(array)}"
                     )
-                vector[first : first + count] = array
-            first += count
+                vector[first : first + part.count] = array
+            first += part.count
         return vector
 
     def start(self, shape: dict[str, float]) -> Array:
         """Null values, with the shape parameters set."""
         vector = self.null.copy()
         first = 0
-        for name, count, _size in self._parts:
-            if name in shape:
-                vector[first : first + count] = shape[name]
-            first += count
+        for part in self._parts:
+            if part.name in shape:
+                vector[first : first + part.count] = shape[part.name]
+            first += part.count
         return vector
 
 

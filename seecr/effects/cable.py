@@ -1,4 +1,4 @@
-"""Tension from stretch."""
+"""Tension from stretch, of the winches' ropes: passive lines are of another make."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def usual_strain(robot: Robot) -> float:
 
     The pretension is the median over the cables at the reference pose, as the robot is described.
     """
-    stretched = float(np.median(robot.reference_lengths / robot.rest_lengths - 1.0))
-    return max(0.5 * robot.usual_load / float(np.mean(robot.ea)), stretched, 1e-9)
+    stretched = np.median((robot.reference_lengths / robot.rest_lengths - 1.0)[robot.typical])
+    return max(0.5 * robot.usual_load / robot.mean_ea, float(stretched), 1e-9)
 
 
 def usual_stretch(robot: Robot) -> float:
@@ -39,7 +39,8 @@ def _heaviest(robot: Robot) -> float:
 class Stiffness(Effect):
     """All cables are stiffer than assumed by one factor: E S -> factor E S (paper, eq 10).
 
-    Above 1: stiffer.
+    Above 1: stiffer. Of the winches' ropes; a passive spring is of another make, see
+    ``cable_stiffness``.
     """
 
     name: ClassVar[str] = "stiffness"
@@ -53,10 +54,10 @@ class Stiffness(Effect):
     factor: float = parameter("", 0.3, null=1.0, bounds=(0.02, 50.0))
 
     def edit_setup(self, setup: Setup) -> None:
-        setup.ea = setup.ea * self.factor
+        setup.ea = np.where(setup.robot.driven, setup.ea * self.factor, setup.ea)
 
     def totals(self, robot: Robot) -> dict[str, Total]:
-        ea = float(np.mean(robot.ea))
+        ea = robot.mean_ea
         return {"ea": Total(self.factor * ea, ea, "N", lower=0.0)}
 
 
@@ -64,7 +65,7 @@ class Stiffness(Effect):
 class CableStiffness(Effect):
     """Each cable is stiffer than assumed by a factor of its own: E S_i -> factor_i E S_i.
 
-    Above 1: stiffer (paper, eq 10).
+    Above 1: stiffer (paper, eq 10). Passive springs have one, too.
     """
 
     name: ClassVar[str] = "cable_stiffness"
@@ -76,7 +77,7 @@ class CableStiffness(Effect):
         "being {largest:.3f} ({which}): E S = {total:.4g} N, not {total_nominal:.4g}"
     )
 
-    factor: Array = parameter("", 0.2, null=1.0, bounds=(0.02, 50.0), size="cable")
+    factor: Array = parameter("", 0.2, null=1.0, bounds=(0.02, 50.0), size="spring")
 
     def edit_setup(self, setup: Setup) -> None:
         setup.ea = setup.ea * self.factor
@@ -85,6 +86,7 @@ class CableStiffness(Effect):
         return {
             f"factor_{i + 1}": Total(float(factor * ea), float(ea), "N", lower=0.0)
             for i, (ea, factor) in enumerate(zip(robot.ea, self.factor, strict=True))
+            if ea > 0.0
         }
 
 
@@ -118,7 +120,7 @@ class NonlinearElasticity(Effect):
 
     def totals(self, robot: Robot) -> dict[str, Total]:
         # the slope of the tension where cables usually work: they do not push when pulled
-        strain, ea = usual_strain(robot), float(np.mean(robot.ea))
+        strain, ea = usual_strain(robot), robot.mean_ea
         slope = 1.0 + 2.0 * self.quadratic * strain + 3.0 * self.cubic * strain**2
         return {"slope": Total(slope * ea, ea, "N", lower=0.0)}
 

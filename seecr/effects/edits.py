@@ -63,6 +63,7 @@ def edit_setup(effect: Effect, setup: Setup) -> None:
     first = len(setup.laws)
     if is_built_in(type(effect)):
         effect.edit_setup(setup)
+        setup.spare_passive()
         return
     setup.own()  # ours put arrays anew; nothing says that others do
     with _told(effect, "edit_setup"):
@@ -75,6 +76,7 @@ def edit_setup(effect: Effect, setup: Setup) -> None:
                 f"effect {effect.name} leaves setup.{name} of shape {value.shape}; expected {shape}"
             )
     setup.laws[first:] = [_checked_law(law, effect.name) for law in setup.laws[first:]]
+    setup.spare_passive()
 
 
 def edit_readings(effect: Effect, readings: Readings, setup: Setup) -> None:

@@ -1,11 +1,12 @@
-"""Where the cable runs, and what holds the exit points."""
+"""Where the cable runs, and what holds the exit points.
+
+Points may be those of passive lines; pulleys, and the frame that yields, are of winches alone.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import ClassVar
-
-import numpy as np
 
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect, OfRobot, Total, mean_length, of_length, parameter
@@ -103,7 +104,7 @@ def _points(nominal: Array, error: Array) -> dict[str, Total]:
 # A frame that yields a third as much as its cables stretch.
 _PLAUSIBLE = OfRobot(
     "0.3 x the mean cable length / the mean E S",
-    lambda robot: 0.3 * mean_length(robot) / float(np.mean(robot.ea)),
+    lambda robot: 0.3 * mean_length(robot) / robot.mean_ea,
 )
 
 

@@ -50,6 +50,7 @@ class Quantity:
     entry: int | None
     paid_out: bool
     history: History
+    of_winches: bool
 
     def shape_of(self, robot: Robot, rows: int) -> tuple[int, ...]:
         """The shape for a robot and a number of rows."""
@@ -73,6 +74,7 @@ def quantity(
     entry: int | None = None,
     paid_out: bool = False,
     history: History = History.NONE,
+    of_winches: bool = True,
 ) -> Any:
     """A field of :class:`Setup` that effects can edit.
 
@@ -85,8 +87,11 @@ def quantity(
         entry: where in the load of a pose it goes, as it is.
         paid_out: it reaches the statics through the rest lengths alone.
         history: whether it makes rows depend on the rows before.
+        of_winches: if each cable has one, it is of winches and their ropes: passive lines keep the
+            plain value, whatever an effect says. What yields at their ends is in their stiffness.
     """
-    item = Quantity(what, unit, shape, plain, column, entry, paid_out, history)
+    of_winches &= "cables" in shape
+    item = Quantity(what, unit, shape, plain, column, entry, paid_out, history, of_winches)
     return field(metadata={"quantity": item})
 
 
@@ -106,11 +111,11 @@ class Setup:
     commands: Commands
     exit_points: Array = quantity(
         "where they really are, base frame", "m", ("cables", 3), "exit_points",
-        column=columns.EXIT,
+        column=columns.EXIT, of_winches=False,
     )  # fmt: skip
     anchor_points: Array = quantity(
         "where they really are, platform frame", "m", ("cables", 3), "anchor_points",
-        column=columns.ANCHOR,
+        column=columns.ANCHOR, of_winches=False,
     )  # fmt: skip
     zero_pose: Array = quantity(
         "where the platform really was when the winches were zeroed", "m", (7,),
@@ -131,7 +136,7 @@ class Setup:
     backlash: Array = quantity(
         "play between motor and drum", "m", ("cables",), paid_out=True, history=History.GIVES
     )
-    ea: Array = quantity("E S", "N", ("cables",), "ea", column=columns.EA)
+    ea: Array = quantity("E S", "N", ("cables",), "ea", column=columns.EA, of_winches=False)
     quadratic: Array = quantity(
         "of the elastic law, T = E S (eps + quadratic eps^2 + cubic eps^3)", "", ("cables",),
         column=columns.QUADRATIC,
@@ -193,18 +198,29 @@ class Setup:
 
         At the reference pose the winches were zeroed with the cables as they really ran there;
         elsewhere the paid-out length has moved by the commanded change. To absolute lengths no
-        reference applies.
+        reference applies. Passive lines have that of the description, whatever is commanded.
         """
         told = self.commanded_change
         if self.backlash.any():
             told = play(told, self.commands.starts, 0.5 * self.backlash, self.commands.passed)
         paid = told * (1.0 + self.length_gain) + self.extra_length
-        if self.commands.absolute:
-            return paid * self.length_factor
         robot = self.robot
-        pretension = robot.rest_lengths - robot.reference_lengths
-        zero = self.geometric_lengths(self.zero_pose[None])
-        return (zero + pretension + paid) * self.length_factor
+        if not self.commands.absolute:
+            pretension = robot.rest_lengths - robot.reference_lengths
+            paid = self.geometric_lengths(self.zero_pose[None]) + pretension + paid
+        lengths = paid * self.length_factor
+        return lengths if robot.all_driven else np.where(robot.driven, lengths, robot.rest_lengths)
+
+    def spare_passive(self) -> None:
+        """Give passive lines the plain values of what is of winches and their ropes."""
+        if self.robot.all_driven:
+            return
+        plain = _plain_values(self.robot, len(self.commands))
+        driven = self.robot.driven
+        for name, item in QUANTITIES.items():
+            value = getattr(self, name)
+            if item.of_winches and value is not plain[name]:
+                setattr(self, name, np.where(driven, value, plain[name]))
 
     def carried(self) -> tuple[Array, Array]:
         """Mass (n,) [kg] and centre of mass (n, 3) [m] of the platform with its known payloads."""

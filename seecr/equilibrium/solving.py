@@ -24,6 +24,7 @@ from seecr.pose import Array
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.statics.solution import Solution
 from seecr.statics.starts import Commanded, HasCommands, commanded_poses, poses_from_lengths
+from seecr.tensions.passive import with_passive
 
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects
@@ -56,9 +57,9 @@ def solve(
             pretension these are then the straight lengths (eqs 1, 2). Or :class:`seecr.Commands`
             with runs, times or lengths, or ``crosscheck.Measurements``, of which only the commands
             count.
-        rest_lengths: (n, m) or (m,) [m] absolute lengths instead of poses. Poses given as well are
-            only where the search starts; by default it starts at the poses whose straight lengths
-            fit these best, found from the reference pose.
+        rest_lengths: (n, m) or (m,) [m] absolute lengths of the driven cables instead of poses.
+            Poses given as well are only where the search starts; by default it starts at the poses
+            whose straight lengths fit these best, found from the reference pose.
         effects: how the robot differs from the paper's model: a model, its file, or effects with
             values. If one has a history, rows are solved in order.
         method: ``"newton"`` is the compiled Newton descent on the potential energy; ``"fsolve"``
@@ -160,9 +161,10 @@ def _commands(
             raise InputError("solve needs commanded poses (n, 7) or rest_lengths (n, m); got none")
         return Commands(commanded_poses(poses, robot=robot))
     table = np.atleast_2d(finite(lengths, "rest_lengths"))
+    table = _with_passive(robot, table)
     if table.ndim != 2 or table.shape[1] != robot.n_cables:
         raise InputError(
-            f"rest_lengths must be (n, {robot.n_cables}) for {robot.name}, got {np.shape(lengths)}"
+            f"rest_lengths must be (n, {robot.n_driven}) for {robot.name}, got {np.shape(lengths)}"
         )
     if np.any(table <= 0):
         raise InputError("rest_lengths must be positive [m]")
@@ -174,6 +176,23 @@ def _commands(
         )
     rows = np.broadcast_to(start, (len(table), 7)).copy()
     return Commands(rows, lengths=table)
+
+
+def _with_passive(robot: Robot, table: Array) -> Array:
+    """Lengths with those of the passive lines, (n, m), of the driven cables' (n, k) or of all's.
+
+    Raises:
+        InputError: another length for a passive line than that of its description.
+    """
+    if robot.all_driven or table.ndim != 2 or table.shape[1] != robot.n_cables:
+        fits = table.ndim == 2 and table.shape[1] == robot.n_driven
+        return with_passive(robot, table) if fits else table
+    if not np.allclose(table[:, ~robot.driven], robot.rest_lengths[~robot.driven], 1e-12, 0.0):
+        raise InputError(
+            f"rest_lengths: no winch drives {', '.join(robot.passive_names)}, so they stay as they "
+            f"are; expected (n, {robot.n_driven}) lengths, of the other cables"
+        )
+    return table
 
 
 def _gravity(values: ArrayLike) -> Array:
@@ -209,7 +228,7 @@ def strained_rows(solution: Solution) -> tuple[str, ...]:
     """
     known = np.isfinite(solution.tensions).all(axis=1)
     robot, rests = solution.robot, np.flatnonzero(solution.converged & known)
-    strains = solution.evaluation.states[rests, :, STRAIN]
+    strains = solution.evaluation.states[rests, :, STRAIN] * robot.driven
     if not np.any(strains >= _ODD) or strained(robot):
         return ()
     at = int(np.argmax(strains.max(axis=1)))
@@ -237,8 +256,11 @@ def _strains(robot: Robot) -> Array:
 
     A hanging platform that is drawn too low rises until its cables are not strained.
     """
-    drawn = robot.reference_lengths / robot.rest_lengths - 1.0
+    driven = robot.driven  # bands and springs may stretch
+    drawn = np.where(driven, robot.reference_lengths / robot.rest_lengths - 1.0, 0.0)
     home = solve(robot, robot.reference_pose)
     if not home.converged[0]:
         return np.asarray(drawn)
-    return np.asarray(np.maximum(drawn, home.tensions[0] * robot.falls / robot.ea))
+    pulls = home.tensions[0] * robot.falls
+    strain = np.divide(pulls, robot.ea, out=np.zeros_like(robot.ea), where=driven)
+    return np.asarray(np.maximum(drawn, strain))

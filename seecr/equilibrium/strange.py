@@ -58,13 +58,14 @@ def _wide(robot: Robot) -> tuple[str, ...]:
 
 def _elsewhere(robot: Robot) -> tuple[str, ...]:
     """Rest lengths that are those of another pose than the reference."""
-    apart = robot.reference_lengths - robot.rest_lengths
+    # bands and springs may stretch
+    apart = np.where(robot.driven, robot.reference_lengths - robot.rest_lengths, 0.0)
     if float(np.max(np.abs(apart) / robot.rest_lengths)) <= _BREAKS:
         return ()
     home = robot.reference_pose[None]
     fitting = poses_from_lengths(robot, Commands(home, lengths=robot.rest_lengths[None]))
     assert fitting is not None
-    left = robot.nominal_lengths(fitting)[0] - robot.rest_lengths
+    left = (robot.nominal_lengths(fitting)[0] - robot.rest_lengths)[robot.driven]
     if np.linalg.norm(left) > _EXPLAINED * np.linalg.norm(apart):
         return ()
     there, place = fitting[0, :3], robot.reference_pose[:3]

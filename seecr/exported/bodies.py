@@ -16,6 +16,7 @@ import numpy as np
 
 from seecr.compiled.columns import UP
 from seecr.description.joints import values_of_pose
+from seecr.description.passive import write_pull
 from seecr.description.robot import Robot
 from seecr.description.scene import cable, dot, numbers_text, scene, text_of
 from seecr.effects.setup import Setup
@@ -195,6 +196,8 @@ def bodies_text(setup: Setup, solution: Solution, comment: str) -> str:
     root.append(tendons)
     take_steps(root, max(one.rate() for one in cables), any(one.chain for one in cables))
     _push(root, world, body, setup.wrench[0])
+    for i in np.flatnonzero(robot.constant_tension_N):
+        write_pull(root, robot.cable_names[i], float(robot.constant_tension_N[i]))
     rest = solution.pose[0]
     if robot.joints:
         rest = values_of_pose(robot, solution.pose)[0][0]
@@ -236,7 +239,8 @@ class _Cable:
         self.radius = float(setup.pulley_radius[i])
         self.sideways = float(setup.compliance[i])
         upwards = self.sideways + float(setup.lift[i])
-        self.series = float(setup.winch_side[i]) / self.ea
+        self.pushes = bool(setup.robot.pushes[i])
+        self.series = float(setup.winch_side[i]) / self.ea if self.ea > 0.0 else 0.0
         self.yields: list[tuple[Array, float]] = []
         if self.radius > 0.0:
             self.series += self.sideways
@@ -296,6 +300,7 @@ class _Cable:
                 tendons, name if self.chain is None else f"{name}-{j + 1}",
                 [*start, ("site", {"site": point})], rest,
                 curved if any(self.law[1:]) else curved[:1], 0.01 * self.robot.length,
+                self.pushes,
             )  # fmt: skip
         return self.at_rest
 
@@ -305,7 +310,7 @@ class _Cable:
         Springs of joints do not count: they are linear, so that no step is too long for them.
         """
         carried = [self.small] if self.yields or self.series > 0.0 else []
-        own, strain = self.length, np.array([self.tension / self.ea])
+        own, strain = self.length, np.array([self.tension / self.ea if self.ea > 0.0 else 0.0])
         if self.chain is not None:
             carried.append(self.chain.between / self.gravity)
             own, strain = self.free / SEGMENTS, self.chain.strain

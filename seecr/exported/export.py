@@ -205,6 +205,8 @@ class Export(Result):
         if self.bodies:
             alone = " alone" if mujoco_name.endswith("MuJoCo") else ", for MuJoCo alone,"
             yield f"{mujoco_name}{alone} also contains {', '.join(self.bodies)}"
+        if self.robot.constant_tension_N.any():
+            yield f"{mujoco_name} has an actuator for each constant tension, which is no spring"
         if "cable_weight" in self.bodies:
             yield (
                 f"  cables hang as {SEGMENTS} springs with masses between: as catenaries do at "
@@ -295,7 +297,7 @@ def _sorted(
 
 def _rest(robot: Robot, said: Expressed, pose: np.ndarray) -> Solution | None:
     """The equilibrium with all that the files hold; None if one file holds it all."""
-    if not said.bodies:
+    if not (said.bodies or robot.constant_tension_N.any()):
         return None
     solution = solve(robot, pose, effects=_inside(said))
     if not solution.converged[0]:

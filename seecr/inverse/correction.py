@@ -29,15 +29,23 @@ from seecr.result import COORDINATES, MOTION, Record, Result, named, rows_of
 from seecr.statics.solution import Solution
 from seecr.statics.starts import Commanded, commands_from
 from seecr.statics.tables import Tables, assemble, spanless, take
-from seecr.tensions.balance import bends, bridged_lengths, is_straight, least_of_heavy
+from seecr.tensions.balance import (
+    bends,
+    bridged_lengths,
+    is_straight,
+    least_of_heavy,
+    with_rest,
+)
 from seecr.tensions.distribution import (
     SAFE,
+    of_driven,
     tension_limits,
     wanted_tensions,
     why_not_held,
     without_span,
 )
 from seecr.tensions.max_margin import balances, counted_balance, holds_tightly
+from seecr.tensions.passive import driven_tables, with_passive
 from seecr.tensions.rest_lengths import Held, hold, holds_stably
 from seecr.units import millimetres, without_rounding
 
@@ -65,7 +73,7 @@ class Correction(Result):
         wanted: (n, 7).
         aimed: (n, 7) the wanted poses if they can be held, else the nearest that can.
         lengths: (n, m) [m] to command, as told lengths: at the reference pose they are the rest
-            lengths of the description.
+            lengths of the description, and for passive lines everywhere.
         held: (n,) bool, tensions within the limits can hold the wanted pose.
         found: (n,) bool, there are lengths for the wanted pose or for the nearest that can be held.
         settled: (n,) bool, ``aimed`` is the wanted pose itself, or meets the first-order conditions
@@ -158,7 +166,7 @@ class Correction(Result):
 
     def _tensions(self, rows: NDArray[np.bool_]) -> str:
         """The least and the largest tension of some poses."""
-        pulls = self.solution.tensions[rows]
+        pulls = self.solution.tensions[rows][:, self.robot.driven]
         return f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N"
 
     def place(self, row: int) -> str:
@@ -174,7 +182,8 @@ class Correction(Result):
                 f"at most {100.0 * self.strain_limit:g} %"
             )
         states = self.solution.evaluation.states
-        strains = np.where(self.found, states[..., STRAIN].max(axis=1), 0.0)
+        pulled = states[:, self.robot.driven, STRAIN].max(axis=1)
+        strains = np.where(self.found, pulled, 0.0)
         beyond = strains > _STRAIN * (1.0 + 1e-6)
         if np.any(beyond):
             k, many = int(np.argmax(strains)), int(beyond.sum())
@@ -194,11 +203,11 @@ class Correction(Result):
 
     def records(self) -> list[Record]:
         """One row per pose: wanted pose, lengths, remaining error, tensions."""
-        cables = self.robot.cable_names
+        cables, driven = self.robot.cable_names, np.flatnonzero(self.robot.driven)
         return rows_of(
             {
                 **named("want_{}", COORDINATES, self.wanted),
-                **named("length_{}_m", [str(k + 1) for k in range(len(cables))], self.lengths),
+                **named("length_{}_m", [str(k + 1) for k in driven], self.lengths[:, driven]),
                 "held": self.held,
                 "reached": self.reached,
                 "why_not": self.why_not,
@@ -322,12 +331,12 @@ def _search_of(
     if given.lengths is not None:
         raise InputError("correct needs wanted poses (n, 7); got lengths")
     low, high = tension_limits(robot, lowest, highest)
-    # an aim is of the line, as limits are
-    wanted = wanted_tensions(aim, low / robot.falls, high / robot.falls, also=(SAFE,))
-    target = robot.falls * wanted
+    given_aim = aim if isinstance(aim, str) else of_driven(robot, np.asarray(aim, float))
+    falls = robot.falls[robot.driven]  # an aim is of the line, as limits are
+    target = falls * wanted_tensions(given_aim, low / falls, high / falls, also=(SAFE,))
     if target.ndim == 2 and len(target) != len(given):
         raise InputError(f"aim must have {counted(len(given), 'row')}, got {len(target)}")
-    limits = _Limits(np.broadcast_to(target, (len(given), robot.n_cables)), low, high)
+    limits = _Limits(np.broadcast_to(target, (len(given), len(low))), low, high)
     model = model_given(effects, robot) if isinstance(effects, Model | str | Path) else None
     safe = model if isinstance(aim, str) and aim == SAFE else None
     acting = effects_of(effects if model is None else model, robot)
@@ -336,6 +345,8 @@ def _search_of(
 
 @dataclass(frozen=True, eq=False)
 class _Limits:
+    """Aim (n, k) and limits (k,) or (n, k) [N] of the driven cables."""
+
     aim: Array
     low: Array
     high: Array
@@ -432,7 +443,8 @@ class _Search:
         if len(lost) == 0:
             return tuple(out)
         some = take(tables, lost)
-        weighs, names = least_of_heavy(some), self.robot.cable_names
+        weighs, robot = least_of_heavy(some), self.robot
+        names = [robot.cable_names[i] for i in np.flatnonzero(robot.driven)]
         gone, pulleys = spanless(some), some.cables[..., RADIUS] > 0.0
         for k in np.flatnonzero(gone.any(axis=1)):
             out[lost[k]] = without_span(gone[k], pulleys[k], names)
@@ -444,7 +456,11 @@ class _Search:
         return tuple(out)
 
     def _tables(self, commands: Commands) -> Tables:
-        """Tables at the commanded poses; their rest lengths do not matter."""
+        """Tables of the driven cables at the commanded poses; rest lengths do not matter."""
+        return driven_tables(self._whole_tables(commands), self.robot)
+
+    def _whole_tables(self, commands: Commands) -> Tables:
+        """Those of all lines."""
         plain = self.robot.commanded_lengths(commands.pose)
         trial = replace(commands, lengths=plain, told=True)
         return assemble(Experiment(self.robot, trial).setup(self.effects))
@@ -475,11 +491,16 @@ class _Search:
 
         def stays(poses: Array, some: NDArray[np.intp]) -> NDArray[np.bool_]:
             there = at(poses, some)
-            tables = self._tables(there)
-            spans = bridged_lengths(tables)
+            whole = self._whole_tables(there)
+            tables = driven_tables(whole, self.robot)
+            spans = bridged_lengths(whole)
             told = commanded_lengths(self.robot, there, self.effects, spans)
             shortest = np.minimum(spans, np.nan_to_num(told, nan=np.inf)).min(axis=1)
-            stable = holds_stably(tables, limits.aim[rows[some]], *ends)
+
+            def held(rest: Array) -> Tables:
+                return with_rest(whole, with_passive(self.robot, rest))
+
+            stable = holds_stably(tables, limits.aim[rows[some]], *ends, held)
             return np.asarray(stable & (shortest > least))
 
         def holds(poses: Array, some: NDArray[np.intp]) -> NDArray[np.bool_]:
@@ -488,7 +509,7 @@ class _Search:
         return NearestProblem.within(
             self.robot, self.given.pose[rows], balance, stays, ends, scale[rows],
             fix_position=fix_position, straight=own if straight else None,
-            holds=holds if bends(own) and self.robot.n_cables >= self.robot.n_dof else None,
+            holds=holds if bends(own) and self.robot.n_driven >= self.robot.n_dof else None,
         )  # fmt: skip
 
     def _nearest(self, rows: NDArray[np.intp], scale: Array, fix_position: bool) -> Nearest:

@@ -42,7 +42,8 @@ def poses_in_place(
     Full searches, where no straight cable and no neighbour leads to one, are for ``thorough`` ones.
     """
     turned = turned_in_place(problem.robot, tables, problem.least, problem.most)
-    if not np.any(tables.cables[..., [RADIUS, WEIGHT, LIFT]]):
+    straight = not np.any(tables.cables[..., [RADIUS, WEIGHT, LIFT]])
+    if straight and problem.robot.all_driven:  # what passive lines pull changes as it turns
         return turned.poses, turned.found
     best, rows = Best.none(problem), np.arange(len(problem.wanted))
     _try_all(best, np.zeros((len(rows), problem.robot.n_dof)), rows)
@@ -139,7 +140,7 @@ def turned_in_place(robot: Robot, tables: Tables, low: Array, high: Array) -> Tu
     _search_all(out, near, np.ones(n, dtype=bool), _STARTS)
     _improve(out, near[:, :0])
     _spread(out, near, np.flatnonzero(out.found))  # again, from farther inside
-    if robot.n_cables + freedoms(robot)[1] > robot.n_dof + 1:
+    if robot.n_driven + freedoms(robot)[1] > robot.n_dof + 1:
         # each orientation is one of many, and some of these are cut off by the limits
         _search_all(out, near, np.any(out.found[near], axis=1), _MORE)
     _improve(out, near)

@@ -19,6 +19,7 @@ from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.pose import Array, changes_between
 from seecr.prediction.experiment import Experiment, Prediction
+from seecr.tensions.passive import driven_tables, with_passive
 from seecr.tensions.rest_lengths import Held, hold_again
 
 REACHED = 1e-6
@@ -59,8 +60,8 @@ def lengths_with_history(
     """Lengths to command (n, m) [m] that hold the poses, and the prediction with them.
 
     If the rounds do not converge, those of the round that misses fewest poses are taken. Without
-    history and users' laws they are those of ``held`` at once. ``limits`` are aim and limits of
-    :func:`seecr.tensions.rest_lengths.hold_again`.
+    history and users' laws they are those of ``held`` at once, which is of the driven cables.
+    ``limits`` are aim and limits of :func:`seecr.tensions.rest_lengths.hold_again`.
     """
     size = np.where(np.arange(6) < 3, 1.0 / robot.length, 1.0)
     before, part = np.zeros_like(held.rest), np.ones(len(held.rest))
@@ -68,7 +69,7 @@ def lengths_with_history(
     least, best = (np.inf, np.inf), None
     farthest, improved = 0, 0
     for number in range(_MOST):
-        told = commanded_lengths(robot, commands, effects, held.rest)
+        told = commanded_lengths(robot, commands, effects, with_passive(robot, held.rest))
         prediction = Experiment(robot, replace(commands, lengths=told, told=True)).predict(effects)
         if not (prediction.has_history or prediction.setup.laws):
             return told, prediction
@@ -83,7 +84,8 @@ def lengths_with_history(
         if left[1] <= _enough(late, robot) or number + 1 >= max(_ROUNDS, improved + _PATIENCE):
             break
         last, given = held.rest, late and (number - _LATE) // _TURNS % 2 == 0
-        held = hold_again(prediction.tables, held, *limits, follows=not given)
+        tables = driven_tables(prediction.tables, robot)
+        held = hold_again(tables, held, *limits, follows=not given)
         change, size_now = held.rest - last, np.full(len(held.rest), np.inf)
         if late and not given:
             size_now = np.abs(change).max(axis=1)
@@ -145,7 +147,7 @@ def commanded_lengths(
         if change <= 1e-15 * float(np.max(np.abs(told), initial=0.0)) or change >= last:
             break
         last = change if change < 1e-9 else np.inf
-    return told
+    return told if robot.all_driven else np.where(robot.driven, told, robot.rest_lengths)
 
 
 def unplay(wanted: Array, starts: NDArray[np.bool_], half_width: Array) -> Array:

@@ -28,7 +28,9 @@ _PARTS = np.linspace(1.0, 0.1, 10)
 def safe_margins(
     robot: Robot, commands: Commands, model: Model, prediction: Prediction
 ) -> Array | None:
-    """Margins (n, m) [N] that keep tensions within limits; None if the model has no covariance.
+    """Margins (n, k) [N] that keep tensions within limits; None if the model has no covariance.
+
+    They are of the k driven cables, with all falls of their lines.
 
     Each is so many standard errors of the tension that by Bonferroni's inequality all cables stay
     inside with the probability above, and what hysteresis may add if a pose is reached another way.
@@ -40,8 +42,9 @@ def safe_margins(
     spread = spread_of(robot, replace(commands, lengths=lengths), model)
     if spread is None:
         return None
-    times = NormalDist().inv_cdf(1.0 - (1.0 - _SAFE) / robot.n_cables)
-    margins = times * spread.tensions + prediction.tables.cables[..., HYSTERESIS]
+    times = NormalDist().inv_cdf(1.0 - (1.0 - _SAFE) / robot.n_driven)
+    margins = times * robot.falls * spread.tensions + prediction.tables.cables[..., HYSTERESIS]
+    margins = margins[:, robot.driven]
     margins[lost] = np.nan
     return margins
 
@@ -49,11 +52,11 @@ def safe_margins(
 def narrowed(
     tables: Tables, aim: Array, limits: tuple[Array, Array], margins: Array, rows: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
-    """Limits (n, m) [N] that are narrower by these margins, or the largest part of them that holds.
+    """Limits (n, k) [N] that are narrower by these margins, or the largest part of them that holds.
 
     Args:
-        tables: of n poses. aim: (n, m) tensions. limits: (m,) or (n, m).
-        margins: (n, m). rows: (n,) which poses can be held.
+        tables: of n poses, of the driven cables. aim: (n, k) tensions. limits: (k,) or (n, k).
+        margins: (n, k). rows: (n,) which poses can be held.
     """
     low, high = (np.array(np.broadcast_to(one, margins.shape)) for one in limits)
     left = np.flatnonzero(rows & np.isfinite(margins).all(axis=1) & margins.any(axis=1))

@@ -279,7 +279,7 @@ def length_sensitivities(at: Prediction) -> Array:
 
     def change(at: Prediction) -> Array:
         still = np.zeros((at.pulls.shape[1], 3))
-        longer = np.ones_like(at.pulls)
+        longer = np.ones_like(at.pulls) * at.setup.robot.driven  # others stay as long
         by_cable = wrench_by_ends(cable_rates(at), at.pose, still, still, longer)
         return _response_to_wrench(at, *by_cable)
 

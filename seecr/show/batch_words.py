@@ -141,7 +141,7 @@ def chance_lines(
             f"below {_LIKELY:g} at {many} of {'' if all_of_them else 'the '}{len(at)} reached"
         )
         # without more cables than degrees of freedom there is nothing to distribute
-        if minimum and many and found.robot.n_cables > found.robot.n_dof:
+        if minimum and many and found.robot.n_driven > found.robot.n_dof:
             yield (
                 "  --aim minimum puts a cable at its lowest tension, where it stays within the "
                 f"limits with about 0.5; --aim middle{'' if limited else ' with --highest'} "

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from seecr.columns.commands import CommandFile
 from seecr.columns.csv import table_text
 from seecr.commands import Commands, Loads
+from seecr.description.robot import Robot
 from seecr.files import written
 from seecr.inverse.correction import Correction
 from seecr.pose import Array
@@ -132,7 +133,7 @@ class SweepRows:
         if self.lengths is None:
             columns |= _named("cmd_{}", COORDINATES, found.command)
         else:
-            columns |= _named("length_{}_m", cables, self.lengths)
+            columns |= _lengths(found.robot, self.lengths)
         if self.wanted is not None:
             columns |= _named("want_{}", COORDINATES, self.wanted)
         columns |= load_columns(self.loads)
@@ -175,6 +176,12 @@ def _named(pattern: str, names: Sequence[str], values: Array) -> dict[str, Seque
     return {pattern.format(name): column for name, column in columns}
 
 
+def _lengths(robot: Robot, lengths: Array) -> dict[str, Sequence[Any]]:
+    """Columns of the commanded lengths (n, m); passive lines have none."""
+    driven = np.flatnonzero(robot.driven)
+    return _named("length_{}_m", [str(k + 1) for k in driven], lengths[:, driven])
+
+
 _WANT = [f"want_{name}" for name in COORDINATES]
 
 
@@ -186,7 +193,7 @@ def corrected_csv(found: Correction, wanted: CommandFile) -> str:
     """
     columns: dict[str, Sequence[object] | Array] = dict(wanted.conditions)
     columns |= dict(zip(_WANT, found.wanted.T, strict=True))
-    columns |= {f"length_{k + 1}_m": one for k, one in enumerate(found.lengths.T)}
+    columns |= _lengths(found.robot, found.lengths)
     columns |= load_columns(wanted.commands.loads)
     kept = np.flatnonzero(found.found).tolist()
     return table_text({name: [one[i] for i in kept] for name, one in columns.items()})
@@ -197,9 +204,8 @@ def lookup_csv(found: Correction) -> str:
     columns: dict[str, Sequence[object] | Array] = dict(
         zip(("x_m", "y_m", "z_m"), found.wanted.T[:3], strict=True)
     )
-    columns |= _named(
-        "length_{}_m", [str(k + 1) for k in range(found.lengths.shape[1])], found.lengths
-    )
+    driven = np.flatnonzero(found.robot.driven)
+    columns |= _named("length_{}_m", [str(k + 1) for k in driven], found.lengths[:, driven])
     columns["reached"] = found.reached.astype(int).tolist()
     return table_text(columns)
 

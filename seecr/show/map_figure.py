@@ -224,7 +224,7 @@ def _yes_or_no(found: Workspace) -> bool:
     can be tightened without limit everywhere.
     """
     held = found.margin[found.feasible]
-    few = found.robot.n_cables < found.robot.n_dof
+    few = found.robot.n_driven < found.robot.n_dof
     return few or (len(held) > 0 and bool(np.isposinf(held).all()))
 
 

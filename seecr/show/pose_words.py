@@ -119,16 +119,24 @@ def cable_lines(solution: Solution, spread: Spread | None = None) -> Iterator[st
     off = "" if spread is None else "      ± [N]"
     yield f"{'cable':<{wide}}  tension [N]{off}  rest length [m]"
     for k, name in enumerate(robot.cable_names):
-        slack = "  slack" if solution.slack[0, k] else ""
+        slack = ("  slack" if solution.slack[0, k] else "") + _kind(robot, k)
         tension, rest = solution.tensions[0, k] + 0.0, solution.rest_lengths[0, k]
         shown, off = f"{tension:.4f}", ""
         if spread is not None:
             known = solution.slack[0, k]  # zero, and certain to first order
             shown, error = (shown, "") if known else with_error(tension, spread.tensions[0, k])
             off = f"  {error:>9}"
-        yield f"{name:<{wide}}  {shown:>11}{off}  {rest:15.6f}{slack}"
+        length = "–" if robot.constant_tension_N[k] > 0.0 else f"{rest:.6f}"
+        yield f"{name:<{wide}}  {shown:>11}{off}  {length:>15}{slack}"
     if solution.slack[0].any():
         yield from sag_lines(solution.tables)
+
+
+def _kind(robot: Robot, k: int) -> str:
+    """What is said of line k beside its numbers, if no winch drives it."""
+    if robot.constant_tension_N[k] > 0.0:
+        return "  passive, constant tension"
+    return "" if robot.driven[k] else "  passive"
 
 
 def sag_lines(tables: Tables) -> Iterator[str]:

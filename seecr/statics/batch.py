@@ -24,6 +24,7 @@ from seecr.compiled.columns import (
     N_RATES,
     N_STATE,
     NO_LENGTH,
+    PUSHES,
     RADIUS,
     REST,
     SINGULAR,
@@ -411,6 +412,7 @@ def without_idle(tables: Tables, at: Evaluation) -> Evaluation:
     """Evaluate again, without the taut cables whose tension is mere rounding."""
     tension = at.states[..., TENSION]
     idle = (at.states[..., SLACK] == 0.0) & (tension < IDLE * tables.scale[:, None])
+    idle &= tables.cables[..., PUSHES] == 0.0
     rest = take(tables, np.arange(len(tables)))
     rest.cables[idle, GAP] = -rest.cables[idle, REST]
     rest.cables[idle, RADIUS] = 0.0
@@ -420,7 +422,10 @@ def without_idle(tables: Tables, at: Evaluation) -> Evaluation:
 def is_slack(tables: Tables, at: Evaluation) -> NDArray[np.bool_]:
     """Slack cables, (n, m): those longer than their span, which may sag, or without tension."""
     nothing = at.tension < IDLE * tables.scale[:, None]
-    return nothing if isinstance(at, Abreast) else nothing | (at.states[..., SLACK] > 0.5)
+    if isinstance(at, Abreast):
+        return nothing
+    nothing &= tables.cables[..., PUSHES] == 0.0
+    return np.asarray((at.states[..., SLACK] > 0.5) | nothing)
 
 
 def joints_at_rest(tables: Tables, at: Evaluation) -> Array:

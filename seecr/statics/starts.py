@@ -129,13 +129,17 @@ def poses_from_lengths(robot: Robot, commands: Commands) -> Array | None:
     """
     if commands.lengths is None or np.any(commands.pose != robot.reference_pose):
         return None
-    home = np.tile(robot.reference_pose, (len(commands), 1))
-    pose, misfit = _fitted(robot, commands.lengths, home)
+    home, lengths = np.tile(robot.reference_pose, (len(commands), 1)), commands.lengths
+    if not robot.all_driven:  # the others say nothing about where the platform is
+        lengths = np.ascontiguousarray(lengths[:, robot.driven])
+    if lengths.shape[1] == 0:
+        return None
+    pose, misfit = _fitted(robot, lengths, home)
     for _ in range(_ROUNDS):
-        rows, start = _helped(commands.lengths, pose, misfit)
+        rows, start = _helped(lengths, pose, misfit)
         if len(rows) == 0:
             break
-        there, other = _fitted(robot, commands.lengths[rows], start)
+        there, other = _fitted(robot, lengths[rows], start)
         better = other < _BETTER * misfit[rows]
         if not better.any():
             break
@@ -157,7 +161,7 @@ def _helped(lengths: Array, pose: Array, misfit: Array) -> tuple[NDArray[np.intp
 
 
 def _fitted(robot: Robot, lengths: Array, start: Array) -> tuple[Array, Array]:
-    """Poses (n, 7) that fit lengths (n, m) best, from others, and rms misfits (n,) [m]."""
+    """Poses (n, 7) that fit driven lengths (n, m) best, from others, and rms misfits (n,) [m]."""
     free = not robot.joints
     at = start if free else values_of_pose(robot, start)[0]
     scale = np.ones(at.shape[1] - 1 if free else at.shape[1])
@@ -195,8 +199,8 @@ def _misfits(robot: Robot, lengths: Array, at: Array, scale: Array) -> tuple[Arr
     """Straight lengths minus the given ones (n, m) [m], and rates (n, m, d) by scaled steps."""
     free = not robot.joints
     pose, screws = (at, None) if free else pose_of_values(robot, at)
-    arm = quat_rotate(pose[:, None, 3:], robot.anchor_points)
-    span = pose[:, None, :3] + arm - robot.exit_points
+    arm = quat_rotate(pose[:, None, 3:], robot.anchor_points[robot.driven])
+    span = pose[:, None, :3] + arm - robot.exit_points[robot.driven]
     straight = np.maximum(np.linalg.norm(span, axis=2), _POINT * robot.length)
     along = span / straight[..., None]
     by_pose = np.concatenate([along, cross(arm, along)], axis=2)

@@ -24,6 +24,8 @@ from seecr.compiled.columns import (
     N_COLUMNS,
     N_LOAD,
     OF_THE_PAST,
+    PULL,
+    PUSHES,
     RADIUS,
     REST,
     UP,
@@ -191,6 +193,9 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
         return _alike(setup, poses)
     cables, load = np.zeros((n, m, N_COLUMNS)), np.zeros((n, N_LOAD))
     _write(setup, QUANTITIES, cables, load, blank=True)
+    if not robot.all_driven:
+        pull = robot.constant_tension_N
+        cables[..., PULL], cables[..., PUSHES] = pull, robot.pushes | (pull > 0.0)
     if setup.laws:
         _linearise(setup, np.zeros((n, m)) if strains is None else strains, cables)
     return Tables(
@@ -294,8 +299,9 @@ def _linearise(setup: Setup, strains: Array, cables: Array) -> None:
     step = 1e-6 * (1e-3 + np.abs(strains))
     for law in setup.laws:
         slope = (law(strains + step) - law(strains - step)) / (2.0 * step)
-        cables[..., EXTRA] += law(strains) - slope * strains
-        cables[..., EXTRA_SLOPE] += slope
+        driven = setup.robot.driven  # a law is that of the winches' ropes
+        cables[..., EXTRA] += np.where(driven, law(strains) - slope * strains, 0.0)
+        cables[..., EXTRA_SLOPE] += np.where(driven, slope, 0.0)
 
 
 def _hanging(setup: Setup) -> Array:

@@ -25,18 +25,24 @@ SAFE = "safe"
 
 
 def tension_limits(robot: Robot, lowest: ArrayLike, highest: ArrayLike) -> tuple[Array, Array]:
-    """Limits of each cable's tension, (m,) [N] each; they are given for the line that is reeved.
+    """Limits of each driven cable's tension, (k,) [N] each; given as one, (k,) or (m,) numbers.
+
+    They are given for the line that is reeved, and returned for the cable with all its falls.
 
     Raises:
-        InputError: a wrong shape, or limits that contradict each other.
+        InputError: a wrong shape, limits that contradict each other, or a robot without winches.
     """
-    m = robot.n_cables
+    k = robot.n_driven
+    if k == 0:
+        raise InputError(
+            f"{robot.name}: no winch drives any of its lines, so there are no tensions to choose"
+        )
     bounds = []
     for name, value in (("lowest", lowest), ("highest", highest)):
         array = numbers(value, name)
-        if array.shape not in ((), (m,)):
-            raise InputError(f"{name} must be one number or ({m},) [N], got {array.shape}")
-        bounds.append(np.array(np.broadcast_to(array, (m,))))
+        if array.shape not in ((), (k,), (robot.n_cables,)):
+            raise InputError(f"{name} must be one number or ({k},) [N], got {array.shape}")
+        bounds.append(np.array(np.broadcast_to(of_driven(robot, array), (k,))))
     low, high = bounds
     high[high > LARGEST] = np.inf
     if not (all_finite(low) and np.all(low >= 0.0) and np.all(high >= low)):
@@ -46,7 +52,14 @@ def tension_limits(robot: Robot, lowest: ArrayLike, highest: ArrayLike) -> tuple
             f"at most {LARGEST:g}, got "
             f"lowest {got[0]} and highest {got[1]}"
         )
-    return low * robot.falls, high * robot.falls
+    falls = robot.falls[robot.driven]
+    return low * falls, high * falls
+
+
+def of_driven(robot: Robot, values: Array) -> Array:
+    """Of numbers (..., m) of all lines those of the driven ones (..., k); others as they are."""
+    of_all = values.ndim > 0 and values.shape[-1] == robot.n_cables
+    return values[..., robot.driven] if of_all and not robot.all_driven else values
 
 
 def wanted_tensions(

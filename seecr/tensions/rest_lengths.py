@@ -8,6 +8,7 @@ method solves both together, with the derivatives of the cable's law.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -190,13 +191,16 @@ def _loosened(tables: Tables, held: Held, least: Array) -> Held:
     return Held(np.where(slack, longer, held.rest), held.tensions, held.fine)
 
 
-def holds_stably(tables: Tables, aim: Array, low: Array, high: Array) -> NDArray[np.bool_]:
+def holds_stably(
+    tables: Tables, aim: Array, low: Array, high: Array, held: Callable[[Array], Tables]
+) -> NDArray[np.bool_]:
     """(n,) whether poses can be held, as by :func:`hold`, and are stable with those lengths.
 
-    Stable means that all eigenvalues of the stiffness exceed the rounding of the largest.
+    Stable means that all eigenvalues of the stiffness exceed the rounding of the largest. ``held``
+    gives the tables of all lines, the passive ones too, by the driven cables' rest lengths.
     """
     found = hold(tables, aim, low, high, _FEW)
-    now = with_rest(tables, found.rest)
+    now = held(found.rest)
     at = batch.evaluate(now, here(now), threads=None)
     stiffness = np.where(found.fine[:, None, None], at.hessian, 0.0)
     each = np.linalg.eigvalsh(0.5 * (stiffness + np.swapaxes(stiffness, 1, 2)))

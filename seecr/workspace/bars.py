@@ -237,7 +237,7 @@ def _balance(
 
 def _across(robot: Robot) -> Array | None:
     """The horizontal (3,) of the bar's plane, towards its second end; None if it is no bar."""
-    if robot.n_cables != 2 or robot.weight == 0.0 or not robot.joints:
+    if robot.n_cables != 2 or not robot.all_driven or robot.weight == 0.0 or not robot.joints:
         return None
     ends = transform_points(robot.reference_pose[None], robot.anchor_points)[0]
     hinges = [joint.axis for joint in robot.joints if joint.kind == "hinge"]
@@ -345,7 +345,7 @@ def midline_points(solution: Solution) -> Midlines | None:
 
 def _plane(robot: Robot) -> NDArray[np.intp] | None:
     """The two axes of the robot's plane, if it is upright and its cables are parallel in pairs."""
-    if robot.n_cables != 4:
+    if robot.n_cables != 4 or not robot.all_driven:
         return None
     anchors = transform_points(robot.reference_pose[None], robot.anchor_points)[0]
     points = np.concatenate([robot.exit_points, anchors])

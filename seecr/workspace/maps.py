@@ -72,7 +72,7 @@ def default_axes(
     robot = robot_of(robot)
     if values is None:
         # robots with too few cables are solved for their orientation, which is slow
-        values = _VALUES if robot.n_cables >= robot.n_dof else _FEW
+        values = _VALUES if robot.n_driven >= robot.n_dof else _FEW
     values = whole(values, "values", 1)
     turned = robot.reference_pose[3:] if orientation is None else _quaternion(orientation)
     low, high = grid_ends(robot, turned)
@@ -151,7 +151,7 @@ def workspace_map(
     axes = (_axis("x", x), _axis("y", y), _axis("z", z))
     if chance:
         check_chance(effects)
-    if elastic or robot.n_cables < robot.n_dof:
+    if elastic or robot.n_driven < robot.n_dof:
         _refuse_memory(robot, effects)
     turned = robot.reference_pose[3:] if orientation is None else _quaternion(orientation)
     directions = own_directions(robot)

@@ -33,7 +33,7 @@ def margins_at(
     search that is ``thorough`` or not.
     """
     acting = effects_of(effects, robot)
-    if robot.n_cables >= robot.n_dof:
+    if robot.n_driven >= robot.n_dof:
         return tension_margin(
             robot, poses, lowest=lowest, highest=highest, wrenches=wrenches, effects=acting
         )
@@ -121,8 +121,8 @@ def kept_chance(
     for first in range(0, len(out), _PART):
         rows = slice(first, first + _PART)
         tensions = at.tensions[rows, None] + np.einsum("nmp,kp->nkm", slopes[rows], drawn)
-        line = robot.falls
-        kept = (tensions >= low / line - room) & (tensions <= high / line + room)
+        lines, falls = tensions[..., robot.driven], robot.falls[robot.driven]
+        kept = (lines >= low / falls - room) & (lines <= high / falls + room)
         out[rows] = kept.all(axis=2).mean(axis=1)
     out[lost | ~at.solved] = np.nan
     return out
@@ -168,7 +168,7 @@ def held_chance(
     terms, covariance = known
     places, limits = commanded_poses(poses, robot=robot), (lowest, highest, wrenches)
     vectors = _drawn(terms, covariance, _STAGES[-1][0])
-    solved = robot.n_cables < robot.n_dof
+    solved = robot.n_driven < robot.n_dof
     out, rows = np.zeros(len(places)), np.arange(len(places))
     seen = np.zeros((0, len(places)))
     for count, sure in _STAGES:
@@ -195,7 +195,7 @@ def _margins(
     """Margins (n,) at places; full searches are only made at those that are ``hopeful`` (n,)."""
     out = margins_at(robot, places, *limits, effects, thorough=False)
     again = np.flatnonzero(hopeful & np.isneginf(out))
-    if len(again) and robot.n_cables < robot.n_dof:
+    if len(again) and robot.n_driven < robot.n_dof:
         out[again] = margins_at(robot, places[again], *limits, effects)
     return out
 

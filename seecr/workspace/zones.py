@@ -34,6 +34,7 @@ from seecr.statics.tables import Tables, assemble
 from seecr.tensions.balance import balance_of, bends
 from seecr.tensions.distribution import tension_limits
 from seecr.tensions.max_margin import margins_inside
+from seecr.tensions.passive import driven_tables
 
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects
@@ -157,11 +158,12 @@ def tension_margin(
     low, high = tension_limits(robot, lowest, highest)
     if wrench is not None:
         wrench = _wrench(wrench, len(places))
-    if acting := effects_of(effects, robot):
-        return margins_with(robot, places, acting, low, high, wrenches, wrench)
+    acting = effects_of(effects, robot)
+    if acting or not robot.all_driven:
+        return margins_with(robot, places, acting, lowest, highest, wrenches, wrench)
     out = np.full(len(places), np.nan)
     scale = load_scale(robot)
-    if robot.n_cables < robot.n_dof:
+    if robot.n_driven < robot.n_dof:
         pass
     elif robot.joints or (wrench is not None and np.ndim(wrench) == 2):
         return margins_from(*_loads(robot, places, wrench, wrenches), low, high, scale)
@@ -190,6 +192,7 @@ def margins_with(
     low, high = tension_limits(robot, lowest, highest)
     told = Commands(poses, lengths=robot.commanded_lengths(poses), told=True)
     tables = assemble(Experiment(robot, told).setup(effects_of(effects, robot)))
+    tables = driven_tables(tables, robot)
     if wrench is not None:
         tables = _pushed(tables, wrench)
     some = np.zeros((1, 6)) if wrenches is None else wrenches_of(wrenches)

@@ -272,7 +272,7 @@ def test_run_help_names_the_robots_of_all_shipped_cases():
     names = {case.model.stem.removeprefix("demobot_") for case in shipped_cases()}
     planar = {name: "planar" for name in names if name.startswith("planar")}
     told = {"off_centre": "centre of mass off", **planar}
-    assert len(names) == 10
+    assert len(names) == 13
     assert [n for n in names if told.get(n, n.replace("_", "-")) not in words] == []
 
 

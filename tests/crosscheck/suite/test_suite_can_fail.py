@@ -130,7 +130,7 @@ def described(edit: Callable[[Any], Any]) -> Callable[[Patch], None]:
 
     def plant(patch: Patch) -> None:
         honest = suite.load_robot
-        patch.setattr(suite, "load_robot", lambda path: edit(honest(path)))
+        patch.setattr(suite, "load_robot", lambda path, *more: edit(honest(path, *more)))
 
     return plant
 

@@ -222,7 +222,7 @@ def test_an_effect_that_leaves_nonsense_is_named(  # type: ignore[no-untyped-def
 
 
 @pytest.mark.parametrize("arguments, complaint", [
-    ({"size": "cables"}, "size must be one of one, cable, vector, point, got 'cables'"),
+    ({"size": "cables"}, "size must be one of one, cable, spring, vector, point, got 'cables'"),
     ({"unit": 0.1}, 'unit must be a text such as "m", or "" for none, got 0.1'),
     ({"scale": 0.0}, "scale must be a positive number or a function of the robot, got 0.0"),
     ({"scale": float("nan")}, "scale must be a positive number"),

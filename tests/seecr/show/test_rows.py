@@ -166,6 +166,7 @@ def of_a_correction() -> Any:
     poses = np.tile(VERTICAL.reference_pose, (3, 1))
     lengths = np.tile(VERTICAL.rest_lengths, (3, 1))
     return SimpleNamespace(
+        robot=VERTICAL,
         wanted=poses,
         lengths=lengths,
         found=np.ones(3, bool),
