@@ -72,7 +72,7 @@ def command(
     machine = robot_at(robot)
     known, own = model_at(believes, machine), model_at(true, machine)
     wanted, free = at_rest.wanted_of(machine, poses)
-    names = at_rest.words_of(scheme)
+    names = at_rest.parts_of(scheme)
     pictures, every_picture = options.files_of_pictures("control", figure, True)
     recordings = {f"{name}.rrd" for name in names}
     names_out = {"control.json", *pictures, *(f"{name}.csv" for name in names)}

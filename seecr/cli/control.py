@@ -123,7 +123,7 @@ def command(
     machine = robot_at(robot)
     known, own = model_at(believes, machine), model_at(true, machine)
     wanted, free = wanted_of(machine, poses)
-    names = words_of(scheme)
+    names = parts_of(scheme)
     pictures, every_picture = options.files_of_pictures("control", figure, no_recording)
     made = options.made_by(machine.source, poses, believes, true)
     names_out = {"control.json", "control.csv", *pictures}
@@ -162,7 +162,7 @@ def command(
     return status
 
 
-def words_of(text: str) -> list[str]:
+def parts_of(text: str) -> list[str]:
     """Words with commas between."""
     return [word.strip() for word in text.split(",") if word.strip()]
 
@@ -199,7 +199,7 @@ def arguments(
         "lowest": lowest,
         "highest": float("inf") if highest is None else highest,
         "aim": aim_of(aim, machine.n_cables),
-        "holding": None if holding is None else words_of(holding),
-        "reads": words_of(reads),
+        "holding": None if holding is None else parts_of(holding),
+        "reads": parts_of(reads),
         "noise": SensorNoise(*(noise or (0.0, 0.0, 0.0)), seed=seed),
     }

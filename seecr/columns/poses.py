@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from seecr.columns.cells import decimals
 from seecr.columns.known import ANGLES, POSITION, QUATERNION, Columns
 from seecr.columns.plausible import refuse_degrees
+from seecr.counted import counted
 from seecr.description.joints import OFF_MANIFOLD, off_joints, pose_of_values
 from seecr.description.projected import determined, projected
 from seecr.errors import Faults
@@ -38,7 +39,9 @@ def command_lengths(columns: Columns, robot: Robot) -> Array | None:
     missing = [f"length_{i}_m" for i in driven if i not in given]
     if missing:
         every = "" if robot.all_driven else " that a winch drives"
-        raise columns.half_there("length", missing, f"all {len(driven)} cables of the robot{every}")
+        raise columns.half_there(
+            "length", missing, f"all {counted(len(driven), 'cable')} of the robot{every}"
+        )
     lengths, faults = np.tile(robot.rest_lengths, (columns.n_rows, 1)), Faults()
     lengths[:, robot.driven] = columns.all_numbers([f"length_{i}" for i in driven])
     for i in driven:

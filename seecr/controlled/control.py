@@ -83,7 +83,7 @@ def control(
 
     Returns:
         of each scheme errors [m, rad], tensions [N] and winch travel [m] at n poses, and whether
-        its loop settles. Some ms a pose and scheme.
+        its loop settles. Some ms per pose and scheme.
 
     Raises:
         InputError: an unknown scheme, one that needs other readings, a gain or delay that holds
@@ -91,7 +91,7 @@ def control(
             platform free.
 
     Example:
-        ``seecr.control(robot, poses, scheme="elastic+pose_feedback", true="true.toml")``
+        ``seecr.control(robot, poses, scheme="elastic+pose_feedback", steps=5).schemes``
     """
     robot = robot_of(robot)
     commands = commands_from(poses, robot)

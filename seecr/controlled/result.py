@@ -152,7 +152,7 @@ class Controlled(Result):
         out = []
         if done.any():
             steps = between(self.steps[done].min(), self.steps[done].max(), "d")
-            out.append(f"  settles at {int(done.sum())} of {len(self)} in {steps} steps")
+            out.append(f"  settles at {int(done.sum())} of {len(self)} after step {steps}")
         if holds.any():
             radius = between(self.radius[holds].min(), self.radius[holds].max(), ".3f")
             most = int(self.delay[holds].min())

@@ -292,7 +292,7 @@ class Scheme:
         for loop in self.feedbacks:
             if not set(loop.needs) & set(reads):
                 raise InputError(
-                    f"scheme {self.name}: {loop.name} needs readings of "
+                    f"scheme {self.name}: for {loop.name} it needs readings of "
                     f"{' or '.join(loop.needs)}, and this robot reads "
                     f"{' and '.join(reads) or 'nothing'}; leave the scheme out, or say what is read"
                 )

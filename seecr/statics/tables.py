@@ -193,15 +193,20 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
         return _alike(setup, poses)
     cables, load = np.zeros((n, m, N_COLUMNS)), np.zeros((n, N_LOAD))
     _write(setup, QUANTITIES, cables, load, blank=True)
-    if not robot.all_driven:
-        pull = robot.constant_tension_N
-        cables[..., PULL], cables[..., PUSHES] = pull, robot.pushes | (pull > 0.0)
+    _write_passive(robot, cables)
     if setup.laws:
         _linearise(setup, np.zeros((n, m)) if strains is None else strains, cables)
     return Tables(
         cables=cables, load=load, poses=poses, screws=_screws_of(robot, poses.tobytes(), n),
         length=robot.length, scale=_load_scale(setup), reach=_reach(cables), n_dof=robot.n_dof,
     )  # fmt: skip
+
+
+def _write_passive(robot: Robot, cables: Array) -> None:
+    """What lines have that no winch drives, into cables (..., m, columns)."""
+    if not robot.all_driven:
+        pull = robot.constant_tension_N
+        cables[..., PULL], cables[..., PUSHES] = pull, robot.pushes | (pull > 0.0)
 
 
 def _alike(setup: Setup, poses: Array) -> Alike:
@@ -214,6 +219,7 @@ def _alike(setup: Setup, poses: Array) -> Alike:
     load = np.zeros((n if pushed else 1, N_LOAD))
     names = {name for name, item in QUANTITIES.items() if item.column is not None}
     _write_values(setup, names, cable, load, blank=True)
+    _write_passive(robot, cable)
     if pushed:
         _write_values(setup, {"wrench"}, cable, load)
     _write_load(setup, load)

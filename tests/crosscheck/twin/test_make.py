@@ -557,11 +557,11 @@ def test_poses_that_show_nothing_are_refused(tmp_path: Path) -> None:
     with pytest.raises(CrosscheckError, match="show too few effects clearly above the noise"):
         make_twin(robot, 1, poses=poses, points=3, sigma=Sigma(1e3))
     drawn = make_twin(load_robot("demobot_parallel"), 13, points=4).hidden
-    # what does not show at two poses is exchanged, also if sweeps show it
+    # as long as anything shows it is the robot of the sweeps: nothing is exchanged
     near = np.tile([0.4, 0.25, 0.15, 1.0, 0.0, 0.0, 0.0], (2, 1))
     other = make_twin("demobot_parallel", 13, points=4, poses=near, sigma=Sigma(3e-4, 3e-3))
-    assert min(one.max for one in other.answer.moves_over_noise.values()) > 1.0
-    assert {one.name for one in other.hidden} != {one.name for one in drawn}
+    assert max(one.max for one in other.answer.moves_over_noise.values()) > 1.0
+    assert {one.name for one in other.hidden} == {one.name for one in drawn}
     plain = make_twin(robot, 1, poses=poses, points=3, sigma=Sigma(1e3), maybe_none=True)
     assert plain.measured.n_rows == 3
 

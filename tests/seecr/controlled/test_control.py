@@ -221,11 +221,13 @@ REFUSED = {
         "poses, even where the robot is as believed; expected a gain below 0.347"
     ),
     "--scheme pose_feedback --reads tensions": (
-        "scheme pose_feedback: pose_feedback needs readings of position or orientation, and this "
+        "scheme pose_feedback: for pose_feedback it needs readings of position or "
+        "orientation, and this "
         "robot reads tensions; leave the scheme out, or say what is read"
     ),
     "--scheme tension_feedback --reads position,orientation": (
-        "scheme tension_feedback: tension_feedback needs readings of tensions, and this robot "
+        "scheme tension_feedback: for tension_feedback it needs readings of tensions, and "
+        "this robot "
         "reads position and orientation"
     ),
     "--scheme tension_feedback --holding cable1,cable2,cable3": (

@@ -51,6 +51,16 @@ def test_rests_are_minima_of_the_energy(kind: str) -> None:
         assert found.tensions[2, passive] > 1.0, "and stretched at another"
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_many_rests_are_those_of_each(kind: str) -> None:
+    """Batches of many rows are written and descended in another way, which had no such lines."""
+    robot, few = robot_of(kind), commanded(kind)
+    many, alone = seecr.solve(robot, np.tile(few, (40, 1))), seecr.solve(robot, few)
+    assert many.converged.all()
+    np.testing.assert_allclose(many.tensions, np.tile(alone.tensions, (40, 1)), atol=1e-6)
+    np.testing.assert_allclose(many.pose, np.tile(alone.pose, (40, 1)), atol=1e-9)
+
+
 def test_a_constant_tension_with_slack_cables(tmp_path: Path) -> None:
     text = (FOLDER / "counterweight.xml").read_text().replace("weight=25N", "weight=0.055kN")
     (tmp_path / "robot.xml").write_text(text)
