@@ -52,7 +52,7 @@ class JointErrors:
 
     Attributes:
         before, after, held_out: rms errors by kind: of the model as it stood, of the fit, and of
-            held-out runs, each predicted by a fit without it.
+            test runs, each predicted by a fit without it.
         scale, rho: by kind of reading, the estimated noise over the stated one, and its correlation
             between successive rows of a run.
     """
@@ -117,7 +117,7 @@ class Calibrated(Result, JointErrors):
 
     @property
     def pays(self) -> bool:
-        """Whether the fit converged and predicts held-out runs better than the model before."""
+        """Whether the fit converged and predicts test runs better than the model before."""
         pairs = [(was, self.held_out[key]) for key, was in self.before.items()]
         gains = [np.log(was / held) for was, held in pairs if was and held]
         return self.settled and float(np.sum(gains)) > 0.0
@@ -144,7 +144,7 @@ class Calibrated(Result, JointErrors):
         out = [
             f"{counted(len(self.labels), 'parameter')} of {counted(len(self.fitted), 'effect')}: "
             f"{rms_words(self.before)} before, {rms_words(self.after)} after, "
-            f"{rms_words(self.held_out)} on held-out runs",
+            f"{rms_words(self.held_out)} on test runs",
             *self.noise_lines(),
             *self.absent_lines(),
         ]
@@ -206,7 +206,7 @@ def calibrate(
     exclude: GivenNames = (),
     sigma: GivenSigma = None,
 ) -> Calibrated:
-    """Fit every effect that the data can see, with plausible sizes as priors.
+    """Fit every effect that the data can see, with expected sizes as priors.
 
     Args:
         robot: a robot, or its MJCF file.
@@ -242,7 +242,7 @@ def calibrate(
         whole = search.calibrated.fit
         far = whole.outlying
         whole = whole.with_far_off(far)
-        progress("predicting held-out runs", 0.95)
+        progress("predicting test runs", 0.95)
         before = rms_by_kind(whole.data.problem, search.plain.raw)
         errors = JointErrors.of(before, whole)
         others = thin.note_on_others(whole.terms, ready.problem.sigma)

@@ -2,7 +2,7 @@
 
     python scripts/draw_effects.py
 
-DemoBot goes along x and back, plain and with the effect at its plausible size; drawn is what its
+DemoBot goes along x and back, plain and with the effect at its expected size; drawn is what its
 sensors then read otherwise. A test compares :func:`numbers` with what was written.
 """
 
@@ -41,7 +41,7 @@ class Change:
 
     Attributes:
         effect: with its values. robot: name of the robot that was swept.
-        times: how many plausible sizes large.
+        times: how many expected sizes large.
         x: (n,) [m] commanded, there and back.
         position: (n, 3) [m]; rotation: (n, 3) [rad]; tensions: (n, m) [N]; with less without it.
     """
@@ -80,7 +80,7 @@ def plain(robot: str) -> tuple[Robot, Readings]:
 
 
 def sized(kind: type[Effect], robot: Robot, times: float) -> Effect:
-    """An effect at so many plausible sizes; where it has several values their signs differ."""
+    """An effect at so many expected sizes; where it has several values their signs differ."""
     layout = layout_of(kind, robot)
     signs = np.where(np.random.default_rng(1).random(len(layout)) < 0.5, -1.0, 1.0)
     if not layout.groups:

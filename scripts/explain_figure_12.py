@@ -5,7 +5,7 @@
 The text says of the parallel configuration "approximately 20°" of tilt and "about 15 mm" of
 deviation along z at both ends. The paper's equations give another pair of numbers. For each effect
 of the catalogue, and each two of them, the sizes are sought that come nearest to both while staying
-plausible. Two parameters more than numbers always fit; what counts is by how many plausible sizes
+plausible. Two parameters more than numbers always fit; what counts is by how many expected sizes
 they have to be off.
 """
 
@@ -33,7 +33,7 @@ MEASURED, ABOUT = np.array([20.0, -15.0]), np.array([2.0, 3.0])
 
 # The corner of that box which is nearest to the plain robot, and how near to come to it.
 _AIM, _NEAR = MEASURED + ABOUT, 0.1 * ABOUT
-# Plausible sizes here, where they are not the catalogue's: a centre of mass that nobody gives, in a
+# Expected sizes here, where they are not the catalogue's: a centre of mass that nobody gives, in a
 # platform 36 mm high; a target anywhere on it; a platform placed by hand.
 _SIZES = {
     "centre_of_mass": {"shift": 0.01},
@@ -57,8 +57,8 @@ RUNS = {
     "left end, z 0.1 m": (0,),
     "left end, z 0.2 m": (2,),
 }
-HEAD_PLACED = "| one run | effects | tilt | along z | plausible sizes | largest parameter |"
-HEAD = "| effects | tilt | along z | [plausible sizes](glossary.md) | largest parameter |"
+HEAD_PLACED = "| one run | effects | tilt | along z | expected sizes | largest parameter |"
+HEAD = "| effects | tilt | along z | [expected sizes](glossary.md) | largest parameter |"
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +68,9 @@ class Explanation:
     Attributes:
         names: of the effects.
         numbers: (2,) as :data:`MEASURED`.
-        size: root of the sum of squares of the parameters over their plausible sizes.
+        size: root of the sum of squares of the parameters over their expected sizes.
         largest: the parameter that is furthest from null, for people.
-        at: the parameters less null, over their plausible sizes.
+        at: the parameters less null, over their expected sizes.
     """
 
     names: tuple[str, ...]
@@ -93,7 +93,7 @@ class Explanation:
 
     @property
     def explains(self) -> bool:
-        """Both numbers within their margins, with no more than twice a plausible size."""
+        """Both numbers within their margins, with no more than twice an expected size."""
         within = np.all(np.abs(self.numbers - MEASURED) <= ABOUT + _NEAR)
         return bool(within and self.size <= _PLAUSIBLE)
 
@@ -115,7 +115,7 @@ def layout(name: str) -> Layout:
 
 @cache
 def scale(name: str) -> Array:
-    """Plausible sizes of an effect's parameters."""
+    """Expected sizes of an effect's parameters."""
     own = layout(name).scale.copy()
     for part, size in _SIZES.get(name, {}).items():
         own[[key.startswith(part) for key in layout(name).names]] = size
@@ -144,7 +144,7 @@ def of_all(names: tuple[str, ...], part: Callable[[str], Array]) -> Array:
 
 
 def placing(names: tuple[str, ...], some: tuple[int, ...] = EVERY) -> Callable[[Array], Array]:
-    """Both numbers by the parameters less null over their plausible sizes."""
+    """Both numbers by the parameters less null over their expected sizes."""
     null = of_all(names, lambda name: layout(name).null)
     unit = of_all(names, scale)
     ends = np.cumsum([len(layout(name)) for name in names])[:-1]
@@ -227,12 +227,12 @@ def summary(singles: Sequence[Explanation], pairs: Sequence[Explanation]) -> str
     return (
         f"Of {len(singles)} effects {count[1] or 'none'}, and of their {len(pairs)} pairs "
         f"{count[2]}, bring both numbers within their margins with at most {_PLAUSIBLE:g} "
-        "plausible sizes."
+        "expected sizes."
     )
 
 
 def picture(path: Path, singles: Sequence[Explanation]) -> None:
-    """Where effects bring both numbers, from nothing to twice a plausible size."""
+    """Where effects bring both numbers, from nothing to twice an expected size."""
     moved = [one for one in singles if one.size <= _PLAUSIBLE and one.nearness < _FAR]
     with figure(path, 1, 1, figsize=(7.4, 4.6)) as axes:
         ax = axes[0, 0]
@@ -249,7 +249,7 @@ def picture(path: Path, singles: Sequence[Explanation]) -> None:
         ax.plot(*numbers([]), "*", color="black", markersize=11, label="the paper's equations")
         ax.set(xlabel="tilt at the ends [°]", ylabel="deviation along z at the ends [mm]")
         ax.set(xlim=(17.5, 27.5), ylim=(-20.0, -5.0))
-        ax.set_title("dots: one and two plausible sizes")
+        ax.set_title("dots: one and two expected sizes")
         ax.legend(fontsize=8, loc="lower right")
 
 

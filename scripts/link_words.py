@@ -12,7 +12,7 @@ from pathlib import Path
 
 PAGES = sorted((Path(__file__).resolve().parents[1] / "docs").glob("*.md"))
 _OWN = (
-    "plausible size", "held-out runs", "noise alone", "way point", "told length",
+    "expected size", "test runs", "noise alone", "way point", "told length",
     "smallest visible size",
 )  # fmt: skip
 _TO = "](glossary.md)"

@@ -79,7 +79,7 @@ def _parameters(effect: type[Effect]) -> str:
 def _picture(effect: type[Effect]) -> str:
     """What it does to a sweep, drawn by draw_effects.py, and in words."""
     found = json.loads(NUMBERS.read_text(encoding="utf-8"))[effect.name]
-    size = "at its plausible size" if found["times"] == 1 else "at ten times its plausible size"
+    size = "at its expected size" if found["times"] == 1 else "at ten times its expected size"
     kinds = (("position_mm", "mm"), ("orientation_deg", "°"), ("tension_N", "N"))
     most = " and ".join(f"{found[k]:.2g} {unit}" for k, unit in kinds if k in found)
     most = most.replace(" °", "°")

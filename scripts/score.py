@@ -14,7 +14,7 @@ MuJoCo is the truth, on the shipped robots. The kinds:
   is stated 3.5 times too small, twice too large, or not at all;
 - ``unknown``: eight effects that no catalogue has, 3 to 30 times the noise, half of them beside a
   known one;
-- ``tolerances``: twelve effects at once of 0.7 plausible sizes, and another trajectory.
+- ``tolerances``: twelve effects at once of 0.7 expected sizes, and another trajectory.
 
 An effect is owed a name from 5 sigma on beside the others, which no values of these could imitate.
 Something unknown is counted by what it does that no effect that acts at once could imitate.
@@ -330,7 +330,7 @@ def _with_unknown(
 def beyond(
     robot: Robot, usual: Measurements, other: Measurements, hidden: list[Term]
 ) -> float:  # fmt: skip
-    """sqrt(chi2) of a change of readings that effects of plausible sizes cannot imitate."""
+    """sqrt(chi2) of a change of readings that effects of expected sizes cannot imitate."""
     problem, changed = (
         Problem(robot, data, data.sigma, np.ones(data.n_rows, dtype=bool))
         for data in (usual, other)

@@ -34,7 +34,7 @@ from seecr.effects import (
 from seecr.effects.base import Layout
 from seecr.errors import InputError
 
-# Prior width of values, in plausible sizes: the user knows that the effects are there.
+# Prior width of values, in expected sizes: the user knows that the effects are there.
 _WIDE = 10.0
 
 
@@ -171,7 +171,7 @@ def _added(
     progress(f"fitting {what}", 0.0)
     adding = _Adding(Data.of(ready.problem, ready.terms), f"{data.path}")
     best = adding.fitted(ready.terms, valued, named)
-    progress("predicting held-out runs", 0.6)
+    progress("predicting test runs", 0.6)
     # effects that are free in the data were fitted in advance: they are not in the model before
     before = ready.terms.only(n for n in ready.terms.names if n in had or n not in names)
     base = adding.without(best, names, before)
@@ -255,7 +255,7 @@ class _Adding:
             raise UnsolvedError(
                 f"{self.path}: {what}: some rows could not be solved at the start of the fit"
             )
-        # a tracker's frame and what is free in the data have no plausible size: they stay as wide
+        # a tracker's frame and what is free in the data have no expected size: they stay as wide
         sizeless = (TRACKER, *self.data.free)
         widths = {name: _WIDE for name in terms.names if name not in sizeless}
         found = fit(self.data, state, widths, noise=noise)

@@ -28,10 +28,10 @@ class Addition(Result):
         names: names of the effects that are new, or fitted again.
         fitted: all effects of the new model with their errors.
         before: rms errors of the model as it stood. after: those of the new model.
-        held_out_before, held_out: on held-out runs, without the named effects and with them.
+        held_out_before, held_out: on test runs, without the named effects and with them.
         fall: mean fall of chi2 on a held-out block, and its standard error.
         p: p-value of the fall of chi2 on all data.
-        predicts: whether the effects improve the prediction of held-out runs, and not by chance.
+        predicts: whether the effects improve the prediction of test runs, and not by chance.
         from_nothing: distance of their values from null, in standard errors (Mahalanobis).
         is_nothing: whether that is no further than one standard error of a single value.
         whiteness: test of the residuals.
@@ -76,7 +76,7 @@ class Addition(Result):
         if self.p >= FALSE_ALARM:
             return f"what {self.name} explains is not significant (p = {self.p:.2g})"
         return (
-            f"{self.name} does not improve the prediction of held-out runs (chi2 of a block falls "
+            f"{self.name} does not improve the prediction of test runs (chi2 of a block falls "
             f"by {' ± '.join(with_error(*self.fall))})"
         )
 
@@ -116,7 +116,7 @@ class Addition(Result):
         worth = "improves the prediction" if self.predicts else "does not improve the prediction"
         left = rms_words(self.held_out_before), rms_words(self.held_out)
         out = [
-            f"{self.name} {worth} of held-out runs: {left[0]} without, {left[1]} with it",
+            f"{self.name} {worth} of test runs: {left[0]} without, {left[1]} with it",
             f"on all rows: {rms_words(self.before)} before, {rms_words(self.after)} with it",
         ]
         if self.is_nothing:  # it may predict better all the same

@@ -26,7 +26,7 @@ from seecr.pose import Array
 from seecr.prediction.model import Model
 
 _MOST_NAMED = 4
-# A value of more plausible sizes than this needs a check.
+# A value of more expected sizes than this needs a check.
 _IMPLAUSIBLE = 5.0
 # Parameters with a larger correlation than this can hardly be determined separately.
 _CORRELATED = 0.95
@@ -145,9 +145,7 @@ def _warnings_of(robot: Robot, f: Fitted) -> Iterator[str]:
     large = (size > _IMPLAUSIBLE) & ~f.term.layout.shape
     if large.any():
         whose = (
-            "their plausible sizes: check them"
-            if large.sum() > 1
-            else "its plausible size: check it"
+            "their expected sizes: check them" if large.sum() > 1 else "its expected size: check it"
         )
         verb = "is" if large.sum() == 1 else "are up to"
         most = f"{size[large].max():.3g} times {whose} on the robot"

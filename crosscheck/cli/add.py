@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 @choices.grown_model
 @options.option("--refit", "Refit an effect that the model already has.")
 @options.option("--per [file|run]", "Give EFFECT separate values for each file or run.")
-@options.option("--force", "Add it even if it does not predict held-out runs better.")
+@options.option("--force", "Add it even if it does not predict test runs better.")
 @options.own_effects
 @choices.sigma
 @options.out_file("add.json")
@@ -47,7 +47,7 @@ def command(
     All effects of the model are refitted, because one may have absorbed what another causes. The
     model keeps the values, their standard errors and origin, and the errors before and after.
 
-    An effect is not added if it does not improve the prediction of held-out runs: more parameters
+    An effect is not added if it does not improve the prediction of test runs: more parameters
     always fit better. Nor is it added if all its values together differ from null by no more than
     their standard errors. --force adds it anyway.
 

@@ -22,7 +22,7 @@ from seecr.cli.durations import say_duration
 @choices.exclude
 @options.own_effects
 @choices.sigma
-@options.option("--force", "Write it even if it does not predict held-out runs better.")
+@options.option("--force", "Write it even if it does not predict test runs better.")
 @options.out_file("calibration.json")
 @options.as_json
 def command(
@@ -32,12 +32,12 @@ def command(
 ) -> int:  # fmt: skip
     """Fit all effects that DATA.csv can reveal, at once, and write the model.
 
-    Each parameter's plausible size is the standard deviation of its prior: what the data hardly
+    Each parameter's expected size is the standard deviation of its prior: what the data hardly
     determine stays near null. The size of the noise and its correlation along the runs are
     estimated. Use such a model for its predictions; diagnose says which of its effects are real.
 
     \b
-    Exit status: 0 written, 1 not written because the prediction of held-out runs does not improve,
+    Exit status: 0 written, 1 not written because the prediction of test runs does not improve,
     2 bad input, 3 rows without an equilibrium or a fit that does not converge.
     """
     from crosscheck import Sigma, calibrate, load_measurements

@@ -12,7 +12,7 @@ from seecr.cli.following import following
 
 @options.command("crosscheck effects", "crosscheck effects pulley_radius --robot robot.xml")
 @click.argument("name", required=False)
-@options.option("--robot ROBOT.xml", "Show plausible sizes for this robot.")
+@options.option("--robot ROBOT.xml", "Show expected sizes for this robot.")
 @options.own_effects
 @options.fix
 @options.passive
@@ -22,7 +22,7 @@ def command(name: str | None, robot: Path | None, out: Path | None, as_json: boo
     """List the effects of the catalogue, or describe one: its formula, its parameters, and how to
     check it.
 
-    Effects of your own packages are included and marked. With --robot, the plausible size of each
+    Effects of your own packages are included and marked. With --robot, the expected size of each
     parameter for that robot is shown; diagnose and calibrate use it as the prior's standard
     deviation.
     """

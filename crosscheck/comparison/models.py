@@ -40,7 +40,7 @@ moved. Where the correlations are known half of that is for all values together 
 # Correlations are kept with ten digits: a combination of values whose variance, relative to those
 # of the values, is smaller than this may be rounding.
 _ROUNDING = 1e-8
-# A value is settled where the data tell more of it than its plausible size did. Variances add up as
+# A value is settled where the data tell more of it than its expected size did. Variances add up as
 # 1/stderr^2 = 1/size^2 + (what the data tell), so that stderr < size/sqrt(2).
 _SETTLED = 1.0 / np.sqrt(2.0)
 _MOST_NAMED = 6
@@ -119,7 +119,7 @@ class ModelComparison(Result):
 
     @property
     def unsettled(self) -> tuple[ComparedValue, ...]:
-        """Values that neither data tell better than their plausible size does."""
+        """Values that neither data tell better than their expected size does."""
         return tuple(value for value in self.values if not value.settled)
 
     @property

@@ -135,7 +135,7 @@ _CALIBRATE = (
 # others are in the model.
 _ALL_AT_ONCE = (
     "if every tolerance of the robot may be a little off: crosscheck calibrate fits all effects "
-    "at once and reports the error on held-out runs"
+    "at once and reports the error on test runs"
 )
 
 

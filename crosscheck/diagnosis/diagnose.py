@@ -118,7 +118,7 @@ def _diagnosed(
     search = Search(data, Catalogue.of(data, terms), report)
     search.run()
     said = judged(search)
-    progress("predicting held-out runs", 0.95)
+    progress("predicting test runs", 0.95)
     return diagnosis_of(search, said, notes, sight, tolerance, basis)
 
 

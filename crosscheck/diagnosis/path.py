@@ -108,7 +108,7 @@ class ModelPath:
         return None if share is None else float(np.clip(share, 0.0, 1.0)), term
 
     def removed_by(self, index: int) -> float:
-        """The part, 0 to 1, of the chi2 beyond noise on held-out runs that a stage removes."""
+        """The part, 0 to 1, of the chi2 beyond noise on test runs that a stage removes."""
         before, after = self.stages[index - 1].held_out, self.stages[index].held_out
         kinds = [self.problem.counted[:, kind.columns].sum() for kind in KINDS]
         noise = float(np.sum(np.array(kinds) * self.noise**2))
@@ -118,7 +118,7 @@ class ModelPath:
 
 
 def path_to(search: Search, listed: Sequence[str], whole: bool) -> ModelPath:
-    """The path to the listed members; if these are the ``whole``, its end has plausible sizes."""
+    """The path to the listed members; if these are the ``whole``, its end has expected sizes."""
     problem, stood = search.data.problem, search.stood
     named = bool(search.every.stood)
     start = "the given model" if named else "plain SEECR"

@@ -39,8 +39,8 @@ class MissingEffect(Result):
         rivals: effects that these data cannot tell from it.
         check: how to check it without the robot's poses, with what to expect.
         rms: errors by kind, with it and those listed before it in the model.
-        held_out_rms: the same on held-out runs.
-        share: part of the unexplained chi2 (on held-out runs) that it removed.
+        held_out_rms: the same on test runs.
+        share: part of the unexplained chi2 (on test runs) that it removed.
         probability: posterior probability that it, or an equivalent, is missing.
     """
 
@@ -93,7 +93,7 @@ class MissingEffect(Result):
     def lines(self) -> list[str]:
         """Errors with it, values, what it cannot be told from, and how to check it."""
         left_out = rms_words(self.held_out_rms)
-        out = [f"+ {self.effect}: {rms_words(self.rms)} (on held-out runs {left_out})"]
+        out = [f"+ {self.effect}: {rms_words(self.rms)} (on test runs {left_out})"]
         values = value_lines(self.layout, self.values, self.stderr, self.at_bound)
         out += [f"    {line}" for line in values]
         if self.rivals:

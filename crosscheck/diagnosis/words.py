@@ -44,11 +44,11 @@ def sentence_of(
             return _agreement(path.tried, hints_of(chances, ()), noise)
         case DiagnosisVerdict.UNKNOWN_EFFECT if not missing:
             return (
-                f"Structure remains that {none_of(path.tried)}: an unknown effect is missing."
+                f"A pattern remains that {none_of(path.tried)}: an unknown effect is missing."
                 f"{chances.looks_like}"
             )
         case DiagnosisVerdict.UNKNOWN_EFFECT:
-            left = "structure remains that no known effect explains"
+            left = "a pattern remains that no known effect explains"
             return _and_what_is_left(missing, left, path.tried) + chances.looks_like
         case DiagnosisVerdict.EFFECTS_FOUND:
             hints = hints_of(chances, [m.effect for m in missing])
@@ -71,12 +71,12 @@ def _many(said: Judgement, missing: Sequence[MissingEffect], chances: Chances) -
         return (
             "An unknown effect may be there, which known effects can imitate (probability "
             f"{probability_words(chances.unknown)}): no name is certain.{chances.looks_like} On "
-            f"held-out runs the error is {fall}."
+            f"test runs the error is {fall}."
         )
     hints = hints_of(chances, [m.effect for m in missing])
     likely = f" Most probably it is {probable_words(hints)}." if hints and not missing else ""
     return (
-        f"No few effects explain the error with certainty.{likely} On held-out runs it is {fall}. "
+        f"No few effects explain the error with certainty.{likely} On test runs it is {fall}. "
         + (f"Certain among them: {sure}." if sure else "None of them is certain by itself.")
     )
 
@@ -115,14 +115,14 @@ def _with_rivals(one: MissingEffect) -> str:
 
 
 def removed(share: float) -> str:
-    """What an effect does to the error on held-out runs.
+    """What an effect does to the error on test runs.
 
     That may be nothing: noise was stated too large, or it predicts nothing until the next one is in
     the model.
     """
     if share < _NO_SHARE:
-        return "removes no error beyond the noise on held-out runs by itself"
-    return f"removes {percent(share)} of the unexplained error on held-out runs"
+        return "removes no error beyond the noise on test runs by itself"
+    return f"removes {percent(share)} of the unexplained error on test runs"
 
 
 def percent(share: float) -> str:
@@ -179,7 +179,7 @@ def noise_is_other(found: Diagnosis) -> bool:
 def size_notes(terms: Iterable[Term]) -> list[str]:
     """Notes about effects that only explain the data with implausibly large values."""
     return [
-        f"{term.name} would be {largest_size(term):.3g} times its plausible size, which is very "
+        f"{term.name} would be {largest_size(term):.3g} times its expected size, which is very "
         "unlikely: check it by hand first, as it may stand for an effect that was not tried"
         for term in terms
     ]

@@ -32,7 +32,7 @@ class Why(Enum):
     CONSTANT_TEMPERATURE = "the temperature never changed"
     NEEDS_TENSIONS = "needs measured tensions"
     NOT_MOVED = "these commands do not vary the quantity that it depends on"
-    UNSEEN = "not visible in these data: its plausible size moves no reading"
+    UNSEEN = "not visible in these data: its expected size moves no reading"
     GAINS_NOTHING = "explains nothing beside the others"
     ALIKE = "indistinguishable from {by}, which is listed"
     NOT_NEEDED_BESIDE = "not needed once {by} {are} in the model (probability {chance})"
@@ -119,11 +119,11 @@ class Unfit(Enum):
         "the measured orientations{file} are {off} from those that the model expects, and only "
         "{left} if {convention}: they seem to be written by another convention"
     )
-    BLIND = "noise of {noise} would hide every effect, even at ten times its plausible size"
+    BLIND = "noise of {noise} would hide every effect, even at ten times its expected size"
     NOTHING_TO_TRY = "none of the effects considered is visible in these data: {lacking}"
     UNSOLVED_MODEL = "some rows could not be solved with the model's values"
     STRUCTURE_OR_NOISE = (
-        "structure remains, but with only {rows} and no stated noise it may as well be noise that "
+        "a pattern remains, but with only {rows} and no stated noise it may as well be noise that "
         "is correlated from row to row"
     )
 
@@ -212,7 +212,7 @@ class DiagnosisVerdict(StrEnum):
     NO_EFFECT_MISSING = "no_effect_missing", "model and data agree"
     EFFECTS_FOUND = "effects_found", "with these effects the residuals are noise"
     MANY_EFFECTS = "many_effects", "no few effects explain the error, but all together do"
-    UNKNOWN_EFFECT = "unknown_effect", "structure remains that no known effect explains"
+    UNKNOWN_EFFECT = "unknown_effect", "a pattern remains that no known effect explains"
     NO_VERDICT = "no_verdict", "the data or the solves do not allow one"
 
     meaning: str

@@ -255,5 +255,5 @@ def _is_stopped(term: Term) -> bool:
 
 
 def largest_size(term: Term) -> float:
-    """The largest absolute value of an effect's parameters in plausible sizes, without shapes."""
+    """The largest absolute value of an effect's parameters in expected sizes, without shapes."""
     return float(np.max(np.abs(term.sizes[~term.layout.shape]), initial=0.0))

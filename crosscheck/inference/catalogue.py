@@ -40,9 +40,9 @@ _TRACKER_WIDTHS = (*WIDTHS, 30.0, 100.0, 300.0)
 # that acts the same would be taken in to make up for it.
 _FEW_VALUES = 12
 _CLOSER_WIDTHS = tuple(sorted([*WIDTHS, *(float(np.sqrt(a * b)) for a, b in pairwise(WIDTHS))]))
-# An effect is not seen if its plausible size moves no reading by more than this part of its noise.
+# An effect is not seen if its expected size moves no reading by more than this part of its noise.
 _UNSEEN = 0.02
-# Starts are this far off a bound, in plausible sizes: laws with history have derivatives there.
+# Starts are this far off a bound, in expected sizes: laws with history have derivatives there.
 _INSIDE = 0.1
 # A form with values for each file or run needs so many rows in each.
 _ROWS = 5
@@ -248,7 +248,7 @@ def _key_of(layout: Layout) -> str:
 
 
 def _waits(problem: Problem, layout: Layout) -> bool:
-    """Whether an effect has shapes or, at its plausible size, history or weight."""
+    """Whether an effect has shapes or, at its expected size, history or weight."""
     setup = problem.experiment.setup([_at_its_size(layout).effect()])
     return bool(layout.shape.any() or setup.has_history or np.any(setup.cable_weight))
 
@@ -410,7 +410,7 @@ class About:
         )  # fmt: skip
 
     def _gain_at_its_size(self, term: Term) -> float:
-        """The same by what a plausible size changes, for one amplitude with no shape or history.
+        """The same by what an expected size changes, for one amplitude with no shape or history.
 
         Sag grows with the square of the weight: its derivative at no weight says next to nothing.
         """

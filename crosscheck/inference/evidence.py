@@ -11,7 +11,7 @@ Beside a set, a further group has the normal matrix C = N_gg - N_gS V N_Sg and g
     ln gain = 1/2 sum lambda^2 b_i^2/(1 + lambda^2 e_i) - 1/2 sum ln(1 + lambda^2 e_i)
 
 in the axes of C = U diag(e) U^T. Z is averaged over the widths of each group, so that a badly
-wrong plausible size does not decide. A parameter that cannot be negative has half a Gaussian as its
+wrong expected size does not decide. A parameter that cannot be negative has half a Gaussian as its
 prior, which multiplies Z by twice the probability that it is positive, given the data.
 """
 
@@ -50,7 +50,7 @@ class MemberColumns:
 
     @property
     def middle(self) -> float:
-        """The width nearest to one plausible size."""
+        """The width nearest to one expected size."""
         return float(self.widths[np.argmin(np.abs(np.log(self.widths)))])
 
 

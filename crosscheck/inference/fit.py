@@ -1,4 +1,4 @@
-"""Fits effects to readings: damped Gauss-Newton with plausible sizes as priors and its own noise.
+"""Fits effects to readings: damped Gauss-Newton with expected sizes as priors and its own noise.
 
 The unknowns are z = (value - null)/scale with the prior z ~ N(0, width^2), and the coefficients of
 at most one field F of an unknown effect, which are integrated out. The fit minimises
@@ -40,20 +40,20 @@ from seecr.effects import Terms
 from seecr.pose import Array
 
 TRACKER = "tracker_frame"
-"""The effect that has no plausible size: a tracker may stand anywhere."""
+"""The effect that has no expected size: a tracker may stand anywhere."""
 
 FLAT, SHAPES = 300.0, 30.0
-"""Prior widths of what has no plausible size: a tracker's frame, and shapes."""
+"""Prior widths of what has no expected size: a tracker's frame, and shapes."""
 
 # Rounds of estimating noise and weights, the change at which these have settled, steps of a round.
 _ROUNDS, _SETTLED, _STEPS = 4, 0.05, 6
 # A step is the last if it gains less than both this part of the objective and this much.
 _PART, _GAIN = 1e-3, 1e-2
-# Trials of a step, each damped ten times more; the longest step in plausible sizes (or widths).
+# Trials of a step, each damped ten times more; the longest step in expected sizes (or widths).
 _DAMPINGS, _MOST = 12, 5.0
 # A value whose posterior is no narrower than this part of its prior is not determined by the data.
 _UNSEEN = 0.98
-# A parameter of which a plausible size moves the readings by less than this part of their noise
+# A parameter of which an expected size moves the readings by less than this part of their noise
 # moves none.
 _IDLE = 1e-5
 
@@ -187,7 +187,7 @@ class Fit:
 
     @property
     def z(self) -> Array:
-        """(p,) values in plausible sizes from null."""
+        """(p,) values in expected sizes from null."""
         return self.terms.sizes
 
     @property
@@ -280,7 +280,7 @@ class Fit:
         return np.sqrt(np.diag(self.covariance))
 
     def with_idle(self, covariance: Array) -> Array:
-        """A covariance (p, p) in which what moves no reading has its plausible size as error."""
+        """A covariance (p, p) in which what moves no reading has its expected size as error."""
         out, moves = covariance.copy(), np.linalg.norm(self.jacobian, axis=0)
         idle = np.isinf(np.diag(out)) & (moves < _IDLE)
         out[idle, idle] = self.terms.scale[idle] ** 2
@@ -308,7 +308,7 @@ def fit(
 
     Args:
         data, start: what is fitted, and the model at its starting values.
-        widths: prior widths of its effects, in plausible sizes; 1 by default.
+        widths: prior widths of its effects, in expected sizes; 1 by default.
         field: (N, k) columns of an unknown effect in units of their width, or None.
         noise: where to begin; by default white and as large as the median residual.
         rounds: of estimating the noise and fitting with it.

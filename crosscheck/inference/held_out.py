@@ -1,4 +1,4 @@
-"""Errors on held-out runs, each predicted by a fit that has not seen it.
+"""Errors on test runs, each predicted by a fit that has not seen it.
 
 Only these tell whether a model is right: the error on the rows of a fit always falls. A fit without
 a block of rows goes on from the fit of all rows, with its noise and its weights.

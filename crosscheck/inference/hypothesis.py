@@ -86,9 +86,9 @@ def scored(every: Catalogue, key: Key, fit: Fit, widths: Mapping[str, float]) ->
 
 
 def wider(every: Catalogue, one: Hypothesis) -> dict[str, float]:
-    """The widths of greatest evidence about a fit, none below a plausible size.
+    """The widths of greatest evidence about a fit, none below an expected size.
 
-    A plausible size may be ten times too small; odds of twenty to one say so. Of many effects that
+    An expected size may be ten times too small; odds of twenty to one say so. Of many effects that
     can stand for each other the evidence would also narrow those that it has no use for, and call
     their values certain.
     """

@@ -31,8 +31,8 @@ OUTLIERS, FAR = (0.95, 0.045, 0.005), (1.0, 10.0, 100.0)
 are. One reading in twenty is disturbed on real trackers (reflections, lost lines of sight)."""
 
 WIDTHS = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
-"""Prior standard deviations of an effect's values in plausible sizes, all equally probable. A good
-tracker resolves a hundredth of a plausible size; plausible sizes may be wrong by ten. Data that
+"""Prior standard deviations of an effect's values in expected sizes, all equally probable. A good
+tracker resolves a hundredth of an expected size; expected sizes may be wrong by ten. Data that
 would show no effect even at the widest allow no verdict."""
 
 FIELD_WIDTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
@@ -40,8 +40,8 @@ FIELD_WIDTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 whatever the prior."""
 
 LARGEST = 5.0 * WIDTHS[-1]
-"""No effect of more plausible sizes is listed as found: five standard deviations of the widest
-prior. The lines of one real robot were truly 20 plausible sizes longer than stated."""
+"""No effect of more expected sizes is listed as found: five standard deviations of the widest
+prior. The lines of one real robot were truly 20 expected sizes longer than stated."""
 
 # --- error rates and costs ------------------------------------------------------------------------
 

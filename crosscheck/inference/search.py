@@ -273,7 +273,7 @@ class Search:
         return self.cache[key]
 
     def at_plausible_sizes(self, found: Hypothesis) -> Hypothesis:
-        """A hypothesis fitted anew with prior widths of one plausible size at least.
+        """A hypothesis fitted anew with prior widths of one expected size at least.
 
         Narrow priors hold values near null that the readings hardly determine, and their errors
         are small only because of that: no reason to tell somebody with a caliper.
@@ -489,7 +489,7 @@ class Search:
 
     @cached_property
     def everything(self) -> Hypothesis:
-        """All effects that act from the start, fitted together with plausible sizes as priors."""
+        """All effects that act from the start, fitted together with expected sizes as priors."""
         members = self.every.members.values()
         names = [m.key for m in members if not m.waits and not part_of(m.key)]
         key = self.stood | frozenset(names)
@@ -501,7 +501,7 @@ class Search:
         return self._together(key, state)
 
     def _together(self, key: Key, state: State, noise: Noise | None = None) -> Hypothesis:
-        """A hypothesis fitted with plausible sizes as priors."""
+        """A hypothesis fitted with expected sizes as priors."""
         found = fit(self.data, state, noise=noise)
         return scored(self.every, key, found, dict.fromkeys(key, 1.0))
 

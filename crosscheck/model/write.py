@@ -63,7 +63,7 @@ def kept(one: Fitted, before: Term | None) -> Kept:
     """What a model keeps of a fit, beside the same effect in the model before.
 
     For an unknown file or run the mean of the known ones is expected, with a standard error from
-    their differences and uncertainties; if only one is known, with a plausible size.
+    their differences and uncertainties; if only one is known, with an expected size.
     """
     term, layout = one.term, one.term.layout
     if not isinstance(layout, ApartLayout):

@@ -42,12 +42,12 @@ class Visible:
     Attributes:
         signal: what the effect does to the readings.
         needed: squared signal that a test finds.
-        factor: smallest size that shows, in plausible sizes, with all parameters scaled alike; inf
+        factor: smallest size that shows, in expected sizes, with all parameters scaled alike; inf
             if the poses do not see it at all.
         identifiable: the same beside the best imitator that is no exact twin.
         imitator: name of that imitator, "" if there is none.
         confused: (name, signal it cannot imitate) of effects that cannot be told from this one at
-            its plausible size, the best imitator first; without exact twins.
+            its expected size, the best imitator first; without exact twins.
         twins: effects that imitate this one exactly in what the poses read.
     """
 
@@ -60,7 +60,7 @@ class Visible:
     twins: tuple[str, ...]
 
     def __repr__(self) -> str:
-        return f"{self.name}: from {short(self.factor)} plausible sizes on"
+        return f"{self.name}: from {short(self.factor)} expected sizes on"
 
     @property
     def name(self) -> str:
@@ -69,16 +69,16 @@ class Visible:
 
     @property
     def visible(self) -> bool:
-        """Whether a plausible size would show."""
+        """Whether an expected size would show."""
         return self.factor <= 1.0
 
     @property
     def named(self) -> bool:
-        """Whether a plausible size would show and be told from everything else."""
+        """Whether an expected size would show and be told from everything else."""
         return self.visible and not self.confused and not self.twins
 
     def sizes(self, factor: float) -> dict[str, float]:
-        """Parameters at a multiple of their plausible sizes, without shapes."""
+        """Parameters at a multiple of their expected sizes, without shapes."""
         layout = self.signal.layout
         own = np.any(self.signal.columns != 0.0, axis=0)
         own = own if own.any() else ~layout.shape
@@ -171,7 +171,7 @@ class Plan(Result):
         named = [v for v in seen if v.named]
         return (
             f"Of {counted(len(self.effects), 'effect')}, {len(seen)} would be visible at a "
-            f"plausible size and {len(named)} of these could be named. An effect of the smallest "
+            f"expected size and {len(named)} of these could be named. An effect of the smallest "
             f"visible size is found with a power of {100 * POWER:.0f} %, at a false-alarm rate of "
             f"{100 * LEVEL:.0f} % over all effects; from {NAMED:g} times that size on, a "
             "diagnosis names nine effects in ten, or an effect that these data cannot "
@@ -253,7 +253,7 @@ class Sight:
 
     @property
     def hidden(self) -> tuple[str, ...]:
-        """Effects that would not show at a plausible size."""
+        """Effects that would not show at an expected size."""
         lost = (one.name for one in self.effects if not one.visible)
         return tuple(name for name in lost if name not in self.found)
 
@@ -272,7 +272,7 @@ class Sight:
         total = len(self.effects) + len(asked)
         seen = len(self.effects) - len(self.hidden)
         effects = f"{seen} of {counted(total, 'effect')}"
-        out = [f"In these data {effects} would be visible at a plausible size."]
+        out = [f"In these data {effects} would be visible at an expected size."]
         large = [n for n, why in self.missing.items() if why.why is Why.TOO_MANY_PARAMETERS]
         lacking = by_reason({n: why for n, why in self.missing.items() if n not in large})
         still = [one.name for one in self.effects if not np.isfinite(one.factor)]
@@ -285,13 +285,13 @@ class Sight:
             out.append(f"Not visible: {'; '.join(lacking)}.")
         if large:
             out.append(
-                "Some have more parameters than these data have rows, and rest on plausible sizes: "
+                "Some have more parameters than these data have rows, and rest on expected sizes: "
                 f"{some(large, _MOST)}."
             )
         pairs = [f"{name} from {' or '.join(others[:3])}" for name, others in self.alike.items()]
         if pairs:
             alike = some(pairs, _MOST, "; ")
-            out.append(f"At a plausible size the data could not distinguish {alike}.")
+            out.append(f"At an expected size the data could not distinguish {alike}.")
         return out
 
     def as_json(self) -> dict[str, Any]:
@@ -342,7 +342,7 @@ def alike(found: Visible) -> str:
     names = [f"{name} (exactly)" for name in found.twins]
     names += [name for name, _left in found.confused]
     if not found.visible and not found.twins:
-        return "(not visible at a plausible size)"
+        return "(not visible at an expected size)"
     return some(names)
 
 

@@ -1,6 +1,6 @@
 """How large an effect must be to show, or to be told from another, by sensitivities alone.
 
-With the whitened derivatives G of an effect by its plausible sizes, the expected squared signal is
+With the whitened derivatives G of an effect by its expected sizes, the expected squared signal is
 lam = |G|^2, and the part that another effect's derivatives H cannot imitate is
 lam_gh = |G - H H^+ G|^2. A chi2 test of the family-wise level finds the effect in four of five
 cases if lam is at least ``needed``. So the smallest visible size is the plausible one times
@@ -44,7 +44,7 @@ class Signal:
 
     Attributes:
         layout: the effect. shape: values of its shape parameters.
-        columns: (N, p) whitened change of each reading by each plausible size; 0 for shapes.
+        columns: (N, p) whitened change of each reading by each expected size; 0 for shapes.
     """
 
     layout: Layout
@@ -58,7 +58,7 @@ class Signal:
 
     @property
     def power(self) -> float:
-        """Expected squared signal of plausible sizes."""
+        """Expected squared signal of expected sizes."""
         return float(np.sum(self.columns**2))
 
     @property

@@ -125,13 +125,13 @@ def _probabilities(found: Diagnosis, effect: str) -> list[str]:
 
 
 def _needs(path: ModelPath, term: Term) -> str:
-    """What it would take: the parameter that is largest in plausible sizes."""
+    """What it would take: the parameter that is largest in expected sizes."""
     layout, setup = term.layout, path.first.state.prediction.setup
     size = np.where(_makes_size(layout, setup), term.sizes, 0.0)
     k = int(np.argmax(np.abs(size)))
     factor, unit = in_unit(layout.units[k])
     name = parameter_name(layout.names[k], layout.units[k])
-    doubt = f" ({short(abs(float(size[k])), 2)} plausible sizes)" if abs(size[k]) > 3 else ""
+    doubt = f" ({short(abs(float(size[k])), 2)} expected sizes)" if abs(size[k]) > 3 else ""
     # a factor near one is told from one by its later digits
     digits = 5 if layout.null[k] else 3
     return f"{name} = {short(factor * float(term.vector[k]), digits)} {unit}".strip() + doubt

@@ -103,7 +103,7 @@ def _way(found: Diagnosis) -> TextTable:
     rows = [("before", found.before, "")]
     for finding in found.missing:
         rows.append((f"+ {finding.effect}", finding.rms, ""))
-        rows.append(("  on held-out runs", finding.held_out_rms, "dim"))
+        rows.append(("  on test runs", finding.held_out_rms, "dim"))
     return rms_table([*rows, ("noise alone", found.floor, "dim")])
 
 
@@ -199,7 +199,7 @@ def _waterfall(found: Diagnosis, path: ModelPath) -> Panel | None:
         "the noise of each reading need not be noise."
     ) * bool(path.problem.sigma.length_m)
     words = (
-        "Bars (dots if the axis is logarithmic): rms error on held-out runs, which the model was "
+        "Bars (dots if the axis is logarithmic): rms error on test runs, which the model was "
         f"not fitted to{added}. Bracket: the range over these runs, with one tick for each. Faint "
         "mark: the same error on the rows that the model was fitted to, which proves nothing. Grey "
         f"background: the error that {estimated}noise alone would give.{together}"
@@ -237,7 +237,7 @@ def _confusion(found: Diagnosis) -> Panel | None:
     if confusion is None:
         return None
     words: list[str] = [
-        "Percentage of the row's signal, over its plausible sizes, that the column could imitate "
+        "Percentage of the row's signal, over its expected sizes, that the column could imitate "
         "with these poses and readings."
     ]
     if confusion.twins:
@@ -289,7 +289,7 @@ def checks(found: Diagnosis) -> list[Check]:
     bound = _at_bounds(listed[-1])
     return [
         *out,
-        Check("held-out runs", better == blocks, "each added effect improves the prediction of "
+        Check("test runs", better == blocks, "each added effect improves the prediction of "
             f"{better} of {blocks}"),
         Check("sizes", worst < PLAUSIBLE and not bound, f"at most {short(worst, 2)} plausible "
               f"sizes ({largest})" + (f"; at its bound: {', '.join(bound)}" if bound else "")),
@@ -360,7 +360,7 @@ def step_text(
         rows = [(row.effect, str(row.why_not)) for row in found.candidates[:_MOST_CANDIDATES]]
         more = [TextTable(["tried", "why not listed"], rows)]
     blocks = [
-        kinds_table(kinds, errors, ("held-out runs", "fitted runs", "noise")),
+        kinds_table(kinds, errors, ("test runs", "fitted runs", "noise")),
         *more,
         Line(f"The box shows the worst pose, line {line} of the data."),
     ]

@@ -43,7 +43,7 @@ def waterfall(found: Diagnosis) -> str:
             _panel(axes, found, stages, kind)
         panels[0].set_yticks(range(len(stages)), [_label(stage, found) for stage in stages])
         panels[0].set_ylim(len(stages) - 0.45, -0.75)
-        return image(figure, "Errors on held-out runs, model by model, compared with the noise")
+        return image(figure, "Errors on test runs, model by model, compared with the noise")
 
 
 def _label(stage: Stage, found: Diagnosis) -> str:
@@ -202,7 +202,7 @@ def _names(found: Diagnosis) -> list[str]:
 
 
 def _columns(path: ModelPath, about: About, name: str) -> Array | None:
-    """(N, p) what an effect does beside the base model, by plausible sizes."""
+    """(N, p) what an effect does beside the base model, by expected sizes."""
     final = path.last.fit
     key = path.search.every.keys_of(final.terms).get(name, name)
     own = about.columns.get(key)
@@ -259,7 +259,7 @@ _SIZE_ROW = 0.19
 
 
 def draw_sizes(effects: tuple[Visible, ...]) -> str:
-    """The smallest size that shows and that can be named, in plausible sizes, of each effect."""
+    """The smallest size that shows and that can be named, in expected sizes, of each effect."""
     shown = [found for found in effects if np.isfinite(found.factor)]
     with styled():
         figure = blank(_SIZE_ROW * len(shown) + 0.9)
@@ -274,7 +274,7 @@ def draw_sizes(effects: tuple[Visible, ...]) -> str:
         axes.set_yticks(place, [found.name for found in shown])
         axes.set_ylim(-0.7, len(shown) - 0.3)
         plain_log(axes)
-        axes.set_xlabel("smallest visible size, in plausible sizes (dotted: 1)")
+        axes.set_xlabel("smallest visible size, in expected sizes (dotted: 1)")
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
         grid(axes, "x")
         return image(figure, "The smallest visible sizes")

@@ -25,7 +25,7 @@ EACH = {
 
 
 def effect_record(effect: type[Effect], robot: Robot | None) -> Record:
-    """An effect as JSON, SI; the parameters' limits and plausible sizes where there is a robot."""
+    """An effect as JSON, SI; the parameters' limits and expected sizes where there is a robot."""
     return {
         "effect": effect.name,
         "place": effect.place,
@@ -55,7 +55,7 @@ def _parameters(effect: type[Effect], robot: Robot | None) -> list[Record]:
 
 
 def _parameter(name: str, metadata: Mapping[str, Any]) -> Record:
-    """A parameter of any robot; no number where its plausible size depends on the robot."""
+    """A parameter of any robot; no number where its expected size depends on the robot."""
     scale = metadata["scale"]
     return {
         "name": name,
@@ -69,7 +69,7 @@ def _parameter(name: str, metadata: Mapping[str, Any]) -> Record:
 
 
 def size_words(metadata: Mapping[str, Any]) -> str:
-    """A parameter's plausible size in words: a number with its unit, or a formula of the robot."""
+    """A parameter's expected size in words: a number with its unit, or a formula of the robot."""
     scale = metadata["scale"]
     if callable(scale):
         return str(getattr(scale, "words", "depends on the robot"))
@@ -119,14 +119,14 @@ def print_effect(effect: type[Effect], robot: Robot | None) -> None:
     show([*blocks, Line(f"check by hand: {effect.by_hand()}")])
 
 
-_OF_ROBOT = "plausible sizes depend on the robot: --robot ROBOT.xml gives their numbers"
+_OF_ROBOT = "expected sizes depend on the robot: --robot ROBOT.xml gives their numbers"
 
 
 def _parameter_words(row: Record) -> str:
-    """A parameter of any robot, or of one, with its plausible size."""
+    """A parameter of any robot, or of one, with its expected size."""
     factor, unit = in_unit(row["unit"])
     of_one = "each" not in row
-    words = f"absent at {factor * row['absent']:.4g}, plausible size "
+    words = f"absent at {factor * row['absent']:.4g}, expected size "
     words += (
         f"{factor * row['plausible_size']:.3g} {unit}" if of_one else row["plausible_size_words"]
     )

@@ -224,7 +224,7 @@ def _over_poses(recording: Recording, scene: Scene, stages: Sequence[Stage], sho
 def _model_plots(
     recording: Recording, index: rr.TimeColumn, stages: Sequence[Stage], shown: Misfit, kind: Kind
 ) -> None:
-    """The error of each pose under each model; over the steps, that on all held-out runs."""
+    """The error of each pose under each model; over the steps, that on all test runs."""
     starts = shown.problem.experiment.commands.starts
     for k, stage in enumerate(stages):
         sizes = kind.sizes(shown.problem, stage.state.raw) * kind.factor
@@ -236,7 +236,7 @@ def _model_plots(
     steps = rr.TimeColumn(MODEL_STEP, sequence=range(len(stages)))
     rms = [kind.factor * (stage.held_out.rms[kind.key] or 0.0) for stage in stages]
     recording.scalars(entity, steps, rms)
-    plots.as_line(recording, entity, "rms on held-out runs", colours.SILVER, 2.0)
+    plots.as_line(recording, entity, "rms on test runs", colours.SILVER, 2.0)
 
 
 def _model_legend(stages: Sequence[Stage], shown: Misfit, kind: Kind) -> Legend:
@@ -261,7 +261,7 @@ def _bars_view(found: Diagnosis, stages: Sequence[Stage]) -> rrb.Spatial2DView:
     assert found.path is not None
     height = _height(found, stages)
     return rrb.Spatial2DView(
-        name="rms error on held-out runs, logarithmic; the line is the noise",
+        name="rms error on test runs, logarithmic; the line is the noise",
         origin=_BARS,
         background=rrb.Background(color=layout.GROUND),
         visual_bounds=rrb.VisualBounds2D(x_range=(0.0, 100.0), y_range=(-1.0, height)),
@@ -289,7 +289,7 @@ def _bars_of(
     recording: Recording, index: rr.TimeColumn, found: Diagnosis, stages: Sequence[Stage],
     kind: Kind, top: float,
 ) -> None:  # fmt: skip
-    """A block: bars of one kind of reading, from half the noise to the error on held-out runs."""
+    """A block: bars of one kind of reading, from half the noise to the error on test runs."""
     values = np.array([kind.factor * (s.held_out.rms[kind.key] or 0.0) for s in stages])
     floor = kind.factor * (found.floor.get(kind.key) or 0.0)
     ends = _bar_ends(values, values, floor)

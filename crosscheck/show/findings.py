@@ -28,7 +28,7 @@ from seecr.counted import counted
 from seecr.effects import Terms
 from seecr.units import in_unit, measured, parameter_name, short, with_error
 
-# Correlations above this are named; parameters beyond this many plausible sizes are doubtful.
+# Correlations above this are named; parameters beyond this many expected sizes are doubtful.
 _CORRELATED, PLAUSIBLE = 0.9, 5.0
 _MOST_CORRELATIONS = 8
 # More parameters than this stand in two columns.
@@ -122,7 +122,7 @@ def parameter_table(finding: MissingEffect) -> TextTable:
         flags = [
             *["at its bound"] * bound,
             *["not determined by these data"] * (not seen),
-            *[f"{short(abs(size), 2)} plausible sizes"] * (abs(size) > PLAUSIBLE),
+            *[f"{short(abs(size), 2)} expected sizes"] * (abs(size) > PLAUSIBLE),
         ]
         rows.append([
             Code(parameter_name(name, si)),

@@ -36,8 +36,8 @@ def _addition(found: Addition, model: Path, written: bool) -> Iterator[Block]:
     yield rms_table([
         ("before", found.before, ""),
         (f"with {found.name}", found.after, "bold"),
-        (f"without {found.name}, on held-out runs", found.held_out_before, "dim"),
-        (f"with {found.name}, on held-out runs", found.held_out, ""),
+        (f"without {found.name}, on test runs", found.held_out_before, "dim"),
+        (f"with {found.name}, on test runs", found.held_out, ""),
     ])  # fmt: skip
     yield Items(found.warnings, "warning: ", "bold yellow")
     yield Line(f"With {found.name}, {_left(found)}.", "green" if found.is_noise else "")
@@ -77,7 +77,7 @@ def _calibration(found: Calibrated, model: Path, written: bool) -> Iterator[Bloc
     yield rms_table([
         ("before", found.before, ""),
         ("calibrated", found.after, "bold"),
-        ("calibrated, on held-out runs", found.held_out, ""),
+        ("calibrated, on test runs", found.held_out, ""),
     ])  # fmt: skip
     largest = [_largest(one) for one in found.fitted]
     rows = [
@@ -97,7 +97,7 @@ def _calibration(found: Calibrated, model: Path, written: bool) -> Iterator[Bloc
         yield Line("The fit did not converge: do not use its values.", "bold yellow")
     elif not found.pays:
         then = "" if written else ": not written; --force writes it"
-        yield Line(f"The prediction of held-out runs does not improve{then}", "bold yellow")
+        yield Line(f"The prediction of test runs does not improve{then}", "bold yellow")
     if written:
         parts = (
             f"{counted(len(found.fitted), 'effect')}, {counted(len(found.covariance), 'parameter')}"

@@ -149,7 +149,7 @@ def _visible(plan: Plan) -> Iterator[Block | None]:
     rows += [
         [Code(name), "", Small(f"{_UNTESTABLE}{why.words}")] for name, why in plan.missing.items()
     ]
-    yield section("Each effect", TextTable(["effect", "#in plausible sizes", *_HEADS], rows))
+    yield section("Each effect", TextTable(["effect", "#in expected sizes", *_HEADS], rows))
 
 
 def _card(number: int, item: Suggestion) -> Panel:
@@ -177,7 +177,7 @@ def _confusion(plan: Plan) -> Panel | None:
     kept = tuple(name for name, shown in zip(names, seen, strict=True) if shown)
     figure = Figure(draw_confusion(Confusion(kept, 0, part[np.ix_(seen, seen)])), wide=False)
     words = (
-        "Percentage of the row's signal, over its plausible sizes, that the column could imitate. "
+        "Percentage of the row's signal, over its expected sizes, that the column could imitate. "
         "Framed: they imitate each other."
     )
     return section("Which effects could be mistaken for which", figure, Line(words, "dim"))

@@ -32,7 +32,7 @@ _SHARES = (0.2, 0.6, 0.2)
 # Only tensions show this effect, so it is drawn after all others, with this probability: the poses
 # of a seed are the same with and without tensions.
 _OF_TENSIONS, _ALSO = "tension_scale", 0.1
-# Range of sizes, in plausible sizes: for an effect with one number, and for each of several.
+# Range of sizes, in expected sizes: for an effect with one number, and for each of several.
 _ONE, _SEVERAL = (1.0, 2.0), (0.5, 2.0)
 # A cable that softens as it stretches breaks in the end: these effects only stiffen.
 _UPWARDS = ("nonlinear_elasticity",)
@@ -77,7 +77,7 @@ def choose(
     What a seed hides does not depend on the commands: measured again, it is the same robot.
 
     Args:
-        robot: for its plausible sizes.
+        robot: for its expected sizes.
         random: of the twin's seed.
         given: these effects, with the sizes that they have if any; None draws them.
         count: how many to draw; None draws that too.

@@ -131,7 +131,7 @@ def parameter(
 
     Args:
         unit: as in the suffixes of CSV columns, such as "m" or "rad"; "" for none.
-        scale: plausible size, one standard deviation from tolerances or data sheets; a number
+        scale: expected size, one standard deviation from tolerances or data sheets; a number
             or a function of the robot, whose ``words`` are told where there is no robot.
         null: value at which the effect is absent.
         bounds: lowest and highest value, numbers or functions of the robot.
@@ -186,7 +186,7 @@ class Effect:
             anew, winches homed before each run), or nothing.
         advice: how to measure it on its own, and after a colon what to expect. ``{name}`` is
             filled with a parameter in millimetres or degrees where those are its units,
-            ``{largest}`` and ``{which}`` with the parameter that is the most plausible sizes from
+            ``{largest}`` and ``{which}`` with the parameter that is the most expected sizes from
             null, and others by :meth:`totals`.
         renamed: of parameters in model files written before: each old key, and those that have
             its value now.
@@ -384,7 +384,7 @@ def mean_length(robot: Robot) -> float:
 
 @dataclass(frozen=True)
 class OfRobot:
-    """A plausible size, or a bound, that depends on the robot.
+    """An expected size, or a bound, that depends on the robot.
 
     Attributes:
         words: the formula, such as "2 % of the mean cable length".
@@ -399,14 +399,14 @@ class OfRobot:
 
 
 def of_length(part: float) -> OfRobot:
-    """A plausible size that is a part of the mean cable length."""
+    """An expected size that is a part of the mean cable length."""
     words = f"{100.0 * part:g} % of the mean cable length"
     return OfRobot(words, lambda robot: part * mean_length(robot))
 
 
 # Limits of values without physical bounds, far beyond what a robot can have: they stop typing
 # errors, other units and damaged files, whose squares the solver could not even compute.
-# A value may differ from null by so many plausible sizes, an angle by one full turn. What a tracker
+# A value may differ from null by so many expected sizes, an angle by one full turn. What a tracker
 # reads may be in the coordinates of its hall.
 _LARGEST_SIZE, _LARGEST_READ, _TURN = 1e4, 1e5, 2.0 * np.pi
 

@@ -16,7 +16,7 @@ from seecr.pose import Array, quat_from_rotvec, quat_rotate
 # No platform is lighter than this part of what its file says, nor has its centre of mass this
 # many of its own lengths outside of its anchor points.
 _LEAST_MASS, _FARTHEST = 0.05, 2.0
-# Plausible sizes, and what the robot's length is.
+# Expected sizes, and what the robot's length is.
 _LENGTH = "half the largest distance of two anchor points"
 _TENTH = OfRobot("10 % of the platform's mass", lambda r: 0.1 * r.mass)
 _FORCE = OfRobot("3 % of the weight", lambda r: 0.03 * r.usual_load)

@@ -196,7 +196,7 @@ def layout_of(effect: GivenEffect, robot: GivenRobot) -> Layout:
         robot: as described, or its MJCF.
 
     Returns:
-        names, units, plausible sizes and bounds of its p parameters.
+        names, units, expected sizes and bounds of its p parameters.
 
     Raises:
         InputError: neither the name of an effect nor an effect.

@@ -249,7 +249,7 @@ class Term:
 
     @property
     def sizes(self) -> Array:
-        """(p,) z = (value - null)/scale: how many plausible sizes the values are from null."""
+        """(p,) z = (value - null)/scale: how many expected sizes the values are from null."""
         return (self.vector - self.layout.null) / self.layout.scale
 
     def effect(self) -> Effect:
@@ -351,7 +351,7 @@ class Terms:
 
     @cached_property
     def scale(self) -> Array:
-        """(p,) plausible sizes."""
+        """(p,) expected sizes."""
         return _joined([term.layout.scale for term in self._terms])
 
     @cached_property
@@ -371,7 +371,7 @@ class Terms:
 
     @property
     def sizes(self) -> Array:
-        """(p,) z = (value - null)/scale: how many plausible sizes the values are from null."""
+        """(p,) z = (value - null)/scale: how many expected sizes the values are from null."""
         return (self.vector - self.null) / self.scale
 
     def part(self, name: str) -> slice:

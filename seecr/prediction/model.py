@@ -8,7 +8,7 @@
     [effect.parameters]
     radius_m = { value = 0.0099, stderr = 0.0001, unit = "m", at_bound = false }
     [effect.provenance]          # data file, date, version, who or what put it there
-    [effect.before]              # rms errors without it, with it, and on held-out runs
+    [effect.before]              # rms errors without it, with it, and on test runs
     [effect.after]
     [effect.held_out]
     [fit]                        # correlations of the errors of these values

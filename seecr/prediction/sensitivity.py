@@ -70,7 +70,7 @@ def wrench_by_ends(
 
 # Terms with a parameter shifted up and down, for finite differences.
 
-# Steps of central and one-sided differences, in plausible sizes of a parameter.
+# Steps of central and one-sided differences, in expected sizes of a parameter.
 _CENTRAL, _ONE_SIDED = 1e-4, 1e-5
 
 # Quantities that affect the statics only through the rest lengths.
@@ -199,7 +199,7 @@ def blocks_of_cables(
     ]
 
 
-# Step of finite differences along a path, in plausible sizes of a parameter. It is small because a
+# Step of finite differences along a path, in expected sizes of a parameter. It is small because a
 # cable that is barely taut at the equilibrium is slack close to it.
 _WAY = 1e-5
 # Step for the sensors' reading of a pose: [rad], or a relative change of a length or tension.

@@ -160,7 +160,7 @@ def test_a_plan_is_written_as_commands(tmp_path: Path) -> None:
 def test_a_diagnosis_reads_like_one() -> None:
     text = str(found())
     assert text.startswith("In these data ") and "\neffects_found: " in text
-    assert "\n+ pulley_radius: " in text and "(on held-out runs " in text
+    assert "\n+ pulley_radius: " in text and "(on test runs " in text
     assert "\nnoise alone: " in text and "    check: " in text
     (row,) = found().to_frame().to_pylist()
     assert row["effect"] == "pulley_radius" and row["parameter"] == "radius_m"

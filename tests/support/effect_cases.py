@@ -57,7 +57,7 @@ def lengthened(tables: Tables, by: float) -> Tables:
 def random_term(
     rng: np.random.Generator, experiment: Experiment, name: str, part: float = 0.3
 ) -> Term:
-    """An effect of about ``part`` of its plausible size, shapes where a search would start."""
+    """An effect of about ``part`` of its expected size, shapes where a search would start."""
     layout = layout_of(effect_named(name), experiment.robot)
     sign = np.where(layout.lower >= layout.null, 1.0, rng.choice([-1.0, 1.0], len(layout)))
     if name == "nonlinear_elasticity":
@@ -102,7 +102,7 @@ def worst_mismatch(experiment: Experiment, terms: Terms, found: np.ndarray) -> t
     """Largest error of sensitivities (n, 6 + m, p) against full differences, and whose it is.
 
     In parts of the largest change of that kind of reading when the parameter changes by its
-    plausible size; changes below a millionth of the robot's length, a microradian or a millionth
+    expected size; changes below a millionth of the robot's length, a microradian or a millionth
     of its weight are nobody's.
     """
     robot = experiment.robot

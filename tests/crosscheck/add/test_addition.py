@@ -46,7 +46,7 @@ def test_what_predicts_better_pays_unless_it_is_nothing(predicts: bool, is_nothi
     found = addition(predicts=predicts, is_nothing=is_nothing)
     assert found.pays == (predicts and not is_nothing)
     worth = "improves" if predicts else "does not improve"
-    assert found.lines()[0].startswith(f"stiffness + creep {worth} the prediction of held-out runs")
+    assert found.lines()[0].startswith(f"stiffness + creep {worth} the prediction of test runs")
     nothing = "stiffness + creep is 9 standard errors from null"
     assert (f"{nothing}: it is not worth adding" in found.lines()) == is_nothing
     assert found.why_not.startswith(nothing if is_nothing else "what stiffness + creep explains")
@@ -79,7 +79,7 @@ def test_the_added_effect_is_found_by_its_name_and_the_model_has_all() -> None:
 
 
 def test_warnings_of_several_parameters_are_in_the_plural() -> None:
-    """Once "gain_1, gain_2 is up to 9 times its plausible size"."""
+    """Once "gain_1, gain_2 is up to 9 times its expected size"."""
     gains = {f"gain_{i}": 0.1 for i in (1, 2)}
     one, two = (
         " ".join(weigh._warnings_of(ROBOT, fitted("drum_gain", **dict(list(gains.items())[:k]))))
@@ -87,8 +87,8 @@ def test_warnings_of_several_parameters_are_in_the_plural() -> None:
     )
     assert one.startswith("drum_gain: gain_1 is ")
     assert two.startswith("drum_gain: gain_1, gain_2 are up to ")
-    assert "times its plausible size: check it on" in one and "up to" not in one
-    assert "times their plausible sizes: check them on" in two
+    assert "times its expected size: check it on" in one and "up to" not in one
+    assert "times their expected sizes: check them on" in two
     known = Term.of(ROBOT, "drum_gain").measured(**dict.fromkeys(gains, (0.01, 1e-4)))
     known = known.with_vector(np.zeros(8))
     off = Fitted(known, np.full(8, 1e-4), np.zeros(8, dtype=bool))

@@ -44,7 +44,7 @@ def test_added_one_after_the_other_the_error_falls_to_the_noise(both, tmp_path, 
     assert said["held_out"]["position_rms_m"] < said["held_out_before"]["position_rms_m"]
     first = add("pulley_radius", both, tmp_path / "again.toml")
     assert first.exit_code == 0
-    assert "before" in first.stdout and "on held-out runs" in first.stdout
+    assert "before" in first.stdout and "on test runs" in first.stdout
     assert "crosscheck diagnose" in first.stdout  # something is still missing
     compared = ("compare", *both, "--model", model, *gate, "--out", out)
     assert run(*compared).exit_code == 1

@@ -41,7 +41,7 @@ def test_all_at_once_the_error_falls_to_the_noise_and_the_model_can_be_used(
     model = tmp_path / "model.toml"
     result = run("calibrate", *many, *FEW, "--model", model, "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output
-    assert "on held-out runs" in result.stdout and f"Written to {model}" in result.stdout
+    assert "on test runs" in result.stdout and f"Written to {model}" in result.stdout
     found = json.loads((tmp_path / "out" / "calibration.json").read_text())
     assert set(found["made"]["sha256"]) == {"robot.xml", "measured.csv", "measured.toml"}
     assert found["settled"] and found["improves_held_out"]
@@ -88,7 +88,7 @@ def test_where_nothing_is_gained_nothing_is_written(tmp_path: Path) -> None:
     model = tmp_path / "model.toml"
     result = run("calibrate", *files, *FEW, "--model", model)
     assert result.exit_code == 1 and not model.exists()
-    assert "The prediction of held-out runs does not improve: not written" in result.stdout
+    assert "The prediction of test runs does not improve: not written" in result.stdout
     forced = run("calibrate", *files, "--only", "platform_mass", "--model", model, "--force")
     assert forced.exit_code == 0 and model.exists()
     assert "does not improve\n" in forced.stdout and "not written" not in forced.stdout

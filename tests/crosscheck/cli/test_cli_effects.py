@@ -25,7 +25,7 @@ def test_one_effect_has_its_formula_and_its_size_for_a_robot() -> None:
     assert result.exit_code == 0, result.output
     assert "r (pi - psi)" in result.stdout
     layout = layout_of(catalogue()["pulley_radius"], load_robot(COGIRO))
-    assert f"plausible size {1e3 * layout.scale[0]:.3g} mm" in result.stdout
+    assert f"expected size {1e3 * layout.scale[0]:.3g} mm" in result.stdout
     assert f", at most {1e3 * layout.upper[0]:.4g} mm" in result.stdout
     assert "check by hand: measure a sheave with a caliper" in result.stdout
 
@@ -35,14 +35,14 @@ def test_one_effect_has_its_formula_and_its_size_for_a_robot() -> None:
     [
         ("drum_gain", "gain [no unit], one per cable"),
         ("exit_point_error", ", x y z per cable"),
-        ("stiffness", "factor [no unit]: absent at 1, plausible size 0.3\n"),
+        ("stiffness", "factor [no unit]: absent at 1, expected size 0.3\n"),
         (
             "pulley_radius",
-            "radius [mm]: absent at 0, plausible size 2 % of the mean cable length\n",
+            "radius [mm]: absent at 0, expected size 2 % of the mean cable length\n",
         ),
         (
             "pulley_radius",
-            "plausible sizes depend on the robot: --robot ROBOT.xml gives their numbers",
+            "expected sizes depend on the robot: --robot ROBOT.xml gives their numbers",
         ),
         ("creep", "time [s]: modifies the others, starts at 100"),
         ("frame_compliance", "sideways [mm/N]"),

@@ -1,4 +1,4 @@
-"""Effects far below their plausible sizes, which a good tracker sees all the same."""
+"""Effects far below their expected sizes, which a good tracker sees all the same."""
 
 from __future__ import annotations
 

@@ -42,6 +42,6 @@ def test_what_something_unknown_may_change_is_told_and_kept() -> None:
 
 def test_where_all_error_is_below_the_noise_no_share_of_it_is_told() -> None:
     """Points that moved were "removes 0 %", beside errors that fell."""
-    assert removed(0.0) == "removes no error beyond the noise on held-out runs by itself"
-    assert removed(0.526) == "removes 52.6 % of the unexplained error on held-out runs"
+    assert removed(0.0) == "removes no error beyond the noise on test runs by itself"
+    assert removed(0.526) == "removes 52.6 % of the unexplained error on test runs"
     assert "removes 0.1 %" in removed(0.001)

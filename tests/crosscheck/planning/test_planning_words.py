@@ -38,7 +38,7 @@ def test_exact_twins_come_first_and_what_is_not_seen_is_said() -> None:
     confused = tuple((name, 1.0) for name in "bcdef")
     both = replace(CLEAR, twins=("a",), confused=confused)
     assert alike(both) == "a (exactly), b, c, d and 2 more"
-    assert alike(replace(CLEAR, factor=2.0)) == "(not visible at a plausible size)"
+    assert alike(replace(CLEAR, factor=2.0)) == "(not visible at an expected size)"
     assert alike(replace(both, factor=2.0)).startswith("a (exactly)")
 
 
@@ -93,18 +93,18 @@ def test_what_cannot_be_told_apart_is_so_at_plausible_sizes() -> None:
     """Of two effects that it then told apart a diagnosis began with "could not distinguish"."""
     like = replace(CLEAR, confused=(("creep", 3.0),))
     assert Sight((like,), {}).lines()[-1] == (
-        f"At a plausible size the data could not distinguish {CLEAR.name} from creep."
+        f"At an expected size the data could not distinguish {CLEAR.name} from creep."
     )
 
 
 def test_what_has_more_parameters_than_rows_is_not_called_invisible() -> None:
-    """It was listed by the same diagnosis: sets weigh it with plausible sizes."""
+    """It was listed by the same diagnosis: sets weigh it with expected sizes."""
     large = Reason(Why.TOO_MANY_PARAMETERS, parameters=36, rows=28)
     lacking = {"anchor_point_error": large, "tension_scale": Reason(Why.NEEDS_TENSIONS)}
     said, unseen, rest = Sight((CLEAR,), lacking).lines()
     assert said.startswith("In these data 1 of 3 effects")
     assert unseen == "Not visible: tension_scale (needs measured tensions)."
-    assert rest.endswith("rest on plausible sizes: anchor_point_error.")
+    assert rest.endswith("rest on expected sizes: anchor_point_error.")
 
 
 ROBOT = "planar_vertical"

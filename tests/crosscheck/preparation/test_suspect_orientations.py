@@ -141,7 +141,7 @@ def test_where_conventions_hardly_differ_it_is_asked_and_no_more() -> None:
 @pytest.mark.parametrize("deg", [0.0, 4.0, 15.0])
 @pytest.mark.parametrize("name", sorted(catalogue()))
 def test_no_effect_is_taken_for_a_convention(name: str, deg: float) -> None:
-    """Also one ten times its plausible size, of which a verdict will speak."""
+    """Also one ten times its expected size, of which a verdict will speak."""
     still = tilting(deg=deg)
     assert still.command_pose is not None
     experiment = Experiment(COGIRO, Commands(still.command_pose))

@@ -402,7 +402,7 @@ def test_checks_tell_noise_from_structure() -> None:
     assert good["size of the noise"] is True
     assert good["something unknown"] is True
     assert good["neighbouring rows"] is True
-    assert good["held-out runs"] is True
+    assert good["test runs"] is True
     bad = {check.name: check.good for check in checks(diagnosis("unknown"))}
     assert bad["something unknown"] is False
     assert checks(diagnosis("none")) == []
@@ -431,7 +431,7 @@ def test_friction_would_need_a_friction_and_not_the_length_that_it_is_looked_for
 def test_sizes_that_are_not_plausible_are_named_with_their_effect() -> None:
     found = diagnosis("pulleys")
     (sizes,) = (check for check in checks(found) if check.name == "sizes")
-    assert sizes.words.endswith("plausible sizes (pulley_radius)")
+    assert sizes.words.endswith("expected sizes (pulley_radius)")
     fit = path_of(found).last.fit
     at_bound = replace(fit.state, terms=fit.terms.with_vector(fit.terms.lower))
     stuck = with_last(found, fit=replace(fit, state=at_bound))

@@ -93,7 +93,7 @@ def test_a_plan_counts_what_shows_and_what_can_be_named() -> None:
     hidden = replace(SHOWS, factor=2.0)
     twin = replace(SHOWS, twins=("a",))
     words = plan(effects=(SHOWS, twin, hidden)).sentence
-    assert words.startswith("Of 3 effects, 2 would be visible at a plausible size and 1 of these")
+    assert words.startswith("Of 3 effects, 2 would be visible at an expected size and 1 of these")
     assert "so few rows (2)" in plan(effects=()).sentence
     lost: Any = SimpleNamespace(unsolved=np.ones(2, bool), problem=None)
     assert "no equilibrium at any of the rows" in plan(effects=(), planned=lost).sentence

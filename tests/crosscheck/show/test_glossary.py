@@ -32,11 +32,9 @@ def test_a_word_is_linked_where_it_first_stands_in_each_section() -> None:
 
 
 def test_words_are_known_in_the_plural_with_numbers_and_by_their_other_names() -> None:
-    page = linked(
-        "<p>9 standard errors from zero; two plausible sizes; on held-out runs; p 0.1</p>"
-    )
+    page = linked("<p>9 standard errors from zero; two expected sizes; on test runs; p 0.1</p>")
     said = re.findall(r"<a [^>]*>(.*?)</a>", page)
-    assert said == ["9 standard errors from zero", "plausible sizes", "held-out runs"]
+    assert said == ["9 standard errors from zero", "expected sizes", "test runs"]
     assert linked("<p>unslackened, noise-free &amp; phase</p>").count("<a") == 0
 
 

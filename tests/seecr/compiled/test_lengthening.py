@@ -17,7 +17,7 @@ ALL = ("pulley_radius", "cable_weight", *LAWS)
 
 
 def predicted(kind: str, names: tuple[str, ...]) -> seecr.Prediction:
-    """A short way with effects of plausible sizes, each row with its history."""
+    """A short way with effects of expected sizes, each row with its history."""
     robot = seecr.load_robot(kind)
     poses = np.tile(robot.reference_pose, (5, 1))
     poses[:, 0] += np.linspace(0.0, 0.05 * robot.length, 5)

@@ -229,7 +229,7 @@ def test_the_usual_strain_is_that_of_the_weight_or_of_the_pretension() -> None:
     assert usual_strain(pretensioned) == pytest.approx(strain) and 0.004 < strain < 0.006
     weight = hung.mass * np.linalg.norm(hung.gravity)
     assert usual_strain(hung) == pytest.approx(0.5 * weight / hung.ea.mean(), rel=1e-9)
-    # at a plausible size the quadratic part adds or takes 0.3 of the tension, the cubic 0.3 more
+    # at an expected size the quadratic part adds or takes 0.3 of the tension, the cubic 0.3 more
     scale = seecr.layout_of("nonlinear_elasticity", pretensioned).scale
     assert scale * [strain, strain**2] == pytest.approx([0.3, 0.3])
 

@@ -31,7 +31,7 @@ def line(n: int = 12, first: float = 0.33, last: float = 0.47, z: float = 0.15) 
 
 
 def typical(robot: seecr.Robot, effect: type) -> seecr.Term:
-    """An effect of a plausible size."""
+    """An effect of an expected size."""
     layout = seecr.layout_of(effect, robot)
     size = np.where(layout.shape, layout.null, layout.null + 0.7 * layout.scale)
     return seecr.Term(layout, np.clip(size, layout.lower, layout.upper))
