@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from seecr.equilibrium.search import equilibria
     from seecr.equilibrium.solving import solve
     from seecr.errors import (
+        ExecutorError,
         InputError,
         InputFileError,
         MissingPackageError,
@@ -94,8 +95,8 @@ _MODULES = {
     ),
     "equilibrium.solving": ("solve",),
     "errors": (
-        "InputError", "InputFileError", "MissingPackageError", "NoRestError", "RobotError",
-        "SeecrError",
+        "ExecutorError", "InputError", "InputFileError", "MissingPackageError", "NoRestError",
+        "RobotError", "SeecrError",
     ),
     "prediction.experiment": ("Experiment", "Prediction", "predict", "placed", "tracked"),
     "exported.export": ("Export", "export"),
@@ -123,7 +124,7 @@ _WHERE = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
     "BarBalance", "BarManifold", "BarRest", "Barrier", "Commands", "Control", "Controlled",
-    "Correction", "Effect", "Experiment", "Export", "FeedForward", "Feedback", "InputError",
+    "Correction", "Effect", "ExecutorError", "Experiment", "Export", "FeedForward", "Feedback", "InputError",
     "InputFileError", "Joint", "Jump", "Knowledge", "Loads", "Midlines", "MissingPackageError",
     "Model", "NoRestError", "Prediction", "Readings", "Robot", "RobotError", "Scheme",
     "SeecrError", "SensorNoise", "Setup", "SlackSpan", "Solution", "Spread", "Status", "Term",

@@ -54,6 +54,12 @@ class MissingPackageError(SeecrError):
     """A request that needs a package which is not installed."""
 
 
+class ExecutorError(SeecrError):
+    """An executor that ended before its work."""
+
+    exit_status = 3
+
+
 class InputFileError(SeecrError):
     """A user's file that is missing, of another kind, or wrong at some place."""
 

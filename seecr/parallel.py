@@ -8,16 +8,31 @@ one they run in this process, with the same results.
 
 from __future__ import annotations
 
+import asyncio
+import hashlib
+import logging
 import os
+import pickle
 import signal
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor, as_completed, wait
-from contextlib import contextmanager
+from concurrent.futures import (
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    as_completed,
+    wait,
+)
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from seecr.errors import ExecutorError, InputError, MissingPackageError
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -27,6 +42,8 @@ R = TypeVar("R")
 
 # Fewer poses than this are not worth a second thread.
 _CHUNK = 128
+# A scheduler that is there answers within a second; over a slow network it may take a few.
+_SECONDS = 10
 # Per thread: ``whole``, whether the other processors are busy, so that batches are not divided.
 _at = threading.local()
 
@@ -115,28 +132,111 @@ if hasattr(os, "register_at_fork"):
 # --- tasks on an executor -------------------------------------------------------------------------
 
 
+def as_done(
+    function: Callable[[T], R], items: Sequence[T], executor: Executor | None = None,
+    order: Sequence[int] | None = None,
+) -> Iterator[tuple[int, R]]:  # fmt: skip
+    """Call a function with each item, in this process or by an executor.
+
+    The executor gets them in ``order``, the longest first so that none is left over at the end. The
+    function must be of a module so that it can be sent to a process, or a ``partial`` of such a
+    one: what it holds is packed once, and unpacked once in each process. Work that is not begun is
+    given up where the iterator is closed.
+
+    Yields:
+        each result as it comes, with the number of its item. An executor's results are not kept.
+
+    Raises:
+        ExecutorError: the executor ended before its work.
+    """
+    if executor is None:
+        yield from ((i, function(item)) for i, item in enumerate(items))
+        return
+    futures: dict[Future[R], int] = {}
+    try:
+        sent = _sent(function, executor)
+        for i in range(len(items)) if order is None else order:
+            futures[executor.submit(_whole, sent, items[i])] = i
+        for future in as_completed(futures):
+            yield futures.pop(future), future.result()
+    except Exception as error:
+        if not _is_end(error):
+            raise
+        raise ExecutorError(
+            f"the executor ended before its work ({type(error).__name__}): a worker was killed, "
+            "perhaps for lack of memory, or the scheduler was; expected one that stays"
+        ) from None
+    finally:
+        for future in futures:
+            future.cancel()
+
+
 def run_tasks(
     function: Callable[[T], R], items: Sequence[T], executor: Executor | None = None,
     order: Sequence[int] | None = None, tell: Callable[[R], None] = lambda _result: None,
 ) -> list[R]:  # fmt: skip
-    """Call a function with each item, in this process or by an executor.
-
-    The executor gets them in ``order``, the longest first so that none is left over at the end; the
-    function must be of a module so that it can be sent to a process. Each result is told here as it
-    comes.
-
-    Returns:
-        the results in the order of the items.
+    """The results of :func:`as_done` in the order of the items, each told here as it comes.
 
     Raises:
-        concurrent.futures.BrokenExecutor: a process of the executor died.
+        ExecutorError: the executor ended before its work.
     """
-    if executor is None:
-        return [_told(function(item), tell) for item in items]
-    order = range(len(items)) if order is None else order
-    futures = {executor.submit(_whole, function, items[i]): i for i in order}
-    found = {futures[f]: _told(f.result(), tell) for f in as_completed(futures)}
+    found: dict[int, R] = {}
+    with closing(as_done(function, items, executor, order)) as results:
+        for i, result in results:
+            tell(result)
+            found[i] = result
     return [found[i] for i in range(len(items))]
+
+
+@contextmanager
+def cluster(address: str, tell: Callable[[str], None]) -> Iterator[Executor]:
+    """The workers of a scheduler of dask.distributed, as an executor.
+
+    A task whose worker is lost is done again by another one, twice at most.
+
+    Args:
+        address: of the scheduler. tell: told if it has no workers yet.
+
+    Raises:
+        MissingPackageError: distributed is not installed.
+        InputError: there is no scheduler.
+    """
+    try:
+        from distributed import Client, rpc
+    except ModuleNotFoundError as error:
+        if error.name != "distributed":  # installed, but one of its own imports is missing
+            raise
+        raise MissingPackageError(
+            "a scheduler needs the package distributed, which is not installed; "
+            "pip install 'seecr[cluster]'"
+        ) from None
+    # it would tell what the error tells, and more
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+
+    async def identity() -> Any:
+        async with rpc(address) as asked:
+            return await asked.identity()
+
+    async def asked_in_time() -> Any:
+        return await asyncio.wait_for(identity(), _SECONDS)
+
+    try:  # before there is a client, which waits for ever for what listens and does not answer
+        found = asyncio.run(asked_in_time())
+        if found["type"] != "Scheduler":
+            raise TypeError
+    except Exception as error:  # of many kinds: what answers may be anything
+        raise InputError(
+            f"--scheduler {address}: no scheduler answers there ({type(error).__name__}); expected "
+            "the address that dask-scheduler prints, such as tcp://10.0.0.1:8786"
+        ) from None
+    if not found["workers"]:
+        tell(f"the scheduler {address} has no workers yet: the work begins when one comes")
+    with Client(address, set_as_default=False) as client:
+        executor = client.get_executor(retries=2, pure=False)
+        try:
+            yield executor
+        finally:
+            executor.shutdown(wait=False)  # else it waits for work that nobody wants any more
 
 
 @contextmanager
@@ -166,14 +266,43 @@ def processes(count: int) -> Iterator[Executor | None]:
             executor.shutdown(cancel_futures=True)
 
 
-def _told(result: R, tell: Callable[[R], None]) -> R:
-    tell(result)
-    return result
+@dataclass(frozen=True)
+class _Parcel:
+    """A function with all that it holds, packed; equal ones have the same digest."""
+
+    digest: str
+    data: bytes = field(compare=False, repr=False)
 
 
-def _whole(function: Callable[[T], R], item: T) -> R:
+def _sent(function: Any, executor: Executor) -> Any:
+    """What tasks are given of their function: a client of dask sends it to each worker once."""
+    data = pickle.dumps(function)
+    parcel = _Parcel(hashlib.sha256(data).hexdigest(), data)
+    client = getattr(executor, "_client", None)
+    # not by scatter, of which nothing is left when its worker is lost
+    return parcel if client is None else client.submit(_same, parcel, pure=False)
+
+
+def _same(parcel: _Parcel) -> _Parcel:
+    return parcel
+
+
+@lru_cache(maxsize=2)
+def _unpacked(parcel: _Parcel) -> Any:
+    return pickle.loads(parcel.data)
+
+
+def _whole(parcel: _Parcel, item: Any) -> Any:
+    """One task, in one thread."""
     with undivided():
-        return function(item)
+        return _unpacked(parcel)(item)
+
+
+def _is_end(error: Exception) -> bool:
+    """Whether an error is that of an executor, not of its tasks."""
+    kinds = (BrokenExecutor, CancelledError, ConnectionError)
+    late = type(error) is RuntimeError and "shutdown" in str(error)  # of submit, without a class
+    return isinstance(error, kinds) or late or type(error).__module__.startswith("distributed.")
 
 
 def _begin(pipe: Connection) -> None:

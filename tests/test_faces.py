@@ -114,13 +114,13 @@ seecr.importing.caspr: read_caspr
 seecr.importing.draft: write_robot
 seecr.importing.points_table: read_points
 seecr.importing.wirex: read_wirex
-seecr.parallel: processors
+seecr.parallel: cluster processes processors
 seecr.pose: NORM_TOLERANCE
 seecr.statics.starts: commanded_poses
 seecr.units: millimetres
 seecr.version: full_version
 seecr.workspace.grid: own_directions
-seecr.workspace.maps: evenly
+seecr.workspace.maps: MOST_POSES axis_of
 """.strip().splitlines()
     for module, _, names in [line.partition(": ")]
     for name in names.split()

@@ -13,6 +13,8 @@ from seecr.cli.durations import say_duration
 from seecr.cli.following import following, passive_lines
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from crosscheck import Case, CaseResult, Run, Thresholds
     from crosscheck.suite.effects import EffectCase
 
@@ -53,13 +55,14 @@ if TYPE_CHECKING:
     "Number of parallel processes.  [default: one per processor]",
     options.WholeNumber(min=1),
 )
+@options.scheduler
 @options.option("--no-recordings", "Do not write recordings (.rrd).")
 @options.out("crosscheck-results")
 @options.as_json
 def command(
     patterns: tuple[str, ...], list_only: bool, robot: Path | None, mujoco_robot: Path | None,
-    thresholds_file: Path | None, seed: int, jobs: int | None, no_recordings: bool, out: Path,
-    as_json: bool,
+    thresholds_file: Path | None, seed: int, jobs: int | None, scheduler: str | None,
+    no_recordings: bool, out: Path, as_json: bool,
 ) -> int:  # fmt: skip
     """Solve each pose with SEECR, settle it in MuJoCo, and compare the difference with thresholds.
 
@@ -110,7 +113,8 @@ def command(
         return 0
     at_once = jobs or processors()
     say_duration("run", sum(map(len, chosen)), "poses", as_json, at_once=at_once)
-    run = _run(chosen, thresholds, seed, at_once, not no_recordings, out)
+    with options.executor_of(scheduler) as executor:
+        run = _run(chosen, thresholds, seed, at_once, not no_recordings, out, executor)
     _tell(run, out, not no_recordings, as_json)
     return run.outcome.exit_status
 
@@ -127,7 +131,7 @@ def _list(chosen: list[Case | EffectCase]) -> None:
 
 def _run(
     chosen: list[Case | EffectCase], thresholds: Thresholds, seed: int, jobs: int,
-    recordings: bool, out: Path,
+    recordings: bool, out: Path, executor: Executor | None,
 ) -> Run:  # fmt: skip
     from crosscheck import run_suite, write_run
     from crosscheck.suite.write import FILE_NAME, RESULTS
@@ -142,7 +146,7 @@ def _run(
             run = run_suite(
                 chosen, thresholds, seed=seed, jobs=jobs,
                 record=partial(_record, folder=folder) if recordings else None,
-                progress=lambda result: advance(len(result), result.case.name),
+                progress=lambda result: advance(len(result), result.case.name), executor=executor,
             )  # fmt: skip
         write_run(run, folder)
     return run

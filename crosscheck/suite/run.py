@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import time
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import BrokenExecutor
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
@@ -50,7 +50,7 @@ from seecr.counted import counted, some
 from seecr.description.mjcf import load_robot, model_names
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve as seecr_solve
-from seecr.errors import InputError, InputFileError
+from seecr.errors import ExecutorError, InputError, InputFileError
 from seecr.files import json_text
 from seecr.parallel import processes, run_tasks
 from seecr.result import Record, Result
@@ -301,6 +301,7 @@ def run_suite(
     jobs: int = 1,
     record: Recorder | None = None,
     progress: Callable[[CaseResult | EffectResult], None] | None = None,
+    executor: Executor | None = None,
 ) -> Run:
     """Run cases and effects, several at a time.
 
@@ -312,6 +313,9 @@ def run_suite(
         jobs: number of processes.
         record: see :func:`run_case`; a function of a module, so that other processes find it.
         progress: called with each result as it comes.
+        executor: runs the cases in place of ``jobs`` processes, as any
+            ``concurrent.futures.Executor``. Its workers read the same files as this process, and
+            write those of ``record``.
 
     Returns:
         the results in the order of the cases.
@@ -319,6 +323,7 @@ def run_suite(
     Raises:
         InputError: no case, something that is not one, or ``jobs`` not a whole number from 1 on.
         CrosscheckError: a name that no shipped case has, or a process that was killed.
+        ExecutorError: the executor ended before its work.
 
     Example:
         ``crosscheck.run_suite(crosscheck.shipped_cases()[:1]).outcome``
@@ -332,14 +337,16 @@ def run_suite(
     tell = progress or (lambda result: None)
     one = partial(run_case, thresholds=thresholds, record=record)
     order = sorted(range(len(poses)), key=lambda i: -len(poses[i]))
-    count = min(jobs, len(chosen))
+    count = min(jobs, len(chosen)) if executor is None else 1
     if count > 1:
         _warm_up(chosen[0])
     try:
-        with processes(count) as executor:
-            results = run_tasks(one, poses, executor, order, tell)
-            found = run_effects(effects, executor, tell)
-    except BrokenExecutor:
+        with processes(count) as own:
+            results = run_tasks(one, poses, executor or own, order, tell)
+            found = run_effects(effects, executor or own, tell)
+    except ExecutorError:
+        if executor is not None:
+            raise
         raise CrosscheckError(
             f"one of {count} processes was killed, perhaps for lack of memory; try --jobs 1"
         ) from None

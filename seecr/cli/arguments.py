@@ -27,9 +27,8 @@ from seecr.equilibrium.solving import strained_rows
 from seecr.equilibrium.strange import strange
 from seecr.pose import NORM_TOLERANCE
 from seecr.statics.starts import commanded_poses
-from seecr.workspace.maps import evenly
+from seecr.workspace.maps import MOST_POSES, axis_of
 
-_MOST_POSES = 10_000_000  # of a grid or line; more would take days, and all memory
 _COUNT = 24  # poses of --line
 
 
@@ -137,8 +136,8 @@ def _check_count(option: str, poses: int) -> None:
     Raises:
         InputError: there are.
     """
-    if poses > _MOST_POSES:
-        raise InputError(f"{option}: expected at most {_MOST_POSES:.0e} poses, got {poses:.1e}")
+    if poses > MOST_POSES:
+        raise InputError(f"{option}: expected at most {MOST_POSES:.0e} poses, got {poses:.1e}")
 
 
 def axes_of(
@@ -149,32 +148,11 @@ def axes_of(
     Raises:
         InputError: one that is none, or far outside the robot; more poses than can be solved.
     """
-    axes = [_axis_of(text) for text in texts]
+    axes = [axis_of(text, "--grid") for text in texts]
     _check_count("--grid", math.prod(map(len, axes)))
     places = np.array([[axis[k] for axis in axes] for k in (0, -1)])
     check_places(places if directions is None else places @ directions, robot)
     return axes
-
-
-def _axis_of(text: str) -> NDArray[np.float64]:
-    """One axis of a grid: FIRST:LAST:COUNT or one number.
-
-    Raises:
-        InputError: it is neither.
-    """
-    parts = text.split(":")
-    try:
-        if len(parts) == 1:
-            return np.array([float(text)])
-        first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
-        if len(parts) != 3 or count < 1 or not np.isfinite(last - first):
-            raise ValueError
-    except (ValueError, IndexError):
-        raise InputError(
-            f"--grid: expected FIRST:LAST:COUNT with a count above zero, or one number [m], "
-            f"got {text!r}"
-        ) from None
-    return evenly(first, last, min(count, _MOST_POSES + 1))
 
 
 def check_unit(name: str, turn: Sequence[float]) -> None:

@@ -19,6 +19,8 @@ from seecr.cli.following import PASSIVE, STDIN
 from seecr.cli.group import ARGUMENTS
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from seecr.files import Made
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -301,6 +303,24 @@ def made_by(*files: Path | None) -> Made:
     ctx = click.get_current_context()
     words = [ctx.find_root().info_name or "seecr", *ctx.meta.get(ARGUMENTS, [])]
     return Made.now(shlex.join(words), files)
+
+
+scheduler = option(
+    "--scheduler ADDRESS",
+    "The workers of this scheduler of dask.distributed do the work; needs seecr[cluster].",
+)
+
+
+@contextmanager
+def executor_of(scheduler: str | None, jobs: int = 1) -> Iterator[Executor | None]:
+    """The workers of ``--scheduler``, or so many processes; None for this process alone."""
+    from seecr.parallel import cluster, processes
+
+    def tell(text: str) -> None:
+        click.echo(f"note: {text}", err=True)
+
+    with processes(jobs) if scheduler is None else cluster(scheduler, tell) as executor:
+        yield executor
 
 
 @contextmanager

@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     callback=options.check_finite,
 )
 @options.option("--no-elastic", "Only compute which poses can be held; faster.")
+@options.scheduler
 @options.pictures
 @options.out("seecr-map")
 @options.as_json
@@ -61,7 +62,8 @@ def command(
     robot: Path, cable: str | None, model: Path | None, grid: tuple[str, ...] | None,
     turned: tuple[float, ...] | None, lowest: float, highest: float | None,
     wrenches: tuple[tuple[float, ...], ...], at_least: float | None, edge: float | None,
-    no_elastic: bool, figure: str, no_recording: bool, out: Path, as_json: bool,
+    no_elastic: bool, scheduler: str | None, figure: str, no_recording: bool, out: Path,
+    as_json: bool,
 ) -> int:  # fmt: skip
     """Show on a grid where tensions within limits hold the platform, and where it really comes to
     rest.
@@ -119,10 +121,14 @@ def command(
     names = {"map.json", "map.npz", *(pictures & {"map.rrd"})}
     with staged(out, names=names, sometimes=sometimes, made=made) as folder:
         say_duration("map", total, "poses", as_json)
-        with options.progress_bar("mapping", total) as tell:
+        with (
+            options.executor_of(scheduler) as executor,
+            options.progress_bar("mapping", total) as tell,
+        ):
             found = workspace_map(
                 machine, *axes, orientation=turned or None, elastic=not no_elastic,
-                chance=at_least is not None, progress=lambda done: tell(done, ""), **asked,
+                chance=at_least is not None, progress=lambda done: tell(done, ""),
+                executor=executor, **asked,
             )  # fmt: skip
         if not np.any(found.feasible):
             raise _holds_none(found, asked["lowest"], asked["highest"])

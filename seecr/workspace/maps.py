@@ -7,10 +7,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from concurrent.futures import Executor
+from contextlib import closing
+from dataclasses import dataclass
 from queue import SimpleQueue
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from seecr.arguments import finite, whole
 from seecr.commands import Commands
@@ -18,7 +22,7 @@ from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
-from seecr.parallel import run_parts
+from seecr.parallel import as_done, run_parts
 from seecr.pose import NORM_TOLERANCE, Array
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.prediction.model import GivenEffects
@@ -37,8 +41,13 @@ from seecr.workspace.margins import asked_chance, check_chance, margins_at, read
 Progress = Callable[[int], None]
 """Called with the number of poses done since the last call."""
 
+MOST_POSES = 10_000_000
+"""Of a grid or line; more would take days, and all memory."""
 # Poses per part.
 _PART = 5_000
+# Tasks of an executor that a grid is divided into, so that many workers end at about one time; a
+# task of fewer poses is not worth sending, and of more its results fill memory.
+_TASKS, _SMALLEST, _LARGEST = 64, 128, 200_000
 # Values of the default grid along an axis with an extent; fewer for robots with too few cables.
 _VALUES, _FEW = 33, 13
 
@@ -103,6 +112,27 @@ def evenly(low: float, high: float, count: int) -> Array:
     return np.where(np.abs(numbers) < 1e-12 * (high - low), 0.0, numbers)
 
 
+def axis_of(text: str, name: str) -> Array:
+    """One axis of a grid: ``FIRST:LAST:COUNT`` or one number [m]; ``name`` is for the error.
+
+    Raises:
+        InputError: it is neither.
+    """
+    parts = text.split(":")
+    try:
+        if len(parts) == 1:
+            return np.array([float(text)])
+        first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
+        if len(parts) != 3 or count < 1 or not np.isfinite(last - first):
+            raise ValueError
+    except (ValueError, IndexError):
+        raise InputError(
+            f"{name}: expected FIRST:LAST:COUNT with a count above zero, or one number [m], "
+            f"got {text!r}"
+        ) from None
+    return evenly(first, last, min(count, MOST_POSES + 1))
+
+
 def workspace_map(
     robot: GivenRobot,
     x: ArrayLike,
@@ -117,6 +147,7 @@ def workspace_map(
     elastic: bool = True,
     chance: bool = False,
     progress: Progress | None = None,
+    executor: Executor | None = None,
 ) -> Workspace:
     """The static-feasible and the elastic workspace on a grid of positions.
 
@@ -135,6 +166,9 @@ def workspace_map(
             with a covariance, and takes a millisecond or so per pose near the edge; a tenth of a
             second where the orientation has to be found.
         progress: called as poses are done.
+        executor: solves parts of the grid, as any ``concurrent.futures.Executor``: processes, or
+            ``client.get_executor(retries=2, pure=False)`` of dask.distributed. The results are the
+            same to the last bit. By default the threads of this process do.
 
     Returns:
         margins and equilibria at all poses of the grid, and why some have no equilibrium.
@@ -142,6 +176,7 @@ def workspace_map(
     Raises:
         InputError: an axis without values, an orientation that the joints do not allow, effects
             with a history, or probabilities asked for without a covariance.
+        ExecutorError: the executor ended before its work.
 
     Example:
         ``seecr.workspace_map(robot, [0.3, 0.4], [0.2, 0.3], [0.15]).margin``
@@ -158,38 +193,90 @@ def workspace_map(
     refuse_unreached(robot, axes, turned, directions)
     shape = (len(axes[0]), len(axes[1]), len(axes[2]))
     n = int(np.prod(shape))
-    margin, slack = np.empty(n), np.full(n, NEVER, dtype=np.int8)
-    likely = np.empty(n, np.float32) if chance else None
-    moved, stiffness = np.full((n, 6), np.nan, np.float32), np.full(n, np.nan, np.float32)
-    softest = np.full((n, 6), np.nan, np.float32)
-    status = np.empty(n, np.int8) if elastic else None
+    job = _Grid(
+        robot, axes, turned, directions, effects, elastic, chance, (lowest, highest, wrenches)
+    )
+    found: dict[str, NDArray[Any]] = {
+        "margin": np.empty(n), "slack": np.full(n, NEVER, np.int8),
+        "moved": np.full((n, 6), np.nan, np.float32), "stiffness": np.full(n, np.nan, np.float32),
+        "softest": np.full((n, 6), np.nan, np.float32),
+        **({"likely": np.empty(n, np.float32)} if chance else {}),
+        **({"status": np.empty(n, np.int8)} if elastic else {}),
+    }  # fmt: skip
 
-    def fill(part: slice) -> None:
-        rows = np.arange(part.start, part.stop)
+    def fill(part: slice, columns: dict[str, NDArray[Any]]) -> None:
+        for name, values in columns.items():
+            found[name][part] = values
+
+    if executor is None:
+        parts = _parts(0, n, _PART)
+        _run_telling(lambda part: fill(part, job.part(part)), parts, progress)
+    else:
+        parts = _parts(0, n, min(max(-(-n // _TASKS), _SMALLEST), _LARGEST))
+        with closing(as_done(job.task, parts, executor)) as results:
+            for i, done in results:
+                for part, columns in done:
+                    fill(part, columns)
+                if progress is not None:
+                    progress(parts[i].stop - parts[i].start)
+    moved, softest = found["moved"], found["softest"]
+    return Workspace(
+        robot, axes, np.asarray(turned), found["margin"].reshape(shape),
+        moved[:, :3].reshape(*shape, 3), moved[:, 3:].reshape(*shape, 3),
+        found["slack"].reshape(shape), found["stiffness"].reshape(shape),
+        softest.reshape(*shape, -1), found["likely"].reshape(shape) if chance else None, elastic,
+        found["status"].reshape(shape) if elastic else None, directions,
+    )  # fmt: skip
+
+
+def _parts(start: int, stop: int, size: int) -> list[slice]:
+    return [slice(k, min(k + size, stop)) for k in range(start, stop, size)]
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """What is computed at the poses of a grid; sent as one to whoever computes a part of it."""
+
+    robot: Robot
+    axes: tuple[Array, Array, Array]
+    turned: ArrayLike
+    directions: Array | None
+    effects: GivenEffects
+    elastic: bool
+    chance: bool
+    limits: tuple[ArrayLike, ArrayLike, ArrayLike | None]
+
+    def task(self, part: slice) -> list[tuple[slice, dict[str, NDArray[Any]]]]:
+        """A part of many poses, in smaller ones for the sake of memory."""
+        return [(one, self.part(one)) for one in _parts(part.start, part.stop, _PART)]
+
+    def part(self, part: slice) -> dict[str, NDArray[Any]]:
+        """Margins and equilibria of a part of the grid's poses."""
+        robot, effects, (lowest, highest, wrenches) = self.robot, self.effects, self.limits
+        rows, shape = np.arange(part.start, part.stop), [len(axis) for axis in self.axes]
         index = np.unravel_index(rows, shape)
-        places = np.column_stack([axis[k] for axis, k in zip(axes, index, strict=True)])
-        places = places if directions is None else places @ directions
-        poses = commanded_poses(np.column_stack([places, np.tile(turned, (len(rows), 1))]))
-        margin[rows] = margins_at(robot, poses, lowest, highest, wrenches, effects)
-        if likely is not None:
-            likely[rows] = asked_chance(robot, poses, effects, lowest, highest, wrenches)
-        if status is not None:
+        places = np.column_stack([axis[k] for axis, k in zip(self.axes, index, strict=True)])
+        places = places if self.directions is None else places @ self.directions
+        poses = commanded_poses(np.column_stack([places, np.tile(self.turned, (len(rows), 1))]))
+        out = {"margin": margins_at(robot, poses, lowest, highest, wrenches, effects)}
+        if self.chance:
+            out["likely"] = asked_chance(robot, poses, effects, lowest, highest, wrenches)
+        if self.elastic:
             found = solve(robot, poses, effects=effects)
             there = found.converged
-            status[rows] = codes_of(found.status)
-            moved[rows[there]] = found.deviation[there]
-            slack[rows[there]] = found.slack[there].sum(axis=1)
-            stiffness[rows] = np.where(there, found.smallest_eigenvalue, np.nan)
-            softest[rows[there]] = found.softest_direction[there]
+            out["status"] = codes_of(found.status)
+            out["moved"] = np.where(there[:, None], found.deviation, np.nan)
+            out["slack"] = np.where(there, found.slack.sum(axis=1), NEVER)
+            out["stiffness"] = np.where(there, found.smallest_eigenvalue, np.nan)
+            out["softest"] = np.where(there[:, None], found.softest_direction, np.nan)
+        return {name: np.asarray(values, _STORED.get(name)) for name, values in out.items()}
 
-    _run_telling(fill, [slice(k, min(k + _PART, n)) for k in range(0, n, _PART)], progress)
-    return Workspace(
-        robot, axes, np.asarray(turned), margin.reshape(shape),
-        moved[:, :3].reshape(*shape, 3), moved[:, 3:].reshape(*shape, 3),
-        slack.reshape(shape), stiffness.reshape(shape), softest.reshape(*shape, -1),
-        None if likely is None else likely.reshape(shape), elastic,
-        None if status is None else status.reshape(shape), directions,
-    )  # fmt: skip
+
+# As results are kept, and sent.
+_STORED = {
+    "likely": np.float32, "moved": np.float32, "stiffness": np.float32, "softest": np.float32,
+    "slack": np.int8,
+}  # fmt: skip
 
 
 def _refuse_memory(robot: Robot, effects: GivenEffects) -> None:

@@ -16,7 +16,7 @@ COUNTED = re.compile(rf"\{{[^{{}}]*\}} (?:(?!on )\w+ )?(?:{NOUNS})s\b")
 # What is no number, and numbers that are never one.
 ALLOWED = {
     "{name} rows", "{what} columns", "{rule.kind.name} readings", "{effect.name} leaves readings",
-    "{_MOST_POSES:.0e} poses", "{_ROWS} rows", "{tried} effects", "{m} cables",
+    "{MOST_POSES:.0e} poses", "{_ROWS} rows", "{tried} effects", "{m} cables",
     "{_MOST_CHANGES} poses",
 }  # fmt: skip
 

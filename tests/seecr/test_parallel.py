@@ -9,13 +9,14 @@ import sys
 import threading
 import time
 from collections import deque
-from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from multiprocessing import active_children
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import seecr
 from seecr import parallel
 
 
@@ -246,7 +247,7 @@ def test_an_error_in_a_process_is_the_callers_and_ends_all() -> None:
 @pytest.mark.slow
 def test_a_process_that_is_killed_is_an_error_and_ends_all() -> None:
     began = time.monotonic()
-    with pytest.raises(BrokenExecutor), parallel.processes(2) as executor:
+    with pytest.raises(seecr.ExecutorError, match="ended before its work"), parallel.processes(2) as executor:
         parallel.run_tasks(signal.raise_signal, [signal.SIGTERM] * 2, executor)
     assert active_children() == [] and time.monotonic() - began < 50.0
 
