@@ -247,7 +247,8 @@ def test_an_error_in_a_process_is_the_callers_and_ends_all() -> None:
 @pytest.mark.slow
 def test_a_process_that_is_killed_is_an_error_and_ends_all() -> None:
     began = time.monotonic()
-    with pytest.raises(seecr.ExecutorError, match="ended before its work"), parallel.processes(2) as executor:
+    ended = pytest.raises(seecr.ExecutorError, match="ended before its work")
+    with ended, parallel.processes(2) as executor:
         parallel.run_tasks(signal.raise_signal, [signal.SIGTERM] * 2, executor)
     assert active_children() == [] and time.monotonic() - began < 50.0
 
