@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from crosscheck.planning.design import choose_poses, make_plan
     from crosscheck.planning.result import Plan
     from crosscheck.planning.write import write_plan
+    from crosscheck.studies.study import Study, study
     from crosscheck.suite.agreement import Thresholds, load_thresholds
     from crosscheck.suite.cases import Case, shipped_cases, user_cases
     from crosscheck.suite.results import CaseResult
@@ -78,6 +79,7 @@ _MODULES = {
     "planning.design": ("choose_poses", "make_plan",),
     "planning.result": ("Plan",),
     "planning.write": ("write_plan",),
+    "studies.study": ("Study", "study"),
     "suite.cases": ("Case", "shipped_cases", "user_cases"),
     "suite.results": ("CaseResult",),
     "suite.run": ("Run", "run_suite"),
@@ -107,6 +109,7 @@ __all__ = [
     "Plan",
     "Run",
     "Sigma",
+    "Study",
     "Thresholds",
     "TimedControl",
     "Timing",
@@ -134,6 +137,7 @@ __all__ = [
     "run_suite",
     "save_model",
     "shipped_cases",
+    "study",
     "unseal",
     "user_cases",
     "write_measurements",

@@ -82,15 +82,17 @@ SHOWING = ("crosscheck.show.", "seecr.show.")
 TRADE = {
     f"{module}.{name}"
     for line in """
-crosscheck.measurements.data: parse_quantity
+crosscheck.measurements.data: parse_kind parse_quantity
 crosscheck.model.write: check_place state_of
 crosscheck.planning.write: NAME box_of planned_files
+crosscheck.studies.cases: read_cases
 crosscheck.suite.cases: select
 crosscheck.suite.run: every_shipped shipped_like
 crosscheck.suite.write: FILE_NAME RESULTS
 crosscheck.given: check_case
 crosscheck.importing: FILES write_case
 crosscheck.twin: FILES
+seecr.columns.csv: table_text
 seecr.columns.commands: CommandFile read_commands
 seecr.columns.headers: columns_said parse_columns renamed
 seecr.columns.plausible: ABSURD scalar_last

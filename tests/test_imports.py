@@ -28,7 +28,7 @@ TABLE = (
     "crosscheck: settle model measurements twin",
     "crosscheck: fit controlled suite importing inference preparation",
     "crosscheck: comparison planning",
-    "crosscheck: calibration add diagnosis",
+    "crosscheck: calibration add diagnosis studies",
     "crosscheck: show cli",
 )
 # The rooms of a folder whose files stand in an order.

@@ -18,6 +18,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "import": ("importing", "Convert recordings of other programs into measurements."),
     "effects": ("effects", "List the catalogue of effects, and how to check each by hand."),
     "control": ("control", "Schemes of control in MuJoCo, with time, beside seecr control."),
+    "study": ("study", "Do many maps, sweeps, diagnoses or twins, on many machines if need be."),
     "twin": ("twin", "Make measurements with a hidden effect, with MuJoCo as the truth."),
 }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -421,10 +422,14 @@ class Workspace(Result):
 
     def records(self) -> list[Record]:
         """One row per pose of the grid."""
+        return rows_of(self.columns())
+
+    def columns(self) -> dict[str, Any]:
+        """The columns of the rows, an array or a list each."""
         places, names = self.places.reshape(-1, 3), None
         if self.status is not None:
             names = np.array([one.name for one in STATUSES], object)[self.status.ravel()]
-        columns = {
+        return {
             **named("{}_m", "xyz", places),
             "margin_N": self.margin.ravel(),
             "feasible": self.feasible.ravel(),
@@ -436,7 +441,6 @@ class Workspace(Result):
             "smallest_eigenvalue_N_per_m": self.stiffness.ravel(),
             **named("softest_{}", MOTION, self.softest.reshape(-1, 6)),
         }
-        return rows_of(columns)
 
     def as_json(self, at_least: float | None = None) -> Record:
         """``map.json``: how much can be held, and the elastic robot's largest errors there.

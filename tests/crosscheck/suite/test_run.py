@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import BrokenExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,7 +27,7 @@ from crosscheck.suite.results import CaseResult, failure_lines, finding_lines, r
 from crosscheck.suite.run import run_case, run_suite
 from crosscheck.suite.verdicts import Outcome, Verdict
 from seecr.description.mjcf import CABLES, model_path
-from seecr.errors import InputFileError
+from seecr.errors import ExecutorError, InputFileError
 from seecr.pose import pose_add, pose_difference, quat_from_rotvec, quat_multiply
 
 PARALLEL, COGIRO = model_path("demobot_parallel"), model_path("demobot_cogiro")
@@ -401,7 +400,7 @@ def test_errors_cross_processes(tmp_path):
 
 def test_a_process_that_was_killed_is_told_with_what_to_do(monkeypatch):
     def broken(*_args):
-        raise BrokenExecutor
+        raise ExecutorError("the executor ended before its work")
 
     monkeypatch.setattr(suite, "run_tasks", broken)
     words = r"one of 2 processes was killed, perhaps for lack of memory; try --jobs 1"

@@ -1,0 +1,102 @@
+"""``crosscheck study``: many maps, sweeps, diagnoses and twins, on many processors or machines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from seecr.cli import options
+
+if TYPE_CHECKING:
+    from crosscheck import Study, Tolerance
+
+
+@options.command(
+    "crosscheck study cases.csv --within 1mm --within 2deg",
+    "crosscheck study cases.csv --scheduler tcp://10.0.0.1:8786 --out study",
+)
+@click.argument("cases", type=options.FILE, metavar="CASES.csv")
+@options.option(
+    "--within SIZE",
+    "Also tell which robots come to rest within this of all poses they are sent to, such as 1mm or "
+    "2deg; one of each may be given.",
+    name="sizes",
+    multiple=True,
+)
+@options.option(
+    "--jobs N",
+    "Number of parallel processes.  [default: one per processor]",
+    options.WholeNumber(min=1),
+)
+@options.scheduler
+@options.option("--figure [png|svg|none]", "Kind of figure.", default="png")
+@options.out("crosscheck-study")
+@options.as_json
+def command(
+    cases: Path, sizes: tuple[str, ...], jobs: int | None, scheduler: str | None, figure: str,
+    out: Path, as_json: bool,
+) -> int:  # fmt: skip
+    """Do many cases, and only those that are not done yet.
+
+    CASES.csv has a row for each case: the robot, what to do with it (map, sweep, diagnose, or twin:
+    make a twin and diagnose it), and what it needs; columns such as exit_2_x_mm, ea_N, mass_kg or
+    pulley_radius.radius_m change the robot. docs/formats.md has the list. Files are looked for
+    beside the table first.
+
+    \b
+    Writes into --out:
+      parts/           a Parquet file per case with all its rows, named by the hash of the robot,
+                       data, options and version; called again, only missing ones are computed
+      study.csv        the table: one row per case
+      study.json       the same, with how it was made
+      study.png        a figure
+
+    \b
+    Exit status: 0 all well, 2 bad input, 3 a case without a result, or workers that ended.
+    """
+    from crosscheck import study
+    from crosscheck.show.study import study_figure
+    from crosscheck.studies.cases import read_cases
+    from seecr.columns.csv import table_text
+    from seecr.files import json_text, write_text
+    from seecr.folders import staged
+    from seecr.parallel import processors
+
+    within = _limits(sizes)
+    count = len(read_cases(cases)[0])  # mistakes are told before workers are asked for
+    made = options.made_by(cases)
+    names = ["study.csv", "study.json"]
+    with staged(out, names=names, sometimes=("study.png", "study.svg"), made=made) as folder:
+        with (
+            options.executor_of(scheduler, min(jobs or processors(), count)) as executor,
+            options.progress_bar("studying", count) as tell,
+        ):
+            found = study(cases, executor, out=out, within=within, progress=tell)
+        rows, status = found.records(), 3 if found.failed else 0
+        write_text(folder / names[0], table_text({k: [row[k] for row in rows] for k in rows[0]}))
+        text = json_text({"made": made, "exit_status": status, **found.as_json()})
+        write_text(folder / names[1], text + "\n")
+        if figure != "none":
+            study_figure(found, folder / f"study.{figure}")
+    click.echo(text) if as_json else _tell(found, out)
+    return status
+
+
+def _tell(found: Study, out: Path) -> None:
+    from crosscheck.show.study import print_study
+
+    print_study(found)
+    click.echo(f"Results in {out}/")
+
+
+def _limits(sizes: tuple[str, ...]) -> Tolerance | None:
+    from crosscheck import CrosscheckError, Tolerance
+    from crosscheck.measurements.data import parse_kind
+
+    found = [parse_kind("--within", ("position", "orientation"), text) for text in sizes]
+    if len(dict(found)) < len(found):
+        raise CrosscheckError("--within: expected one size of each kind, got two")
+    units = {"position": "position_m", "orientation": "orientation_rad"}
+    return Tolerance(**{units[kind]: size for kind, size in found}) if found else None
