@@ -211,7 +211,8 @@ def cluster(address: str, tell: Callable[[str], None]) -> Iterator[Executor]:
             "pip install 'seecr[cluster]'"
         ) from None
     # it would tell what the error tells, and more
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
 
     async def identity() -> Any:
         async with rpc(address) as asked:

@@ -1,11 +1,11 @@
-"""The parts of a study: a Parquet file for each case, named by the hash of what it depends on.
+"""The parts of a study: a Parquet file for each case.
 
+Its name is the hash of all that its case depends on, and that of its own bytes, which shows damage.
 A part is written under another name and renamed, so that whatever ends a study leaves whole parts.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,7 +14,7 @@ from typing import Any
 
 from crosscheck.studies.cases import StudyCase
 from seecr.errors import InputError, InputFileError
-from seecr.files import reason_of, written
+from seecr.files import digits_of, reason_of, written
 from seecr.folders import MANIFEST, folder_lock
 from seecr.result import Record
 
@@ -37,23 +37,23 @@ class StudyParts:
         Raises:
             InputFileError: the part is damaged, or of another case.
         """
-        if self._folder is None or not (path := self._folder / _name(case)).exists():
+        if self._folder is None:
+            return None
+        path = next(iter(sorted(self._folder.glob(f"{case.key}-*.parquet"))), None)
+        if path is None:
             return None
         import pyarrow
         from pyarrow import parquet
 
         try:
-            # all of it: sums of each page show what is damaged
-            rows = parquet.read_table(path, page_checksum_verification=True)
-            said = json.loads(rows.schema.metadata[_KEY])
-            summary, key, digest = said["summary"], said["key"], said["digest"]
-            if digest != _digest(key, summary):
+            if digits_of(path) != path.stem.partition("-")[2]:
                 raise ValueError
+            said = json.loads(parquet.read_schema(path).metadata[_KEY])
         except (pyarrow.ArrowException, OSError, ValueError, KeyError, TypeError):
             raise InputFileError.at(path, f"is a damaged part of a study; {_AGAIN}") from None
-        if key != case.key:
+        if said["key"] != case.key:
             raise InputFileError.at(path, f"is a part of another study or case; {_AGAIN}")
-        return dict(summary)
+        return dict(said["summary"])
 
     def keep(self, case: StudyCase, rows: Any, summary: Record) -> None:
         """Write the part of a case.
@@ -65,10 +65,12 @@ class StudyParts:
             return
         from pyarrow import parquet
 
-        said = {"key": case.key, "summary": summary, "digest": _digest(case.key, summary)}
-        kept = rows.replace_schema_metadata({_KEY: json.dumps(said)})
-        with written(self._folder / _name(case)) as (part,):
-            parquet.write_table(kept, part, write_page_checksum=True)
+        kept = rows.replace_schema_metadata(
+            {_KEY: json.dumps({"key": case.key, "summary": summary})}
+        )
+        with written(self._folder / f"{case.key}.parquet") as (part,):
+            parquet.write_table(kept, part)
+            part.replace(self._folder / f"{case.key}-{digits_of(part)}.parquet")
 
 
 @contextmanager
@@ -116,11 +118,3 @@ def _is_ours(out: Path) -> bool:
             "another with --out",
         )
     return True
-
-
-def _name(case: StudyCase) -> str:
-    return f"{case.key}.parquet"
-
-
-def _digest(key: str, summary: Record) -> str:
-    return hashlib.sha256(json.dumps([key, summary], sort_keys=True).encode()).hexdigest()[:16]

@@ -38,8 +38,9 @@ def run_case(data: Mapping[str, Any], version: str, case: StudyCase) -> tuple[An
                 f"a worker has seecr {full_version()}, and this is {version}; expected one version"
             )
         rows, summary = _DO[case.do](case, data.get(case.data))
-    except SeecrError as error:
-        return None, {FAILED: " ".join(str(error).split())}
+    except Exception as error:  # one of many cases: the others are to be done all the same
+        kind = "" if isinstance(error, SeecrError) else f"a defect, {type(error).__name__}: "
+        return None, {FAILED: f"{kind}{' '.join(str(error).split())}"}
     return rows, plain(summary)
 
 
