@@ -16,7 +16,7 @@ import pickle
 import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import (
     BrokenExecutor,
     CancelledError,
@@ -135,7 +135,7 @@ if hasattr(os, "register_at_fork"):
 def as_done(
     function: Callable[[T], R], items: Sequence[T], executor: Executor | None = None,
     order: Sequence[int] | None = None,
-) -> Iterator[tuple[int, R]]:  # fmt: skip
+) -> Generator[tuple[int, R], None, None]:  # fmt: skip
     """Call a function with each item, in this process or by an executor.
 
     The executor gets them in ``order``, the longest first so that none is left over at the end. The

@@ -86,6 +86,7 @@ crosscheck.measurements.data: parse_kind parse_quantity
 crosscheck.model.write: check_place state_of
 crosscheck.planning.write: NAME box_of planned_files
 crosscheck.studies.cases: read_cases
+crosscheck.studies.study: studied
 crosscheck.suite.cases: select
 crosscheck.suite.run: every_shipped shipped_like
 crosscheck.suite.write: FILE_NAME RESULTS

@@ -56,24 +56,24 @@ def command(
     \b
     Exit status: 0 all well, 2 bad input, 3 a case without a result, or workers that ended.
     """
-    from crosscheck import study
     from crosscheck.show.study import study_figure
     from crosscheck.studies.cases import read_cases
+    from crosscheck.studies.study import studied
     from seecr.columns.csv import table_text
     from seecr.files import json_text, write_text
     from seecr.folders import staged
     from seecr.parallel import processors
 
     within = _limits(sizes)
-    count = len(read_cases(cases)[0])  # mistakes are told before workers are asked for
+    every, data = read_cases(cases)  # mistakes are told before workers are asked for
     made = options.made_by(cases)
     names = ["study.csv", "study.json"]
     with staged(out, names=names, sometimes=("study.png", "study.svg"), made=made) as folder:
         with (
-            options.executor_of(scheduler, min(jobs or processors(), count)) as executor,
-            options.progress_bar("studying", count) as tell,
+            options.executor_of(scheduler, min(jobs or processors(), len(every))) as executor,
+            options.progress_bar("studying", len(every)) as tell,
         ):
-            found = study(cases, executor, out=out, within=within, progress=tell)
+            found = studied(every, data, executor, out, within, tell)
         rows, status = found.records(), 3 if found.failed else 0
         write_text(folder / names[0], table_text({k: [row[k] for row in rows] for k in rows[0]}))
         text = json_text({"made": made, "exit_status": status, **found.as_json()})

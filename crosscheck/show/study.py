@@ -94,7 +94,9 @@ def _dots(
     some = [row for row in rows if _number(row, pair[0]) and _number(row, pair[1])]
     scales, names = zip(*(_unit(key) for key in pair[:2]), strict=True)
     at = np.array([[row[key] for key in pair[:2]] for row in some]).reshape(-1, 2) * scales
-    axes.scatter(*at.T, s=18, c=[GREY if row.get("within") is False else AFTER for row in some])
+    axes.scatter(
+        at[:, 0], at[:, 1], s=18, c=[GREY if row.get("within") is False else AFTER for row in some]
+    )
     for row, place in zip(some if len(some) <= _NAMED else [], at, strict=False):
         axes.annotate(row["case"], place, (3, 3), textcoords="offset points", fontsize=7)
     limits = (found.limits.position_m, found.limits.orientation_rad) if found.limits else ()

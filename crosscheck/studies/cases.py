@@ -151,8 +151,11 @@ class _Reader:
         at("case", self._check_name, name)
         at("do", _check_do, do, given)
         robot = at("robot", self._robot, given.get("robot", ""))
-        for column in filter(_CHANGE.fullmatch, given):
-            robot = at(column, _changed, robot, column, given[column])
+        for kind in _SI:
+            columns = [k for k in given if (m := _CHANGE.fullmatch(k)) and _kind(m) == kind]
+            values = [at(column, _change, robot, column, given[column]) for column in columns]
+            if values:
+                robot = at(columns[0], _changed, robot, kind, values)
         model = at("model", self._model, given.get("model"), robot)
         terms = [at(f"{name}.{next(iter(values))}", Term.of, robot, name, **values)
                  for name, values in at("an effect", _values_of, given).items()]  # fmt: skip
@@ -194,9 +197,11 @@ class _Reader:
         path = self._path(cell)
         name = _hash([do, str(path), numbers_of(robot)])
         if name not in self._data:
-            read: Any = {"sweep": read_commands, "diagnose": load_measurements}.get(do)
-            found = (read or load_commands)(path, robot)
-            self._data[name] = found.commands if do == "sweep" else found
+            if do == "sweep":
+                self._data[name] = read_commands(path, robot).commands
+            else:
+                read = load_measurements if do == "diagnose" else load_commands
+                self._data[name] = read(path, robot)
         return name, [digits_of(p) for p in (path, toml_beside(path)) if p.is_file()]
 
 
@@ -246,28 +251,36 @@ def _axes(cell: str, robot: Robot) -> tuple[Array, ...]:
     return tuple(axis_of(part, "each of X Y Z") for part in parts)
 
 
-def _changed(robot: Robot, column: str, cell: str) -> Robot:
-    """The robot with one number changed.
+def _change(robot: Robot, column: str, cell: str) -> tuple[Any, float]:
+    """Where in the robot's array of that kind a value goes, and the value in SI."""
+    change = _CHANGE.fullmatch(column)
+    assert change is not None
+    number = change[2] or change[4]
+    value = of_columns(_SI[_kind(change)])[change[6]].to_si(_number(cell))
+    if number is None:
+        return ..., value
+    if not 1 <= int(number) <= robot.n_cables:
+        raise InputError(f"expected a cable from 1 to {robot.n_cables}")
+    at = int(number) - 1
+    return (at, "xyz".index(change[5])) if change[5] else at, value
+
+
+def _changed(robot: Robot, kind: str, changes: Iterable[tuple[Any, float]]) -> Robot:
+    """The robot with other numbers of a kind.
 
     Where a point moves, the cable is longer or shorter by as much as its straight length at the
     reference pose: it stays as taut there as its description has it. E S stays.
     """
-    change = _CHANGE.fullmatch(column)
-    assert change is not None
-    kind, number = _kind(change), int(change[2] or change[4] or 1) - 1
-    value = of_columns(_SI[kind])[change[6]].to_si(_number(cell))
-    if not 0 <= number < robot.n_cables:
-        raise InputError(f"expected a cable from 1 to {robot.n_cables}")
+    name = {"exit": "exit_points", "anchor": "anchor_points"}.get(kind, kind)
+    numbers = np.array(getattr(robot, name), float)
+    for at, value in changes:
+        numbers[at] = value
     if kind == "mass":
-        return replace(robot, mass=value)
-    if kind == "ea":
-        every = np.arange(robot.n_cables) == number if change[2] else True
-        return replace(robot, ea=np.where(every, value, robot.ea))
-    points = getattr(robot, f"{kind}_points").copy()
-    points[number, "xyz".index(change[5])] = value
-    moved = replace(robot, **{f"{kind}_points": points})
+        return replace(robot, mass=float(numbers))
+    other: Any = {name: numbers}
+    moved = replace(robot, **other)
     longer = moved.reference_lengths - robot.reference_lengths
-    return replace(moved, rest_lengths=robot.rest_lengths + longer)
+    return replace(moved, rest_lengths=robot.rest_lengths + longer) if longer.any() else moved
 
 
 def _values_of(given: Mapping[str, str]) -> dict[str, dict[str, float]]:

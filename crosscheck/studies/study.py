@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass
@@ -126,7 +126,14 @@ def study(
     if within is not None:
         check_kind(within, Tolerance, "within", "such as crosscheck.Tolerance(position_m=1e-3)")
     folder = None if out is None else path_of(out, "a folder")
-    every, data = read_cases(cases)
+    return studied(*read_cases(cases), executor, folder, within, progress)
+
+
+def studied(
+    every: Sequence[StudyCase], data: Mapping[str, Any], executor: Executor | None,
+    folder: Path | None, within: Tolerance | None, progress: Callable[[int, str], None],
+) -> Study:  # fmt: skip
+    """The same of cases that are read, with their data."""
     with parts_in(folder) as parts:
         found: dict[str, Any] = {case.key: parts.read(case) for case in every}
         missing = {case.key: case for case in every if found[case.key] is None}

@@ -88,12 +88,12 @@ def _said(found: Diagnosis) -> Record:
 def _twin(case: StudyCase, commands: Any) -> tuple[Any, Record]:
     """A twin of the robot as it is described, and its diagnosis."""
     given = dict(case.options)
-    hidden: Any = list(case.effects) or None
+    hidden: Any = case.effects
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "robot.xml"
         case.robot.save(file)
         more = {"points": given["points"]} if "points" in given else {}
-        twin = make_twin(file, given["seed"], effects=hidden, poses=commands, **more)
+        twin = make_twin(file, given["seed"], effects=list(hidden) or None, poses=commands, **more)
         found = diagnose(file, twin.measured)
     named = {name for one in found.missing for name in (one.effect, *one.indistinguishable)}
     names = [term.name for term in twin.hidden]

@@ -258,7 +258,8 @@ class _Grid:
         places = np.column_stack([axis[k] for axis, k in zip(self.axes, index, strict=True)])
         places = places if self.directions is None else places @ self.directions
         poses = commanded_poses(np.column_stack([places, np.tile(self.turned, (len(rows), 1))]))
-        out = {"margin": margins_at(robot, poses, lowest, highest, wrenches, effects)}
+        out: dict[str, NDArray[Any]] = {}
+        out["margin"] = margins_at(robot, poses, lowest, highest, wrenches, effects)
         if self.chance:
             out["likely"] = asked_chance(robot, poses, effects, lowest, highest, wrenches)
         if self.elastic:
