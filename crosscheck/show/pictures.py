@@ -10,6 +10,8 @@ from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.planning.result import Plan
 from crosscheck.show.figures import collecting
 from crosscheck.show.page import page_of, write_page
+from crosscheck.show.study import study_figure
+from crosscheck.studies.study import Study
 from crosscheck.suite.results import CaseResult
 from crosscheck.suite.run import Run
 from seecr.counted import counted
@@ -59,6 +61,7 @@ PICTURES: Mapping[type, Pictures] = {
     Comparison: Pictures(_figure_of, write_page, _record_comparison),
     Diagnosis: Pictures(_figure_of, write_page, _record_diagnosis),
     Plan: Pictures(_figure_of, write_page),
+    Study: Pictures(plot=lambda found, _name: study_figure(found, None)),
     CaseResult: Pictures(recording=_record_case),
     Run: Pictures(recording=_record_run),
 }

@@ -335,6 +335,17 @@ def test_the_command_writes_its_table_and_figure(studied: Any, tmp_path: Path) -
     assert "got two" in ran(f"crosscheck study {path} --within 1mm --within 2mm", 2).stderr
 
 
+def test_its_figure_has_a_dot_for_each_case_with_poses(pendulum: Path) -> None:
+    rows = [hung(pendulum, mass_kg=mass) for mass in (1, 2)]
+    found = crosscheck.study(rows, within=crosscheck.Tolerance(position_m=0.03))
+    (axes,) = found.plot().axes
+    (dots,) = axes.collections
+    np.testing.assert_allclose(dots.get_offsets(), [[19.62, 0.0], [39.24, 0.0]], rtol=1e-6)
+    assert not np.array_equal(*dots.get_facecolors()) and axes.get_xlabel().endswith("[mm]")
+    (limit,) = axes.lines
+    assert limit.get_xdata()[0] == 30.0
+
+
 LAYOUTS = [
     {"robot": "demobot_cogiro", "do": "map", "grid": "7", "exit_1_x_mm": 80 + k} for k in range(6)
 ]
