@@ -124,7 +124,8 @@ _WHERE = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
     "BarBalance", "BarManifold", "BarRest", "Barrier", "Commands", "Control", "Controlled",
-    "Correction", "Effect", "ExecutorError", "Experiment", "Export", "FeedForward", "Feedback", "InputError",
+    "Correction", "Effect", "ExecutorError", "Experiment", "Export", "FeedForward", "Feedback",
+    "InputError",
     "InputFileError", "Joint", "Jump", "Knowledge", "Loads", "Midlines", "MissingPackageError",
     "Model", "NoRestError", "Prediction", "Readings", "Robot", "RobotError", "Scheme",
     "SeecrError", "SensorNoise", "Setup", "SlackSpan", "Solution", "Spread", "Status", "Term",

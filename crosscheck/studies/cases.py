@@ -22,7 +22,7 @@ from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.effects import Term, Terms
 from seecr.errors import Faults, InputError, SeecrError
-from seecr.files import digits_of, path_of, plain, toml_beside
+from seecr.files import digits_of, path_of, plain, toml_path
 from seecr.pose import Array
 from seecr.prediction.model import Model, load_model
 from seecr.units import of_columns
@@ -202,7 +202,7 @@ class _Reader:
             else:
                 read = load_measurements if do == "diagnose" else load_commands
                 self._data[name] = read(path, robot)
-        return name, [digits_of(p) for p in (path, toml_beside(path)) if p.is_file()]
+        return name, [digits_of(p) for p in (path, toml_path(path)) if p.is_file()]
 
 
 def _check_do(do: str, given: Mapping[str, str]) -> None:
