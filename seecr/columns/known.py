@@ -49,24 +49,28 @@ def meant_by(unused: Sequence[str], absent: Sequence[str]) -> dict[str, str]:
     """
     ours = {name.lower(): name for name in absent}
     ours |= {alias: name for alias, name in _ALIASES.items() if name in absent}
+    # most names have not the parts of any other: only few are compared, which takes long
+    alike: dict[frozenset[str], list[str]] = {}
+    for one in ours:
+        alike.setdefault(frozenset() if one in _ALIASES else _distinct(one), []).append(one)
     found = {}
     for name in unused:
         if _ROTATION.search(name):
             continue
-        near = difflib.get_close_matches(name.lower(), ours, n=8, cutoff=_NEAR)
-        told = [one for one in near if one in _ALIASES or _distinct(one) <= _distinct(name)]
-        if told:
-            found[name] = ours[told[0]]
+        parts = _distinct(name)
+        may = [one for own, those in alike.items() if own <= parts for one in those]
+        if near := difflib.get_close_matches(name.lower(), may, n=1, cutoff=_NEAR):
+            found[name] = ours[near[0]]
     return found
 
 
-def _distinct(name: str) -> set[str]:
+def _distinct(name: str) -> frozenset[str]:
     """The distinguishing parts of a name: x, qw, rz, the number of a cable."""
     parts = re.split(r"[\W_]+|(?<=\D)(?=\d)|(?<=\d)(?=\D)", name.lower())
     whole = {part for part in parts if re.fullmatch(r"q[wxyz]|r?[xyz]|\d+", part)}
     # as in cmdx_m, with the axis attached to the word
     stuck = {part[-1] for part in parts if re.fullmatch(r"[a-pr-z]{2,}[xyz]", part)}
-    return whole | stuck
+    return frozenset(whole | stuck)
 
 
 def other_rotations(unused: Sequence[str]) -> list[str]:
@@ -131,10 +135,12 @@ def unused_note(names: Sequence[str], rotations: Sequence[str]) -> list[str]:
             f"conventions: here {OUR_ROTATIONS}."
         )
     if names:
-        notes.append(f"Not used: {', '.join(names)}.")
+        notes.append(f"Not used: {some(names, _MOST_NAMES)}.")
     return notes
 
 
+# Most columns that a note about unused ones names.
+_MOST_NAMES = 40
 # Most further lines that an error names.
 _MOST_LINES = 8
 
@@ -274,7 +280,8 @@ def know_columns(table: Table, n_cables: int, cables: Sequence[str] = ()) -> Col
     meant = meant_by(unused, _absent(known, n_cables))
     turned = other_rotations(unused)
     lost = of_no_cable([name for name in unused if name not in meant])
-    rest = [name for name in unused if name not in (*meant, *turned, *lost)]
+    told = {*meant, *turned, *lost}
+    rest = [name for name in unused if name not in told]
     notes = [*table.notes, *(question(name, near) for name, near in meant.items())]
     notes += [*no_cable_note(lost, cables), *unused_note(rest, turned)]
     columns = Columns(table, known, tuple(unused), meant, notes, tuple(cables))
@@ -291,9 +298,9 @@ def _check_names(table: Table) -> None:
             f"expected a header row with column names such as cmd_x_m, got the number "
             f"{show(numbers[0])}; put the names in the first row, without a # before them"
         )
-    faults = Faults()
+    faults, places = Faults(), dict[str, int]()
     for index, name in enumerate(table.names):
-        first = table.names.index(name)
+        first = places.setdefault(name, index)
         if name and first < index:
             text = f"repeated header, columns {first + 1} and {index + 1}; expected each once"
             faults.add(table.error(f"{text}; rename or remove one", column=name))
