@@ -458,7 +458,9 @@ REFERENCE = (Path(__file__).resolve().parents[3] / "docs" / "formats.md").read_t
 
 
 def block(language: str) -> str:
-    return REFERENCE.partition(f"```{language}\n")[2].partition("```")[0]
+    """The first example in a language from the section about measurements on."""
+    section = REFERENCE.partition("## Measurements")[2]
+    return section.partition(f"```{language}\n")[2].partition("```")[0]
 
 
 def test_the_reference_s_examples_are_read(csv_file, robot):
