@@ -452,15 +452,12 @@ def test_a_quaternion_in_another_order(csv_file, robot):
         assert ("are meas_qw meas_qx meas_qy meas_qz in the right order?" in notes) == wrong
 
 
-REFERENCE = (Path(__file__).resolve().parents[3] / "docs" / "formats.md").read_text(
-    encoding="utf-8"
-)
+FORMATS = Path(__file__).resolve().parents[3] / "docs" / "formats.md"
+REFERENCE = FORMATS.read_text(encoding="utf-8").partition("## Measurements")[2]
 
 
 def block(language: str) -> str:
-    """The first example in a language from the section about measurements on."""
-    section = REFERENCE.partition("## Measurements")[2]
-    return section.partition(f"```{language}\n")[2].partition("```")[0]
+    return REFERENCE.partition(f"```{language}\n")[2].partition("```")[0]
 
 
 def test_the_reference_s_examples_are_read(csv_file, robot):
