@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 LARGEST = 1e30
 """Largest number accepted: squares of larger ones overflow, and no measured value is so large."""
 
+SMALLEST = 1.0 / LARGEST
+"""Shortest length accepted [m]: strains of shorter cables would be larger than that."""
+
 NORM_TOLERANCE = 1e-3
 """How far a unit quaternion's norm may be from one: six digits leave 1e-6, more is wrong."""
 

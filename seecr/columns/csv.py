@@ -322,20 +322,22 @@ def _read_parquet(path: Path) -> Table:
         ) from None
     try:
         content = parquet.read_table(path)
+        names = tuple(name.strip() for name in content.column_names)
+        cells = [
+            ["" if value is None else str(value).strip() for value in column.to_pylist()]
+            for column in content.columns
+        ]
+    except UnicodeDecodeError as error:
+        text = f"expected names and texts in UTF-8, got bytes that are not ({error.object[:20]!r})"
+        raise InputFileError.at(path, f"{text}; write the file again") from None
     except (pyarrow.ArrowException, OSError) as error:
         raise InputFileError.at(path, f"cannot be read as Parquet: {error}") from None
     if content.num_rows == 0:
         raise InputFileError.at(path, "has columns but no rows; expected one row per resting pose")
     return Table(
-        path=path,
-        names=tuple(name.strip() for name in content.column_names),
-        line=np.arange(1, content.num_rows + 1),
-        header_line=None,
-        cells=[
-            ["" if value is None else str(value).strip() for value in column.to_pylist()]
-            for column in content.columns
-        ],
-    )
+        path=path, names=names, line=np.arange(1, content.num_rows + 1), header_line=None,
+        cells=cells,
+    )  # fmt: skip
 
 
 # The text of a CSV, as it is read above: every file of rows is written here.

@@ -16,7 +16,7 @@ from seecr.description.joints import OFF_MANIFOLD, off_joints, pose_of_values
 from seecr.description.projected import determined, projected
 from seecr.errors import Faults
 from seecr.files import toml_path
-from seecr.pose import NORM_TOLERANCE, Array, quat_from_rxyz, rxyz_from_quat
+from seecr.pose import NORM_TOLERANCE, SMALLEST, Array, quat_from_rxyz, rxyz_from_quat
 from seecr.units import millimetres
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def _check_length(columns: Columns, quantity: str, length: Array, rest: float) -
     one = unit.to_si(1.0)
     toml = toml_path(columns.table.path).name
     columns.refuse(
-        length <= 0,
+        length < SMALLEST,
         quantity,
         lambda row: (
             f"expected a length above zero, got {length[row] / one:.6g} {unit.suffix}: it is all "

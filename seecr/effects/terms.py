@@ -268,7 +268,10 @@ class Term:
 def _within(layout: Layout, k: int, value: float) -> float:
     """A value within the limits of parameter k."""
     name = layout.names[k]
-    number = float(finite(value, name))
+    array = finite(value, name)
+    if array.ndim:
+        raise InputError(f"{name}: expected one number, got an array of shape {array.shape}")
+    number = float(array)
     if wrong := beyond(layout, k, number):
         raise InputError(f"effect {layout.name}: {name}: {wrong}")
     return number

@@ -20,7 +20,7 @@ from seecr.effects.setup import Setup
 from seecr.equilibrium.following import follow_commands
 from seecr.equilibrium.search import other_rests, solve_setup
 from seecr.errors import InputError
-from seecr.pose import Array
+from seecr.pose import SMALLEST, Array
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.statics.solution import Solution
 from seecr.statics.starts import Commanded, HasCommands, commanded_poses, poses_from_lengths
@@ -166,8 +166,8 @@ def _commands(
         raise InputError(
             f"rest_lengths must be (n, {robot.n_driven}) for {robot.name}, got {np.shape(lengths)}"
         )
-    if np.any(table <= 0):
-        raise InputError("rest_lengths must be positive [m]")
+    if np.any(table < SMALLEST):
+        raise InputError(f"rest_lengths must be positive [m], and not below {SMALLEST:g} m")
     start = robot.reference_pose[None] if poses is None else commanded_poses(poses, robot=robot)
     if len(start) not in (1, len(table)):
         raise InputError(

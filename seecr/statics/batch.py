@@ -39,7 +39,7 @@ from seecr.compiled.newton import FINE, STIFF, solve_batch
 from seecr.compiled.platform import add_skew, evaluate_batch
 from seecr.compiled.rates import change_at_rest, change_of_each_cable
 from seecr.parallel import run_parts
-from seecr.pose import Array, deviated, products, quat_conjugate
+from seecr.pose import SMALLEST, Array, deviated, products, quat_conjugate
 from seecr.statics.abreast import (
     Rested,
     are_for_lanes,
@@ -237,8 +237,8 @@ def _descend_alone(
 def _refuse_no_length(tables: Tables, found: Evaluation) -> None:
     """Rows in which an effect leaves a cable no length have no result, whatever was computed."""
     rest = rest_lengths_of(tables)
-    if not rest.min(initial=np.inf) > 0.0:
-        found.outcome[(rest <= 0.0).any(axis=1)] = NO_LENGTH
+    if not rest.min(initial=np.inf) >= SMALLEST:
+        found.outcome[(rest < SMALLEST).any(axis=1)] = NO_LENGTH
 
 
 def motions(tables: Tables, at: Evaluation) -> Array:
@@ -459,10 +459,11 @@ def under_moment(tables: Tables) -> NDArray[np.bool_]:
 
 def residual_size(gradient: Array) -> Array:
     """The larger of force and torque over length, (n,) [N]; on joints the norm of the gradient."""
-    if gradient.shape[1] == 6:
-        halves = np.linalg.norm(gradient.reshape(-1, 2, 3), axis=2)
-        return np.asarray(halves.max(axis=1))
-    return np.asarray(np.linalg.norm(gradient, axis=1))
+    with np.errstate(over="ignore"):  # of forces without bounds: of cables that have no length
+        if gradient.shape[1] == 6:
+            halves = np.linalg.norm(gradient.reshape(-1, 2, 3), axis=2)
+            return np.asarray(halves.max(axis=1))
+        return np.asarray(np.linalg.norm(gradient, axis=1))
 
 
 def platform_poses(tables: Tables, deviation: Array) -> Array:

@@ -28,7 +28,14 @@ from seecr.counted import between, counted, rows_words
 from seecr.description.joints import motion_columns, values_of_pose
 from seecr.description.robot import Robot
 from seecr.errors import InputError
-from seecr.pose import Array, pose_difference, quat_rotate, quat_to_matrix, rotation_vectors
+from seecr.pose import (
+    SMALLEST,
+    Array,
+    pose_difference,
+    quat_rotate,
+    quat_to_matrix,
+    rotation_vectors,
+)
 from seecr.result import COORDINATES, Record, Result, named, rows_of
 from seecr.statics import batch
 from seecr.statics.starts import start_of
@@ -465,8 +472,8 @@ def certify(robot: Robot, tables: Tables, found: batch.Evaluation) -> Solution:
     ends = np.where(found.outcome < len(_OF_OUTCOME), found.outcome, len(_OF_OUTCOME))
     ends[(ends == CONVERGED) & ~(check.residual < TOLERANCE)] = STALLED
     no_length = np.zeros(len(ends), dtype=bool)
-    if not rest.min(initial=np.inf) > 0.0:
-        no_length |= np.any(rest <= 0.0, axis=1)
+    if not rest.min(initial=np.inf) >= SMALLEST:
+        no_length |= np.any(rest < SMALLEST, axis=1)
     # a pulley pays out some cable even where an anchor point is commanded to its exit point
     failed = np.flatnonzero(~_IS_BALANCED[ends])
     if len(failed):

@@ -92,3 +92,15 @@ def test_smooth_noise_of_unstated_size_may_as_well_be_something_missing() -> Non
     assert plain(found.as_json())["is_open"] is True
     white = compare(ROBOT, replace(data_of(np.zeros((rows(), 3))), sigma=Sigma()))
     assert white.is_noise and not white.is_open
+
+
+def test_hardly_any_readings_are_no_noise_of_a_kind() -> None:
+    """Noise 1.48 times the stated one is told of 60 readings; 57 do not show what noise there is."""
+    larger = drifting(0.0, 1.2 * SIGMA.position_m)
+    for count, shown in ((19, False), (20, True)):
+        data = data_of(larger).rows(slice(50, 50 + count))
+        data = replace(data, quat_wxyz=None, tensions=np.full_like(data.tensions, np.nan))
+        found = compare(ROBOT, data)
+        assert found.whiteness is not None and not found.whiteness.is_noise
+        assert found.problem.n_readings == 3 * count
+        assert (found.coloured is not None) == shown

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from made_columns import columns_of
 from random_robots import random_robot
 
 from seecr.columns.csv import read_table, table_text
+from seecr.columns.known import know_columns
 from seecr.columns.poses import command_lengths, command_poses, measured_orientation
 from seecr.description.robot import Joint, Robot
 from seecr.errors import InputFileError
@@ -108,3 +110,28 @@ def test_numbers_have_all_digits_or_those_asked_for() -> None:
     cells = ["0.30000000000000004", "0.0", "", "", "1e-09", "", "3", "a"]
     assert table_text({"x": values}).splitlines() == ["x", *cells]
     assert table_text({"x": values, "y": values}, 4).splitlines()[1:3] == ["0.3,0.3", "0,0"]
+
+
+@pytest.mark.slow
+def test_a_hundred_thousand_columns_are_read_in_seconds(tmp_path: Path) -> None:
+    """Each name was compared with all: minutes of work, eight times as much for twice as many."""
+    names = ["cmd_x_m", "cmd_y_m", "cmd_z_m", *(f"a{k}" for k in range(100_000)), "timestamp"]
+    path = tmp_path / "wide.csv"
+    path.write_text(",".join(names) + "\n" + ",".join(["0.5"] * len(names)) + "\n")
+    start = time.process_time()
+    known = know_columns(read_table(path), 4)
+    assert time.process_time() - start < 40.0
+    assert len(known.unused) == 100_001 and known.meant == {"timestamp": "t_s"}
+    assert all(len(note) < 500 for note in known.notes)
+
+
+@pytest.mark.parametrize("where", [b"zz", b"yy"], ids=["name", "text"])
+def test_a_parquet_that_is_not_utf_8_is_refused(tmp_path: Path, where: bytes) -> None:
+    pyarrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    path = tmp_path / "odd.parquet"
+    table = pyarrow.table({"cmd_x_m": [0.1], "zz": ["yy"]})
+    parquet.write_table(table, path, store_schema=False)
+    path.write_bytes(path.read_bytes().replace(where, b"\xff\xfe"))
+    with pytest.raises(InputFileError, match="in UTF-8") as caught:
+        read_table(path)
+    assert "odd.parquet" in str(caught.value) and "\n" not in str(caught.value)

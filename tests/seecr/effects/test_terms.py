@@ -102,6 +102,10 @@ def test_a_term_without_a_layout_is_refused() -> None:
 def test_values_that_no_robot_has_are_refused() -> None:
     with pytest.raises(seecr.InputError, match=r"platform_mass: added_kg: -10 is out of bounds"):
         seecr.Term.of(ROBOT, "platform_mass", added_kg=-10.0)
+    with pytest.raises(
+        seecr.InputError, match=r"added_kg: expected one number, got an array of sh"
+    ):
+        seecr.Term.of(ROBOT, "platform_mass", added_kg=np.array([0.1, 0.2]))
     mass = seecr.Term.of(ROBOT, "platform_mass", added_kg=0.01)
     with pytest.raises(seecr.InputError, match=r"added_kg: 1e\+09 is out of bounds"):
         mass.measured(added_kg=(1e9, 1.0))

@@ -9,7 +9,7 @@ import pytest
 from effect_cases import KINDS, experiment_of, random_effect
 
 import seecr
-from seecr.compiled.columns import STALLED
+from seecr.compiled.columns import NO_LENGTH, STALLED
 from seecr.prediction.sensitivity import length_sensitivities, readings_difference
 from seecr.statics import batch
 
@@ -182,3 +182,28 @@ def test_a_lost_waypoint_spoils_the_rows_after_it_in_its_run_alone(
     monkeypatch.setattr(batch, "walk", lose_one)
     found = experiment.predict([seecr.effect_named("backlash")(gap=1e-3)])
     assert found.solved.tolist() == [True, False, False, True, True, True]
+
+
+def test_what_leaves_a_cable_no_length_has_no_prediction():
+    """The offset is shorter than the first two rows' cable, and longer than that of the others."""
+    robot = seecr.load_robot("demobot_parallel")
+    part = np.array([1.0, 1.0, 0.4, 0.4])[:, None]
+    lengths = np.tile(robot.rest_lengths, (4, 1)) * part
+    commands = seecr.Commands(np.tile(robot.reference_pose, (4, 1)), lengths=lengths)
+    half = 0.5 * robot.rest_lengths[0]
+    found = seecr.predict(
+        robot, commands, [seecr.Term.of(robot, "cable_length_offset", offset_1_m=-half)]
+    )
+    assert found.solved.tolist() == [True, True, False, False]
+    assert set(found.found.outcome[2:].tolist()) == {NO_LENGTH}
+
+
+def test_a_cable_shorter_than_any_is_no_cable():
+    """Strains of 1e300 overflowed, and NumPy warned the user, which tests take for an error."""
+    robot = seecr.load_robot("demobot_parallel")
+    lengths = np.tile(robot.rest_lengths, (2, 1))
+    lengths[0, 3], lengths[1] = 1e-300, 1e-300
+    commands = seecr.Commands(np.tile(robot.reference_pose, (2, 1)), lengths=lengths)
+    assert [s.name for s in seecr.solve(robot, commands).status] == ["NO_LENGTH"] * 2
+    with pytest.raises(seecr.InputError, match=r"positive \[m\], and not below 1e-30 m"):
+        seecr.solve(robot, rest_lengths=lengths)
