@@ -95,7 +95,7 @@ def test_smooth_noise_of_unstated_size_may_as_well_be_something_missing() -> Non
 
 
 def test_hardly_any_readings_are_no_noise_of_a_kind() -> None:
-    """Noise 1.48 times the stated one is told of 60 readings; 57 do not show what noise there is."""
+    """Noise 1.48 times the stated one is told of 60 readings; 57 do not show what kind it is."""
     larger = drifting(0.0, 1.2 * SIGMA.position_m)
     for count, shown in ((19, False), (20, True)):
         data = data_of(larger).rows(slice(50, 50 + count))
