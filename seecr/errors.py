@@ -35,6 +35,10 @@ class SeecrError(ValueError):
 
     exit_status = 2
 
+    def __init__(self, text: str = "") -> None:
+        """Make an error; its lines show no character that would steer a terminal."""
+        super().__init__("\n".join(map(printable, str(text).split("\n"))))
+
 
 class RobotError(SeecrError):
     """A robot description (MJCF or numbers) that does not describe a cable robot."""
@@ -90,7 +94,7 @@ class InputFileError(SeecrError):
         if column is not None:
             place.append(f"column {column}")
         start = f"{path}: {', '.join(place)}: " if place else f"{path}: "
-        return cls(printable(" ".join((start + text).split())))
+        return cls(" ".join((start + text).split()))
 
     @classmethod
     def together(cls, errors: Iterable[InputFileError]) -> InputFileError:
