@@ -74,7 +74,7 @@ def pose_lines(solution: Solution, spread: Spread | None = None) -> Iterator[str
             "there may lead to another equilibrium (seecr sweep --follow)"
         )
     yield from stiffness_lines(solution)
-    yield f"forces balance to {solution.residual[0]:.1g} of the load"
+    yield f"forces balance to {solution.balance[0]:.1g} of the load, rounding included"
 
 
 def _spread_lines(spread: Spread) -> Iterator[str]:
