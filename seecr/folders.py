@@ -135,17 +135,19 @@ def staged(
         check_not_read(out / name, read, option)
     above, folder, done = _missing(out), out / f"{UNFINISHED}{secrets.token_hex(4)}", False
     try:  # from before the folder is made: whoever ends the program then leaves nothing either
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-            finish_moves(out)
-            check_ours(out, names, option)
-            folder.mkdir(mode=0o700)
-        except OSError as error:
-            raise InputError(
-                f"{option} {out}: cannot write there: {reason_of(error)}; expected a folder that "
-                "can be made or written to"
-            ) from None
-        with folder_lock(folder):
+        with contextlib.ExitStack() as kept:
+            try:
+                out.mkdir(parents=True, exist_ok=True)
+                finish_moves(out)
+                with folder_lock(out):  # others may be about to move files, or look for dead ones
+                    check_ours(out, names, option)
+                    folder.mkdir(mode=0o700)
+                    kept.enter_context(folder_lock(folder))
+            except OSError as error:
+                raise InputError(
+                    f"{option} {out}: cannot write there: {reason_of(error)}; expected a folder "
+                    "that can be made or written to"
+                ) from None
             yield folder
             with folder_lock(out):
                 _check_replaced(out, folder, read, option)
@@ -238,15 +240,17 @@ def finish_moves(out: Path) -> None:
 
     A folder that another process is still writing to is left alone.
     """
-    for folder in sorted(out.glob(f"{UNFINISHED}*")) if out.is_dir() else ():
-        with contextlib.suppress(FileNotFoundError), folder_lock(folder, wait=False) as dead:
-            if not dead or not folder.is_dir():
-                continue
-            if (folder / _MOVES).exists():
-                with folder_lock(out):
+    if not any(out.glob(f"{UNFINISHED}*")):
+        return
+    with folder_lock(out):
+        for folder in sorted(out.glob(f"{UNFINISHED}*")):
+            with contextlib.suppress(FileNotFoundError), folder_lock(folder, wait=False) as dead:
+                if not dead or not folder.is_dir():
+                    continue
+                if (folder / _MOVES).exists():
                     _move(out, folder)
-            else:
-                shutil.rmtree(folder, ignore_errors=True)
+                else:
+                    shutil.rmtree(folder, ignore_errors=True)
 
 
 def check_together(*paths: Path) -> None:

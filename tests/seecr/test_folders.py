@@ -6,12 +6,15 @@ import json
 import os
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import pytest
 
 from seecr import InputFileError
-from seecr.folders import MANIFEST, check_together, staged
+from seecr.files import digits_of
+from seecr.folders import MANIFEST, check_together, finish_moves, folder_lock, staged
 
 
 def names_in(folder: Path) -> list[str]:
@@ -201,6 +204,8 @@ def test_files_of_two_results_are_not_read_together(tmp_path: Path) -> None:
 
 _MANY = """
 import sys
+import threading
+import time
 from seecr.folders import staged
 for turn in range(12):
     with staged(sys.argv[1], sometimes=["maybe"]) as folder:
@@ -232,3 +237,46 @@ def test_output_folder_is_complete_or_untouched(tmp_path: Path) -> None:
         raise RuntimeError
     assert names_in(out) == ["x"]
     assert (out / "x").read_text() == "whole"
+
+
+def test_a_command_waits_while_another_moves_its_files(tmp_path: Path) -> None:
+    """One of 100 commands, 8 at once, was told that the other's file was not this program's."""
+    out = tmp_path / "out"
+    with staged(out, names={"a.txt"}) as folder:
+        (folder / "a.txt").write_text("first")
+    ended = []
+
+    def other() -> None:
+        with staged(out, names={"a.txt"}) as folder:
+            (folder / "a.txt").write_text("third")
+        ended.append(True)
+
+    with folder_lock(out):
+        (out / "a.txt").write_text("second")  # it is moved, and the manifest is not yet
+        thread = threading.Thread(target=other)
+        thread.start()
+        time.sleep(0.2)
+        manifest = json.loads((out / MANIFEST).read_text())
+        manifest["files"]["a.txt"]["sha256"] = digits_of(out / "a.txt")
+        (out / MANIFEST).write_text(json.dumps(manifest))
+    thread.join(10.0)
+    assert ended == [True] and (out / "a.txt").read_text() == "third"
+    assert sorted(path.name for path in out.iterdir()) == [MANIFEST, "a.txt"]
+
+
+def test_nobody_takes_a_folder_just_made_for_a_dead_one(tmp_path: Path, monkeypatch) -> None:
+    """Between making the folder and locking it, another command could remove it."""
+    out, seen = tmp_path / "out", []
+    whole = Path.mkdir
+
+    def mkdir(path: Path, *given, **named) -> None:
+        whole(path, *given, **named)
+        if path.parent == out:
+            thread = threading.Thread(target=lambda: (finish_moves(out), seen.append(path)))
+            thread.start()
+            thread.join(0.2)
+
+    monkeypatch.setattr(Path, "mkdir", mkdir)
+    with staged(out, names={"a.txt"}) as folder:
+        (folder / "a.txt").write_text("whole")
+    assert (out / "a.txt").read_text() == "whole"
