@@ -32,6 +32,8 @@ _PART, _FEWEST = 8, 16
 # Orientations that a full search starts from, at the edge of what was found, and of these those
 # about the vertical.
 _STARTS, _MORE, _ABOUT = 24, 100, 4
+# Tilts of a platform that turns about one axis: a bar on two cables has at most four equilibria.
+_TILTS = 8
 
 
 def poses_in_place(
@@ -137,7 +139,11 @@ def turned_in_place(robot: Robot, tables: Tables, low: Array, high: Array) -> Tu
     out.search(np.arange(n), (home.deviation[:, None].copy(), home.values[:, None].copy()))
     near = _neighbours(tables.poses[:, :3])
     _spread(out, near, np.flatnonzero(out.found))
-    _search_all(out, near, np.ones(n, dtype=bool), _STARTS)
+    tilts = np.count_nonzero(robot.hinges) == 1  # several may hold, and some hold from few starts
+    _search_all(out, near, np.ones(n, dtype=bool), _MORE if tilts else _STARTS)
+    if tilts:  # the best one counts
+        some = np.flatnonzero(out.found)
+        out.search(some, _many_starts(out, some, _TILTS), farther=True)
     _improve(out, near[:, :0])
     _spread(out, near, np.flatnonzero(out.found))  # again, from farther inside
     if robot.n_driven + freedoms(robot)[1] > robot.n_dof + 1:
