@@ -1,4 +1,4 @@
-"""Commands at once in one folder leave a whole result and nothing else: scripts/load.py, smaller."""
+"""Commands at once in one folder leave a result and nothing else: scripts/load.py, smaller."""
 
 from __future__ import annotations
 
