@@ -170,7 +170,7 @@ class Plan(Result):
         seen = [v for v in self.effects if v.visible]
         named = [v for v in seen if v.named]
         return (
-            f"Of {counted(len(self.effects), 'effect')}, {len(seen)} would be visible at a "
+            f"Of {counted(len(self.effects), 'effect')}, {len(seen)} would be visible at an "
             f"expected size and {len(named)} of these could be named. An effect of the smallest "
             f"visible size is found with a power of {100 * POWER:.0f} %, at a false-alarm rate of "
             f"{100 * LEVEL:.0f} % over all effects; from {NAMED:g} times that size on, a "

@@ -291,7 +291,7 @@ def checks(found: Diagnosis) -> list[Check]:
         *out,
         Check("test runs", better == blocks, "each added effect improves the prediction of "
             f"{better} of {blocks}"),
-        Check("sizes", worst < PLAUSIBLE and not bound, f"at most {short(worst, 2)} plausible "
+        Check("sizes", worst < PLAUSIBLE and not bound, f"at most {short(worst, 2)} expected "
               f"sizes ({largest})" + (f"; at its bound: {', '.join(bound)}" if bound else "")),
     ]  # fmt: skip
 

@@ -133,7 +133,7 @@ def _sizes(found: Visible) -> list[Cell]:
 def _visible(plan: Plan) -> Iterator[Block | None]:
     """How small each effect can be, as a figure and as a table."""
     words = (
-        "The smallest visible size of each effect. Left of the dotted line, an effect of plausible "
+        "The smallest visible size of each effect. Left of the dotted line, an effect of expected "
         "size is visible. Between dot and diamond the effect is visible, but the effect that "
         "imitates it best would explain the data as well; without a diamond, another effect "
         "imitates it exactly at these poses."

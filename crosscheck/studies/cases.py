@@ -168,7 +168,7 @@ class _Reader:
         data, digits = at("data", self._read, do, given.get("data"), robot)
         of_model = "" if model is None else digits_of(model.path)
         key = _hash([
-            full_version(), do, numbers_of(robot), digits, of_model, numbers, grid,
+            full_version(), do, robot_table(robot), digits, of_model, numbers, grid,
             [[term.name, term.vector] for term in terms],
         ])  # fmt: skip
         return StudyCase(name, do, robot, given, effects, data, numbers | grid, key)
@@ -195,7 +195,7 @@ class _Reader:
         if not cell:
             return "", []
         path = self._path(cell)
-        name = _hash([do, str(path), numbers_of(robot)])
+        name = _hash([do, str(path), robot_table(robot)])
         if name not in self._data:
             if do == "sweep":
                 self._data[name] = read_commands(path, robot).commands
@@ -292,7 +292,7 @@ def _values_of(given: Mapping[str, str]) -> dict[str, dict[str, float]]:
     return found
 
 
-def numbers_of(robot: Robot) -> dict[str, Any]:
+def robot_table(robot: Robot) -> dict[str, Any]:
     """All numbers of a robot."""
     return {f.name: getattr(robot, f.name) for f in fields(Robot) if f.name not in _WORDS}
 

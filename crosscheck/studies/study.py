@@ -13,7 +13,7 @@ from typing import Any
 from crosscheck.diagnosis.tolerance import Tolerance
 from crosscheck.studies.cases import GivenCases, StudyCase, read_cases
 from crosscheck.studies.parts import parts_in
-from crosscheck.studies.tasks import FAILED, run_case
+from crosscheck.studies.tasks import FAILED, run_study_case
 from seecr.arguments import check_kind, silent
 from seecr.counted import counted
 from seecr.errors import ExecutorError
@@ -140,7 +140,7 @@ def studied(
         todo = list(missing.values())
         if len(todo) < len(every):
             progress(len(every) - len(todo), "")
-        one = partial(run_case, data, full_version())
+        one = partial(run_study_case, data, full_version())
         done = 0
         try:
             with closing(as_done(one, todo, executor)) as results:

@@ -26,7 +26,7 @@ FAILED = "failed"
 """Key of the sentence of a case without a result."""
 
 
-def run_case(data: Mapping[str, Any], version: str, case: StudyCase) -> tuple[Any, Record]:
+def run_study_case(data: Mapping[str, Any], version: str, case: StudyCase) -> tuple[Any, Record]:
     """The rows of a case, as a table of pyarrow, and its summary; no rows where it failed.
 
     Args:

@@ -19,9 +19,11 @@ from seecr.compiled.columns import (
     FALLING,
     FORCE_OF_WEIGHT,
     ITERATIONS,
+    REST,
     SINGULAR,
     SPINNING,
     STALLED,
+    TENSION,
     TOLERANCE,
     UNSTABLE,
 )

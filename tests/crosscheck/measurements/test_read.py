@@ -470,6 +470,7 @@ def test_the_reference_s_examples_are_read(csv_file, robot):
 
 def test_the_reference_s_columns_and_units_are_known():
     rows = [row.split("|") for row in REFERENCE.splitlines() if row.startswith("| `")]
+    rows = [row for row in rows if len(row) == 5]  # those with units
     assert len(rows) == 14
     for _, columns, _, units, _ in rows:
         names = [name for name in re.findall(r"`([^`]+)`", columns) for name in name.split()]
