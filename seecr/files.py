@@ -65,7 +65,8 @@ def of_sheet(path: Path) -> tuple[Path, str | None]:
 
 def toml_path(path: Path) -> Path:
     """The TOML beside a file of rows; that of a workbook is beside all of its sheets."""
-    return of_sheet(path)[0].with_suffix(".toml")
+    file = of_sheet(path)[0]
+    return file.with_suffix(".toml") if file.name else Path(f"{file}.toml")  # "." has no name
 
 
 def read_bytes(path: Path, expected: str) -> bytes:

@@ -205,6 +205,13 @@ def saved(folder: Path, stiff: Files) -> Path:
     return path
 
 
+@pytest.mark.parametrize("folder", [".", "/", ".."])
+def test_a_folder_is_no_file_of_measurements(stiff: Files, tmp_path: Path, folder: str) -> None:
+    """The current folder ended as a defect of the program: it has no name to put a suffix to."""
+    said = refused("compare", stiff[0], folder, "--out", tmp_path / "out")
+    assert "is a directory" in said.lower() or "folder" in said
+
+
 def test_measurements_are_not_replaced_by_those_of_a_twin(stiff: Files, tmp_path: Path) -> None:
     robot, data = stiff
     mine = tmp_path / "measured.csv"
