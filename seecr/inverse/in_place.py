@@ -139,7 +139,7 @@ def turned_in_place(robot: Robot, tables: Tables, low: Array, high: Array) -> Tu
     out.search(np.arange(n), (home.deviation[:, None].copy(), home.values[:, None].copy()))
     near = _neighbours(tables.poses[:, :3])
     _spread(out, near, np.flatnonzero(out.found))
-    tilts = np.count_nonzero(robot.hinges) == 1  # several may hold, and some hold from few starts
+    tilts = freedoms(robot)[1] == 1  # several may hold, and some hold from few starts
     _search_all(out, near, np.ones(n, dtype=bool), _MORE if tilts else _STARTS)
     if tilts:  # the best one counts
         some = np.flatnonzero(out.found)
