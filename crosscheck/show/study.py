@@ -48,6 +48,9 @@ def print_study(found: Study, console: Console | None = None) -> None:
     blocks: list[Any] = [TextTable(heads, table, kind="whole")]
     if len(rows) > _MOST:
         blocks.append(Items([f"and {counted(len(rows) - _MOST, 'more row')}, in study.csv"]))
+    if len(rows) == 1:  # there is none that it could differ from
+        told = {key: _cell(key, value) for key, value in rows[0].items() if value is not None}
+        blocks = [Items([f"{_head(key, rows)}: {cell}".lstrip("#") for key, cell in told.items()])]
     show([*blocks, Items(found.lines())], console)
 
 

@@ -29,7 +29,9 @@ _WIRE_ROPES = {
     "steel 7x19": (0.418, 0.381, "6x19M around a strand, which is 7x19"),
     "steel 6x19": (0.384, 0.359, "6x19 with a fibre core"),
 }
-# Modulus [GPa] and density [kg/m^3] of fibres, by their makers' data sheets.
+# Modulus [GPa] and density [kg/m^3] of fibres, of the order that makers state. Published moduli
+# scatter: 101 to 113 GPa for Dyneema, 60 to 75 for Vectran (Scientific Reports 11:8705, 2021,
+# table 1, has the lower ones).
 _FIBRES = {
     "dyneema": (113.0, 975.0, "Dyneema SK78"),
     "vectran": (75.0, 1410.0, "Vectran HT"),
@@ -45,7 +47,7 @@ MATERIALS = {
 } | {
     name: (
         _FIBRE * _BRAIDED * 1e9 * e, _FIBRE * rho,
-        f"a braid of {what}, by its data sheet's {e:g} GPa and {rho:g} kg/m^3",
+        f"a braid of {what}, of {e:g} GPa and {rho:g} kg/m^3",
     )
     for name, (e, rho, what) in _FIBRES.items()
 }  # fmt: skip

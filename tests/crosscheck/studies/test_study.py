@@ -382,3 +382,11 @@ def test_an_executor_that_dies_leaves_what_is_done(tmp_path: Path) -> None:
     again = crosscheck.study(LAYOUTS, out=tmp_path)
     assert again.computed == 6 - len(done)
     assert {name: data for name, data in parts_of(tmp_path).items() if name in done} == done
+
+
+def test_of_a_single_case_all_is_told(tmp_path: Path) -> None:
+    """Only columns in which cases differ were printed: of one case its name, and no result."""
+    cases = tmp_path / "cases.csv"
+    cases.write_text("robot,do,grid\nplanar_vertical,map,0.4 0 0.2\n")
+    said = ran(f"crosscheck study {cases} --jobs 1 --out {tmp_path / 'out'}", 0).stdout
+    assert "robot: planar_vertical\n" in said and "at rest: 1\ndeviation max [mm]: " in said
