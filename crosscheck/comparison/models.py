@@ -24,7 +24,7 @@ from seecr.errors import InputError
 from seecr.files import path_of
 from seecr.pose import Array
 from seecr.prediction.effect_tables import number_of
-from seecr.prediction.model import Model, load_model, new_model, read_document
+from seecr.prediction.model import CALIBRATION, Model, load_model, new_model, read_document
 from seecr.prediction.uncertainty import covariance_of
 from seecr.result import Record, Result
 from seecr.units import measured, parameter_name, significant
@@ -207,6 +207,11 @@ def compare_models(
     first, second = one.only(kept), other.only(kept)
     values, together = _compared(first, second)
     notes = [*one.notes, *other.notes]
+    if shared := _data_of(before) & _data_of(now):
+        notes.append(
+            f"both were fitted to {', '.join(sorted(shared))}: if that is the same file, their errors "
+            "are not independent, and those of a pooled model are too small"
+        )
     if apart:
         notes.append(f"{', '.join(apart)}: separate values for files or runs are not compared")
     if lacking := len(first.stderr) - len(values):
@@ -272,6 +277,14 @@ def _document(given: GivenValues) -> tuple[Path | None, Mapping[str, Any], Model
     path = path_of(given, "a model")
     is_diagnosis = path.suffix.lower() == ".json"
     return path, diagnosis_document(path) if is_diagnosis else read_document(path)[1], None
+
+
+def _data_of(given: GivenValues) -> set[str]:
+    """The data that a model's values were fitted to, by name."""
+    document = _document(given)[1]
+    tables = [*document.get("effect", ()), document.get(CALIBRATION, {})]
+    sources = [table.get("provenance", {}) for table in tables if isinstance(table, Mapping)]
+    return {str(one["data"]) for one in sources if isinstance(one, Mapping) and one.get("data")}
 
 
 def _machine(*given: GivenValues) -> Robot:

@@ -93,6 +93,23 @@ def test_a_pooled_model_has_both_by_their_inverse_covariances(tmp_path: Path) ->
 
 
 @pytest.mark.slow
+def test_two_fits_of_one_file_are_said_not_to_be_independent(tmp_path: Path) -> None:
+    """A model pooled with itself had errors that were smaller by the root of two, in silence."""
+    names = ["monday.toml", "friday.toml"]
+    apart = [kept(tmp_path, name, TRUTH) for name in names]
+    assert "independent" not in str(crosscheck.compare_models(*apart))
+    for path in apart:
+        path.write_text(
+            path.read_text().replace(
+                'name = "platform_mass"',
+                'name = "platform_mass"\nprovenance = { data = "day1.csv", date = "2026-11-29", '
+                'version = "seecr 0.1.0", by = "crosscheck add" }',
+            )
+        )
+    said = str(crosscheck.compare_models(*apart))
+    assert "both were fitted to day1.csv: if that is the same file, their errors are not" in said
+
+
 def test_a_robot_that_has_not_changed_is_said_to_in_one_of_twenty_at_most(tmp_path: Path) -> None:
     model = seecr.load_model(kept(tmp_path, "a.toml", TRUTH), ROBOT)
     random, lower = np.random.default_rng(3), np.linalg.cholesky(COVARIANCE)
