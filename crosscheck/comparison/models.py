@@ -209,8 +209,8 @@ def compare_models(
     notes = [*one.notes, *other.notes]
     if shared := _data_of(before) & _data_of(now):
         notes.append(
-            f"both were fitted to {', '.join(sorted(shared))}: if that is the same file, their errors "
-            "are not independent, and those of a pooled model are too small"
+            f"both were fitted to {', '.join(sorted(shared))}: if that is the same file, their "
+            "errors are not independent, and those of a pooled model are too small"
         )
     if apart:
         notes.append(f"{', '.join(apart)}: separate values for files or runs are not compared")

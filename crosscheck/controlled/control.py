@@ -13,7 +13,7 @@ from crosscheck.controlled.timed import Timing, run_in_time
 from crosscheck.errors import CrosscheckError
 from crosscheck.given import GivenModel, GivenRobot, robot_of
 from seecr.arguments import finite, silent
-from seecr.controlled.control import control
+from seecr.controlled.control import check_all_driven, control
 from seecr.controlled.plant import SensorNoise
 from seecr.controlled.schemes import READS, Scheme
 from seecr.prediction.experiment import effects_of
@@ -67,6 +67,7 @@ def control_in_time(
     if not winches.speed > 0.0:
         raise CrosscheckError(f"winch speed: expected a number above 0, got {winches.speed:g}")
     robot = robot_of(robot)
+    check_all_driven(robot)
     acting = effects_of(true, robot)
     Machine(robot, acting, winches)  # refuses what it cannot move before anything is solved
     rest = control(

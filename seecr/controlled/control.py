@@ -87,13 +87,14 @@ def control(
 
     Raises:
         InputError: an unknown scheme, one that needs other readings, a gain or delay that holds
-            nowhere even where the model is right, or winches that hold tensions and leave the
-            platform free.
+            nowhere even where the model is right, winches that hold tensions and leave the
+            platform free, or a robot with lines that no winch drives.
 
     Example:
         ``seecr.control(robot, poses, scheme="elastic+pose_feedback", steps=5).schemes``
     """
     robot = robot_of(robot)
+    check_all_driven(robot)
     commands = commands_from(poses, robot)
     if commands.lengths is not None:
         raise InputError("control needs wanted poses (n, 7); got lengths")
@@ -150,6 +151,20 @@ def _tuning(gain: float, rate: float, delay: float, steps: int, reads: Sequence[
     late = int(np.ceil(delay * rate - 1e-9))
     seen = [kind in reads for kind in READS[:2] for _ in range(3)]
     return Tuning(float(gain), late, whole(steps, "steps", 1), tuple(seen))
+
+
+def check_all_driven(robot: Robot) -> None:
+    """Check that every line is on a winch: a scheme would turn winches that are not there.
+
+    Raises:
+        InputError: some are not.
+    """
+    if not robot.all_driven:
+        raise InputError(
+            f"{robot.name}: no winch drives {', '.join(robot.passive_names)}, and schemes of "
+            "control drive every line; expected a robot without passive lines (seecr correct takes "
+            "them)"
+        )
 
 
 def _check_holds(scheme: Scheme, belief: Belief, tuning: Tuning) -> None:

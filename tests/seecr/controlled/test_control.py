@@ -278,3 +278,10 @@ def test_robots_without_a_cable_to_spare_have_no_tensions_to_control() -> None:
         seecr.control(ipanema, ipanema.reference_pose, scheme="stiffness", lowest=10.0)
     with pytest.raises(seecr.InputError, match="expected least or one of x, y, z, rx, ry, rz"):
         seecr.control(COGIRO, POSES, scheme="stiffness", stiff="up")
+
+
+def test_lines_that_no_winch_drives_are_refused() -> None:
+    """A scheme would have commanded them as if they were on winches."""
+    robot = seecr.load_robot(seecr.model_path("planar_vertical"), passive=["cable4"])
+    with pytest.raises(seecr.InputError, match="no winch drives cable4, and schemes of control"):
+        seecr.control(robot, robot.reference_pose[None], scheme="geometric")
