@@ -12,8 +12,13 @@ from seecr.columns.cells import decimals
 from seecr.columns.known import ANGLES, POSITION, QUATERNION, Columns
 from seecr.columns.plausible import refuse_degrees
 from seecr.counted import counted
-from seecr.description.joints import OFF_MANIFOLD, off_joints, pose_of_values
-from seecr.description.projected import determined, projected
+from seecr.description.joints import (
+    OFF_MANIFOLD,
+    changeable,
+    determined,
+    off_joints,
+    projected,
+)
 from seecr.errors import Faults
 from seecr.files import toml_path
 from seecr.pose import NORM_TOLERANCE, SMALLEST, Array, quat_from_rxyz, rxyz_from_quat
@@ -103,7 +108,7 @@ def poses_of(columns: Columns, robot: Robot, prefix: str, word: str) -> Array | 
     present = columns.present
     if not present(prefix, POSITION + QUATERNION + ANGLES):
         return None
-    free, reference = _free_coordinates(robot), robot.reference_pose
+    free, reference = changeable(robot), robot.reference_pose
     # joints may determine what is left out, which is found when all is read
     needed = free & (not robot.joints)
     noted = not robot.joints
@@ -249,7 +254,7 @@ def wanted_poses(columns: Columns, robot: Robot) -> Array | None:
         wanted[:, 3:] = _quaternions(columns, "want", blank_is_nan=True)
     elif present("want", ANGLES):
         rxyz = rxyz_from_quat(robot.reference_pose[3:])
-        of, free = ("want", "wanted", "deg"), _free_coordinates(robot)[3:]
+        of, free = ("want", "wanted", "deg"), changeable(robot)[3:]
         angles = _group(columns, of, ANGLES, free, rxyz, blank_is_nan=True)
         given = np.isfinite(angles).all(axis=1)
         wanted[given, 3:] = quat_from_rxyz(angles[given])
@@ -284,7 +289,7 @@ def aimed_poses(columns: Columns, robot: Robot) -> tuple[Array, Array | None]:
 def _all_stated(columns: Columns, robot: Robot) -> bool:
     """Whether each row has a wanted position, and an orientation if there are columns for one."""
     given = columns.present("want", POSITION + QUATERNION + ANGLES)
-    needed = {part for part, free in zip(POSITION, _free_coordinates(robot), strict=False) if free}
+    needed = {part for part, free in zip(POSITION, changeable(robot), strict=False) if free}
     cells = [columns.numbers(f"want_{part}", blank_is_nan=True) for part in given]
     return bool(given) and needed.issubset(given) and bool(np.isfinite(cells).all())
 
@@ -319,17 +324,6 @@ def _group(
     quantities = [f"{prefix}_{parts[k]}" for k in there]
     values[:, there] = columns.all_numbers(quantities, blank_is_nan=blank_is_nan)
     return values
-
-
-def _free_coordinates(robot: Robot) -> NDArray[np.bool_]:
-    """Which of x y z rx ry rz of the platform can change at all, (6,): found by trying."""
-    if not robot.joints:
-        return np.ones(6, dtype=bool)
-    values = np.random.default_rng(0).uniform(-0.5, 0.5, (8, len(robot.joints)))
-    poses, _joints = pose_of_values(robot, values)
-    moved = np.concatenate([poses[:, :3], rxyz_from_quat(poses[:, 3:])], axis=1)
-    free: NDArray[np.bool_] = np.ptp(moved, axis=0) > 1e-9
-    return free
 
 
 def _quaternions(columns: Columns, prefix: str, *, blank_is_nan: bool) -> Array:

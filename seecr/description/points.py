@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,27 @@ PLANES = {"yz": 0, "xz": 1, "xy": 2}
 _ALIKE = 1e-9
 # A frame lower than this part of its width has all its exit points at one height.
 _FLAT = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A slide or hinge joint of a platform that is not free.
+
+    Attributes:
+        kind: ``"slide"`` or ``"hinge"``.
+        name: as in the MJCF.
+        axis: (3,) unit vector in the base frame at the reference pose.
+        point: (3,) [m] a point on the axis, base frame at the reference pose.
+        ball: whether it is one of three hinges in a row, about axes at right angles through one
+            point, that stand for a ball joint. Rests, tensions, stiffness and frequencies are those
+            of the motion, whatever its coordinates.
+    """
+
+    kind: str
+    name: str
+    axis: Array
+    point: Array
+    ball: bool = False
 
 
 def pose_from(at: ArrayLike) -> Array:
@@ -70,23 +92,20 @@ def plane_of(exit_points: Array, anchor_points: Array, pose: Array | None = None
     return flat[0] if len(flat) == 1 else None
 
 
-def joints_in(plane: str | None, point: bool, pose: Array) -> list[dict[str, Any]]:
+def joints_in(plane: str | None, point: bool, pose: Array) -> tuple[Joint, ...]:
     """Joints of a platform: slides in its plane, and a hinge across it unless it is a point.
 
     Of a free platform there are none; of a point in space three slides.
     """
     if plane is None and not point:
-        return []
+        return ()
     kinds = [("slide", letter, "xyz".index(letter)) for letter in plane or "xyz"]
     if plane is not None and not point:
         kinds.append(("hinge", "turn", PLANES[plane]))
-    return [
-        {"kind": kind, "name": name, "axis": np.eye(3)[axis], "point": pose[:3].copy()}
-        for kind, name, axis in kinds
-    ]
+    return tuple(Joint(kind, name, np.eye(3)[axis], pose[:3].copy()) for kind, name, axis in kinds)
 
 
-def physical_inertia(inertia: Array, joints: Sequence[dict[str, Any]], pose: Array) -> Array | None:
+def physical_inertia(inertia: Array, joints: Sequence[Joint], pose: Array) -> Array | None:
     """The inertia (3, 3), or what a planar platform feels of it; None if no body has it.
 
     No body has one that is not positive, or with one principal moment larger than the sum of the
@@ -96,7 +115,7 @@ def physical_inertia(inertia: Array, joints: Sequence[dict[str, Any]], pose: Arr
     moments = np.linalg.eigvalsh(inertia)
     if moments[0] > 0.0 and moments[0] + moments[1] >= moments[2] * (1.0 - _ALIKE):
         return inertia
-    hinges = [joint["axis"] for joint in joints if joint["kind"] == "hinge"]
+    hinges = [joint.axis for joint in joints if joint.kind == "hinge"]
     axis = quat_to_matrix(pose[3:]).T @ hinges[0] if len(hinges) == 1 else np.zeros(3)
     about = float(axis @ inertia @ axis)
     return about * np.eye(3) if about > 0.0 else None
@@ -106,9 +125,9 @@ def robot_numbers(
     exit_points: ArrayLike, anchor_points: ArrayLike, mass: float, ea: ArrayLike,
     stiffness: ArrayLike, at: ArrayLike | None, plane: str | None,
     centre_of_mass: ArrayLike, inertia: ArrayLike | None,
-    joints: Sequence[dict[str, Any]] | None = None,
+    joints: tuple[Joint, ...] | None = None,
 ) -> tuple[dict[str, Any], bool]:  # fmt: skip
-    """The numbers of a robot, its joints as dictionaries. See :meth:`Robot.from_points`.
+    """The numbers of a robot, with its joints. See :meth:`Robot.from_points`.
 
     Args:
         ea, stiffness: for each cable one of them is a number, the other NaN.

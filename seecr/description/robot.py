@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from seecr.counted import between, counted
 from seecr.description.cables import EXAMPLE, rope_of
+from seecr.description.mjcf_text import plain_text
+from seecr.description.points import Joint as Joint  # of a robot
 from seecr.description.points import robot_numbers
-from seecr.description.scene import plain_text
 from seecr.errors import InputError, RobotError
 from seecr.files import path_of, write_text
 from seecr.pose import LARGEST, Array, all_finite, quat_rotate, transform_points
@@ -41,27 +42,6 @@ _OF_CABLES = ("exit_points", "anchor_points", "ea", "rest_lengths")
 _FILLED_IN: Any = None
 
 IDENTITY_POSE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-
-
-@dataclass(frozen=True, eq=False)
-class Joint:
-    """A slide or hinge joint of a platform that is not free.
-
-    Attributes:
-        kind: ``"slide"`` or ``"hinge"``.
-        name: as in the MJCF.
-        axis: (3,) unit vector in the base frame at the reference pose.
-        point: (3,) [m] a point on the axis, base frame at the reference pose.
-        ball: whether it is one of three hinges in a row, about axes at right angles through one
-            point, that stand for a ball joint. Rests, tensions, stiffness and frequencies are those
-            of the motion, whatever its coordinates.
-    """
-
-    kind: str
-    name: str
-    axis: Array
-    point: Array
-    ball: bool = False
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -203,9 +183,8 @@ class Robot:
                 "inertia: expected that of a body about its centre of mass, with positive moments, "
                 "none larger than the sum of the others; leave it out for that of a solid box"
             )
-        joints = tuple(Joint(**joint) for joint in numbers.pop("joints"))
         down = np.asarray(gravity, float)
-        return cls(name, **numbers, gravity=down, cable_names=tuple(names), joints=joints)
+        return cls(name, **numbers, gravity=down, cable_names=tuple(names))
 
     def save(self, path: str | Path, comment: str = "") -> None:
         """Write the robot as MJCF, which :func:`seecr.load_robot` reads back.

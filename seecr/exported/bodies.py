@@ -16,9 +16,9 @@ import numpy as np
 
 from seecr.compiled.columns import UP
 from seecr.description.joints import values_of_pose
+from seecr.description.mjcf_text import cable, dot, numbers_text, scene, text_of
 from seecr.description.passive import write_pull
 from seecr.description.robot import Robot
-from seecr.description.scene import cable, dot, numbers_text, scene, text_of
 from seecr.effects.setup import Setup
 from seecr.pose import Array, transform_points
 from seecr.statics.solution import Solution

@@ -14,8 +14,8 @@ from seecr.commands import Commands
 from seecr.compiled.cable_law import LEAST
 from seecr.compiled.columns import CUBIC, FORCE_OF_WEIGHT, QUADRATIC, STRAIN, UP
 from seecr.description.mjcf import GivenRobot, robot_of
+from seecr.description.mjcf_text import plain_text
 from seecr.description.robot import Robot
-from seecr.description.scene import plain_text
 from seecr.effects import Effect
 from seecr.effects.edits import edit_setup, setup_with
 from seecr.effects.setup import QUANTITIES, History, plain_setup

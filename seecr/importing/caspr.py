@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from seecr.description.points import Joint
 from seecr.errors import InputFileError
 from seecr.importing.draft import Draft, DraftFaults, pulley_notes
 from seecr.importing.xml_tree import Node, numbers_in, numbers_of, read_xml
@@ -86,7 +87,7 @@ def _link(body: Node, faults: DraftFaults) -> Node:
     return links[0]
 
 
-def _joint(link: Node, faults: DraftFaults) -> tuple[Array, tuple[dict[str, Any], ...]]:
+def _joint(link: Node, faults: DraftFaults) -> tuple[Array, tuple[Joint, ...]]:
     """The pose (7,) at the joint's initial values, and the joints there."""
     joint = link.child("joint") or Node("joint", {}, link.line)
     kind = joint.values.get("type", "")
@@ -99,17 +100,19 @@ def _joint(link: Node, faults: DraftFaults) -> tuple[Array, tuple[dict[str, Any]
     values = numbers_of(start, "q_initial", len(motions), faults, joint.line)
     parent = link.child("parent") or Node("parent", {}, link.line)
     pose[:3] = numbers_in(parent, "location", 3, faults)
-    joints = []
+    axes = []
     for motion, value in zip(motions, values, strict=True):
         axis = quat_rotate(pose[3:], np.eye(3)["xyz".index(motion[-1])])
-        turns = len(motion) > 1
-        joints.append({"kind": "hinge" if turns else "slide", "name": motion, "axis": axis})
-        if turns:
+        axes.append(axis)
+        if motion.startswith("r"):
             pose[3:] = quat_multiply(quat_from_rotvec(value * axis), pose[3:])
         else:
             pose[:3] += value * axis
-    held = tuple({**one, "point": pose[:3].copy()} for one in joints)
-    return pose, () if kind == _FREE else held
+    if kind == _FREE:
+        return pose, ()
+    kinds = ["hinge" if motion.startswith("r") else "slide" for motion in motions]
+    held = zip(kinds, motions, axes, strict=True)
+    return pose, tuple(Joint(*one, point=pose[:3].copy()) for one in held)
 
 
 def _inertia(physical: Node, mass: float, centre: Array, faults: DraftFaults) -> Array | None:

@@ -73,7 +73,7 @@ class Draft:
     centre_of_mass: Array | tuple[float, ...] = (0.0, 0.0, 0.0)
     inertia: Array | None = None
     pose: Array | tuple[float, ...] | None = None
-    joints: tuple[dict[str, Any], ...] | None = None
+    joints: tuple[Joint, ...] | None = None
     plane: str | None = "auto"
     limits: tuple[float, float] = (0.0, np.inf)
     notes: tuple[str, ...] = ()
@@ -144,8 +144,7 @@ class Draft:
                 None if one_point else self.plane, self.centre_of_mass, self.inertia,
                 None if one_point else self.joints,
             )  # fmt: skip
-            joints = tuple(Joint(**joint) for joint in numbers.pop("joints"))
-            robot = Robot(self.name, **numbers, cable_names=self.cable_names, joints=joints)
+            robot = Robot(self.name, **numbers, cable_names=self.cable_names)
         except SeecrError as error:
             raise InputError(f"{self.path}: {error}") from None
         return robot, (*self.notes, *self._deduced(robot, replaced))

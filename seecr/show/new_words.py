@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from seecr.counted import between, counted, some
-from seecr.description.pulls import unresisted
+from seecr.description.joints import unresisted
 from seecr.pose import Array
 from seecr.show.pose_words import at_rest, direction_words, softest_words
 from seecr.statics.solution import Solution

@@ -11,8 +11,8 @@ import pytest
 from rectangle import RECTANGLE
 from scipy.spatial.transform import Rotation
 
+from seecr.description.mjcf_text import cable, numbers_text, plain_text, scene, text_of
 from seecr.description.robot import Joint, Robot
-from seecr.description.scene import cable, numbers_text, plain_text, scene, text_of
 
 TURN = Rotation.from_rotvec([0.3, -0.5, 0.8])
 # A body whose axes are not those of its frame; no plate is as flat as to break the triangle rule.

@@ -13,8 +13,7 @@ from published import CASPR, WIREX, caspr_files, wirex_file
 from scipy.spatial.transform import Rotation
 
 import seecr
-from seecr.description.joints import values_of_pose
-from seecr.description.pulls import unresisted
+from seecr.description.joints import unresisted, values_of_pose
 from seecr.importing.caspr import read_caspr
 from seecr.importing.draft import Draft
 from seecr.importing.wirex import read_wirex
