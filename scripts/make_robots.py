@@ -23,7 +23,7 @@ from seecr import Robot, SeecrError, Solution, correct, solve
 from seecr.importing.caspr import read_caspr
 from seecr.importing.draft import Draft
 from seecr.importing.wirex import read_wirex
-from seecr.show.new_words import reason
+from seecr.show.pose_words import reason
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "robots.md"
 # E S over the weight where a file says none, the tension that cables are tightened to [N], and the

@@ -32,7 +32,7 @@ from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.show.case_recording import write_case_recording
 from crosscheck.show.error_recordings import write_diagnosis_recording
-from crosscheck.show.page import write_page
+from crosscheck.show.pictures import write_page
 from crosscheck.suite.agreement import load_thresholds
 from crosscheck.suite.cases import Case, select, shipped_cases
 from crosscheck.suite.run import run_case

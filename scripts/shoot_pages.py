@@ -18,7 +18,7 @@ import browser
 from crosscheck.comparison import compare
 from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.planning import make_plan
-from crosscheck.show.page import write_page
+from crosscheck.show.pictures import write_page
 from crosscheck.twin.make import Twin, make_twin
 from seecr.description.mjcf import model_path
 from seecr.files import Made

@@ -72,7 +72,7 @@ def no_lines_of_progress() -> None:
 @pytest.fixture
 def unpaged(monkeypatch: pytest.MonkeyPatch) -> None:
     """No page is drawn, which takes most of the time of a command, where nobody looks at it."""
-    monkeypatch.setattr("crosscheck.show.page.write_page", lambda _found, _path, _made: None)
+    monkeypatch.setattr("crosscheck.show.pictures.write_page", lambda _found, _path, _made: None)
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ import pytest
 from remembered_twins import remember_twins
 from shown import Page, assert_shown
 
-import crosscheck.show.page
+import crosscheck.show.pictures
 
 TUTORIAL = Path(__file__).resolve().parents[1] / "docs" / "tutorial.md"
 
@@ -17,14 +17,14 @@ TUTORIAL = Path(__file__).resolve().parents[1] / "docs" / "tutorial.md"
 @pytest.fixture
 def pages_of_diagnoses(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Of seven pages the two richest alone are drawn; the list has their names."""
-    drawn, write = list[str](), crosscheck.show.page.write_page
+    drawn, write = list[str](), crosscheck.show.pictures.write_page
 
     def only_diagnoses(found: Any, path: Path, made: Any) -> None:
         if path.name == "diagnosis.html":
             write(found, path, made)
             drawn.append(path.name)
 
-    monkeypatch.setattr(crosscheck.show.page, "write_page", only_diagnoses)
+    monkeypatch.setattr(crosscheck.show.pictures, "write_page", only_diagnoses)
     return drawn
 
 

@@ -57,7 +57,7 @@ def command(
     """
     from crosscheck import Sigma, add_effect, add_effects, load_diagnosed, load_measurements
     from crosscheck.model.write import check_place, state_of
-    from crosscheck.show.fits import print_addition
+    from crosscheck.show.models import print_addition
     from seecr import effect_named
 
     effect, robot, data = _arguments(words, all_from)

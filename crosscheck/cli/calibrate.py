@@ -42,7 +42,7 @@ def command(
     """
     from crosscheck import Sigma, calibrate, load_measurements
     from crosscheck.model.write import check_place, state_of
-    from crosscheck.show.fits import print_calibration
+    from crosscheck.show.models import print_calibration
 
     choices.check_effects(only, exclude)  # a wrong name is told before any file is read
     from seecr.cli.arguments import robot_at

@@ -65,7 +65,7 @@ def command(
     if are_models(robot, data):
         return compare_two(robot, data[0], out, model_out, fail_on, as_json)
     from crosscheck import Limits, Sigma, compare, exceeded, load_limits, load_measurements
-    from crosscheck.show.page import write_page
+    from crosscheck.show.pictures import write_page
     from seecr import load_model, with_history
     from seecr.files import json_text, write_text
     from seecr.folders import staged

@@ -51,7 +51,7 @@ def command(
     from crosscheck import DiagnosisVerdict, Sigma, Tolerance, diagnose, load_measurements
     from crosscheck.model.write import check_place
     from crosscheck.show.diagnosis import print_diagnosis
-    from crosscheck.show.page import write_page
+    from crosscheck.show.pictures import write_page
     from seecr import load_model, new_model, with_history
     from seecr.description.fingerprint import fingerprint
     from seecr.files import json_text, write_text

@@ -92,7 +92,7 @@ def command(
     from crosscheck import Sigma, choose_poses, load_commands, make_plan, write_plan
     from crosscheck.measurements.data import parse_quantity
     from crosscheck.planning.write import NAME, box_of, planned_files
-    from crosscheck.show.page import write_page
+    from crosscheck.show.pictures import write_page
     from crosscheck.show.plan import print_plan
     from seecr.cli.arguments import check_places, robot_at
     from seecr.files import json_text, with_toml, write_text

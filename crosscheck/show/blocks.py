@@ -1,8 +1,8 @@
 """What is shown of a result: lines, lists, tables and figures, for any medium.
 
 A result makes its blocks once, in the units that people read. A terminal
-(:mod:`crosscheck.show.terminal`), a page (:mod:`crosscheck.show.page`) and a recording
-(:mod:`crosscheck.show.markdown`) each show them in their own way.
+(:mod:`crosscheck.show.texts`), a page (:mod:`crosscheck.show.pictures`) and a recording
+(:mod:`crosscheck.show.texts`) each show them in their own way.
 """
 
 from __future__ import annotations

@@ -30,7 +30,6 @@ from crosscheck.show.blocks import (
     section,
     size_cells,
 )
-from crosscheck.show.markdown import kinds_table, markdown, row_heading, unused
 from crosscheck.show.residuals import (
     association_section,
     facts_of,
@@ -38,7 +37,7 @@ from crosscheck.show.residuals import (
     title_of,
     wall_section,
 )
-from crosscheck.show.terminal import show
+from crosscheck.show.texts import kinds_table, markdown, row_heading, show, unused
 from seecr.counted import counted
 from seecr.show.colours import BEFORE, CALM
 from seecr.units import in_unit, short

@@ -43,7 +43,6 @@ from crosscheck.show.blocks import (
 )
 from crosscheck.show.candidates import candidate_blocks, candidate_lines
 from crosscheck.show.findings import PLAUSIBLE, card, in_brief
-from crosscheck.show.markdown import kinds_table, markdown, row_heading, unused
 from crosscheck.show.residuals import (
     association_section,
     facts_of,
@@ -51,7 +50,7 @@ from crosscheck.show.residuals import (
     title_of,
     wall_section,
 )
-from crosscheck.show.terminal import show
+from crosscheck.show.texts import kinds_table, markdown, row_heading, show, unused
 from seecr.show.colours import AFTER, BEFORE, CALM, TINT
 from seecr.units import short
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from crosscheck.fit.words import belongs
 from crosscheck.show.blocks import Block, Items, Line, TextTable
-from crosscheck.show.terminal import show
+from crosscheck.show.texts import show
 from seecr.description.robot import Robot
 from seecr.effects import BUILT_IN, PLACES, Effect, known, layout_of
 from seecr.result import Record

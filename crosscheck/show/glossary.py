@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import html
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+
+from markupsafe import Markup, escape
 
 # In a checkout, and where a wheel puts it: docs/glossary.md is the only source.
 _PLACES = (
@@ -15,9 +16,7 @@ _PLACES = (
     Path(__file__).with_name("glossary.md"),
 )
 _ENTRY = re.compile(r"^\*\*(.+?)\.\*\* (.+?)(?=\n\n|\Z)", re.DOTALL | re.MULTILINE)
-_TAG = re.compile(r"(<[^>]+>)")
-# Words are linked in running text, and not where something else stands for itself.
-_RUNNING, _NOT = {"p", "li"}, {"a", "b", "code", "small"}
+_LINK = Markup('<a href="#{}">{}</a>')
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,7 @@ class Entry:
     name: str
     anchor: str
     words: tuple[str, ...]
-    text: str
+    text: Markup
 
 
 @cache
@@ -58,40 +57,21 @@ def _pattern(name: str) -> str:
     return word.removeprefix(r"on\ ") + ("" if word.endswith("s") else "s?")
 
 
-def _html(text: str) -> str:
+def _html(text: str) -> Markup:
     """Of the little Markdown that the glossary has."""
     text = html.escape(" ".join(text.split()), quote=False)
     text = re.sub(r"\[(.+?)\]\(.+?\)", r"\1", text)
     text = re.sub(r"\*\*(.+?)\*\*", r"<b>\1</b>", text)
     text = re.sub(r"\*(.+?)\*", r"<i>\1</i>", text)
-    return re.sub(r"`(.+?)`", r"<code>\1</code>", text)
+    return Markup(re.sub(r"`(.+?)`", r"<code>\1</code>", text))
 
 
-def with_glossary(page: str) -> str:
-    """A page with words linked, once in each section, and explained at ``<!-- glossary -->``."""
-    main = re.search(r"<main>.*<!-- glossary -->", page, re.DOTALL)
-    assert main is not None
-    linker = _Linker()
-    text = "".join(linker.section(part) for part in re.split(r"(?=<section)", main[0]))
-    foot = _foot(entry for entry in entries() if entry in linker.used)
-    return page.replace(main[0], text.replace("<!-- glossary -->", foot))
-
-
-def _foot(used: Iterable[Entry]) -> str:
-    used = list(used)
-    if not used:
-        return ""
-    lines = [f'<p id="{e.anchor}"><b>{html.escape(e.name)}.</b> {e.text}</p>' for e in used]
-    return "\n".join(
-        ['<details id="glossary">', "<summary>Words used here</summary>", *lines, "</details>"]
-    )
-
-
-class _Linker:
-    """Links words in the running text of sections; remembers which."""
+class Linker:
+    """Links words in the running text of one page, once in each section."""
 
     def __init__(self) -> None:
-        self.used: set[Entry] = set()
+        self._used: set[Entry] = set()
+        self._seen: set[Entry] = set()
         self._of = {word: entry for entry in entries() for word in entry.words}
         longest_first = sorted(self._of, key=len, reverse=True)
         self._any = re.compile(
@@ -99,28 +79,23 @@ class _Linker:
         )
         self._entries = [self._of[word] for word in longest_first]
 
-    def section(self, text: str) -> str:
-        """One section's text, in which each word is linked once."""
-        seen: set[Entry] = set()
-        depth = dict.fromkeys(_RUNNING | _NOT, 0)
-        out = []
-        for part in _TAG.split(text):
-            tag = re.match(r"</?(\w+)", part) if part.startswith("<") else None
-            if tag is not None and tag[1] in depth:
-                depth[tag[1]] += -1 if part[1] == "/" else 1
-            running = any(depth[name] for name in _RUNNING) and not any(
-                depth[name] for name in _NOT
-            )
-            out.append(self._linked(part, seen) if tag is None and running else part)
-        return "".join(out)
+    def begin_section(self) -> str:
+        """From here on words are linked once more."""
+        self._seen = set()
+        return ""
 
-    def _linked(self, text: str, seen: set[Entry]) -> str:
-        def link(found: re.Match[str]) -> str:
+    def linked(self, text: str) -> Markup:
+        """A text with its words linked, where they were not yet in this section."""
+        out, end = Markup(), 0
+        for found in self._any.finditer(text):
             entry = self._entries[int(found.lastindex or 1) - 1]
-            if entry in seen:
-                return found[0]
-            seen.add(entry)
-            self.used.add(entry)
-            return f'<a href="#{entry.anchor}">{found[0]}</a>'
+            if entry not in self._seen:
+                self._seen.add(entry)
+                out += escape(text[end : found.start()]) + _LINK.format(entry.anchor, found[0])
+                end = found.end()
+        self._used |= self._seen
+        return out + escape(text[end:])
 
-        return self._any.sub(link, text)
+    def used(self) -> list[Entry]:
+        """What was linked, in the order of the glossary."""
+        return [entry for entry in entries() if entry in self._used]

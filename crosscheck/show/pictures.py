@@ -1,28 +1,125 @@
-"""Figures, pages and recordings of results, as their own methods give them."""
+"""Pages, figures and recordings of results, as commands and their own methods give them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from operator import attrgetter
+from pathlib import Path
 from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
 
 from crosscheck.comparison.result import Comparison
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.planning.result import Plan
+from crosscheck.show import blocks
+from crosscheck.show.blocks import Bar, Cell, Page, Styled, Words, pieces
+from crosscheck.show.comparison import page_of_comparison
+from crosscheck.show.diagnosis import page_of_diagnosis
 from crosscheck.show.figures import collecting
-from crosscheck.show.page import page_of, write_page
+from crosscheck.show.glossary import Linker
+from crosscheck.show.plan import page_of_plan
 from crosscheck.show.study import study_figure
 from crosscheck.studies.study import Study
 from crosscheck.suite.results import CaseResult
 from crosscheck.suite.run import Run
 from seecr.counted import counted
 from seecr.errors import InputError
+from seecr.files import Made, write_text
 from seecr.show.pictures import Pictures
+from seecr.version import full_version
+
+# --- pages ----------------------------------------------------------------------------------------
+
+_TAGS = {
+    blocks.Code: Markup("<code>{}</code>"),
+    blocks.Bold: Markup("<b>{}</b>"),
+    blocks.Small: Markup("<small>{}</small>"),
+    blocks.Whole: Markup('<span class="whole">{}</span>'),
+    blocks.Dot: Markup('<span class="key" style="background: {}"></span>'),
+    blocks.Below: Markup('<br><span class="plain">{}</span>'),
+}
+_BAR = Markup(
+    '<span class="whole"><span class="bar"><i style="width: {:.1f}%"></i></span>{}</span>'
+)
+_MIDDLE = Markup('<span class="middle"><i style="{}: 50%; width: {:.1f}%"></i></span>')
+
+
+# Where words of the glossary are not linked: there they stand for themselves.
+_UNLINKED = (blocks.Code, blocks.Bold, blocks.Small)
+
+
+def write_page(
+    found: Comparison | Diagnosis | Plan, path: str | Path, made: Made | None = None
+) -> None:
+    """Write a result as one self-contained page; how it came about stands at the page's foot.
+
+    Raises:
+        InputFileError: the file cannot be written.
+    """
+    write_text(Path(path), render(found, made), failure="cannot write the page")
+
+
+def render(found: Comparison | Diagnosis | Plan, made: Made | None = None) -> str:
+    """The page's text."""
+    environment = Environment(
+        loader=PackageLoader("crosscheck.show", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    glossary = Linker()
+    kind = attrgetter("__class__.__name__")
+    environment.filters |= {"html": _html, "cell": _cell, "kind": kind}
+    environment.filters["running"] = lambda words: _html(words, glossary)
+    page = environment.get_template("page.html.jinja").render(
+        page=_page_of(found), version=full_version(), made="" if made is None else made.words,
+        glossary=glossary,
+    )  # fmt: skip
+    return page.lstrip()
+
+
+def _page_of(found: Comparison | Diagnosis | Plan) -> Page:
+    """The page of a result, with its figures drawn."""
+    if isinstance(found, Diagnosis):
+        return page_of_diagnosis(found)
+    if isinstance(found, Plan):
+        return page_of_plan(found)
+    return page_of_comparison(found)
+
+
+def _html(words: Words, glossary: Linker | None = None) -> Markup:
+    """Words with their tags; what users wrote stays text. Running text has a glossary."""
+    out = Markup()
+    for one in pieces(words):
+        linked = glossary is not None and not isinstance(one, _UNLINKED)
+        text = glossary.linked(str(one)) if glossary and linked else escape(str(one))
+        out += _TAGS[type(one)].format(text) if type(one) in _TAGS else text
+    return out
+
+
+def _cell(cell: Cell) -> Markup:
+    if cell is None:
+        return Markup("–")
+    if isinstance(cell, Bar):
+        size = 100.0 * abs(cell.part)
+        if cell.middle:
+            return _MIDDLE.format("left" if cell.part >= 0 else "right", 0.5 * size)
+        return _BAR.format(size, cell.words)
+    if isinstance(cell, Styled):
+        return Markup('<span class="{}">{}</span>').format(cell.style, cell.words)
+    return _html(cell)
+
+
+# --- what draws which result ----------------------------------------------------------------------
 
 
 def _figure_of(found: Comparison | Diagnosis | Plan, name: str) -> Any:
     """A figure of the result's page by the name that --figures gives its file; the first for ""."""
     with collecting() as drawn:
-        page_of(found)
+        _page_of(found)
     if not drawn:
         raise InputError("nothing can be drawn: without readings or a verdict a page has no figure")
     if name and name not in drawn:

@@ -28,7 +28,7 @@ from crosscheck.show.blocks import (
     section,
 )
 from crosscheck.show.residuals import facts_of, title_of
-from crosscheck.show.terminal import show
+from crosscheck.show.texts import show
 from seecr.counted import some
 from seecr.pose import rotvec_from_quat
 from seecr.units import short

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from rich.console import Console
 
 from crosscheck.show.blocks import Cell, Items, TextTable
-from crosscheck.show.terminal import show
+from crosscheck.show.texts import show
 from crosscheck.studies.study import Study
 from seecr.counted import counted
 from seecr.show.colours import AFTER, GREY

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from crosscheck.show.blocks import Block, Bold, Cell, Code, Items, Line, Styled, TextTable, section
-from crosscheck.show.markdown import markdown, pose_heading
-from crosscheck.show.terminal import console_for, show
+from crosscheck.show.texts import console_for, markdown, pose_heading, show
 from crosscheck.suite.effects import effect_failures, effects_line
 from crosscheck.suite.results import (
     QUANTITY_HEADS,

@@ -117,8 +117,7 @@ def command(
     from seecr.files import check_writable, json_text
     from seecr.importing.draft import write_robot
     from seecr.show.files import SweepRows
-    from seecr.show.new_words import home_lines, reason
-    from seecr.show.pose_words import at_rest
+    from seecr.show.pose_words import at_rest, home_lines, reason
 
     out = out if folder is None else folder / out
     _check_out(out, force, [points, *files])

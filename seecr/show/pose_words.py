@@ -1,4 +1,7 @@
-"""An equilibrium in words: pose, cables, stiffness, where else the platform could rest."""
+"""An equilibrium in words: pose, cables, stiffness, where else the platform could rest.
+
+And whether a new robot rests at its reference pose.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from seecr.compiled.columns import FORCE_OF_WEIGHT, WEIGHT
-from seecr.counted import counted, figures
+from seecr.counted import between, counted, figures, some
+from seecr.description.joints import unresisted
 from seecr.description.robot import Joint, Robot
 from seecr.equilibrium.saddles import NO_BARRIER, TWISTED, Barrier
 from seecr.equilibrium.search import elsewhere
@@ -266,14 +270,14 @@ def midline_lines(solution: Solution) -> Iterator[str]:
 
 def bar_lines(at_rest: Bars, at_command: Bars) -> Iterator[str]:
     """All equilibria of a bar on two cables, with its middle at rest, and at its command."""
-    for where, some in (("there", at_rest), ("where it was commanded to", at_command)):
-        if some is None:
+    for where, tilts in (("there", at_rest), ("where it was commanded to", at_command)):
+        if tilts is None:
             continue
         yield (
             f"a bar with its middle {where}, on cables that do not stretch, is in balance at "
-            f"{counted(len(some), 'tilt')} (positive: the second cable's end is up):"
+            f"{counted(len(tilts), 'tilt')} (positive: the second cable's end is up):"
         )
-        for one in some:
+        for one in tilts:
             yield from (f"  {line}" for line in one.lines())
 
 
@@ -332,3 +336,57 @@ def three_figures(values: Array, form: str) -> str:
 def at_rest(solution: Solution) -> bool:
     """Whether every pose is at rest in a stable equilibrium."""
     return bool(solution.converged.all())
+
+
+# --- a new robot ----------------------------------------------------------------------------------
+
+
+def home_lines(solution: Solution) -> Iterator[str]:
+    """Whether the robot rests at its reference pose, and if not, why not."""
+    yield f"sent to its reference pose: {solution.sentence(0)}"
+    robot = solution.robot
+    if at_rest(solution):
+        away = solution.deviation[0]
+        taut = robot.n_cables - int(solution.slack[0].sum())
+        yield (
+            f"  it comes to rest {millimetres(np.linalg.norm(away[:3]), 3)} and "
+            f"{short(float(np.degrees(np.linalg.norm(away[3:]))))} deg off, {taut} of "
+            f"{counted(robot.n_cables, 'cable')} taut, tensions "
+            f"{between(solution.tensions[0].min(), solution.tensions[0].max())} N; softest: "
+            f"{softest_words(solution)}, {significant(solution.smallest_eigenvalue[0], 3)} N/m"
+        )
+        return
+    yield f"  {reason(solution)}"
+
+
+def reason(solution: Solution) -> str:
+    """Why a robot does not rest where it was sent: directions in which no cable resists."""
+    robot, pose = solution.robot, solution.pose[0]
+    if not np.isfinite(pose).all():
+        pose = solution.command[0]
+    free = unresisted(robot, pose, np.ones(robot.n_cables, dtype=bool))
+    if len(free):
+        return (
+            f"no cable, taut or slack, resists {counted(len(free), 'motion')}: "
+            f"{_motions(solution, free)}; expected more cables, or anchor points elsewhere"
+        )
+    slack = solution.slack[0]
+    if slack.all():
+        return (
+            "no cable pulls there, since nothing loads them: tighten them with --pretension 10, "
+            "which shortens them to 10 N or more"
+        )
+    loose = unresisted(robot, pose, ~slack) if slack.any() else free
+    if len(loose):
+        names = [name for name, hangs in zip(robot.cable_names, slack, strict=True) if hangs]
+        return (
+            f"with {some(names)} slack nothing but the weight resists: "
+            f"{_motions(solution, loose)}; another pose (--at) may hold it"
+        )
+    if np.isfinite(solution.softest_direction[0]).all():
+        return f"it gives way there: {softest_words(solution)}; another pose (--at) may hold it"
+    return "no pose was found where its cables carry it; another reference pose (--at) may do"
+
+
+def _motions(solution: Solution, motions: Array) -> str:
+    return "; ".join(direction_words(solution.robot, one) for one in motions)

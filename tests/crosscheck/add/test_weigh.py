@@ -20,7 +20,7 @@ from crosscheck.errors import CrosscheckError, UnsolvedError
 from crosscheck.inference import fit as fit_module
 from crosscheck.inference.fit import Data, fit
 from crosscheck.preparation.prepare import prepare
-from crosscheck.show.fits import why_not
+from crosscheck.show.models import why_not
 from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Term, Terms
 from seecr.errors import InputError

@@ -230,7 +230,7 @@ def test_tables_name_their_units() -> None:
     from rich.console import Console
 
     from crosscheck.show.blocks import rms_table
-    from crosscheck.show.terminal import show
+    from crosscheck.show.texts import show
 
     out = StringIO()
     rms = {"position_rms_m": 1e-3, "orientation_rms_rad": 1e-3, "tension_rms_N": 2.0}

@@ -12,7 +12,7 @@ import pytest
 from made_data import case
 
 import crosscheck
-from crosscheck.show.page import render
+from crosscheck.show.pictures import render
 
 pytestmark = [
     pytest.mark.slow,

@@ -40,7 +40,7 @@ from crosscheck.show.effect_figures import confusion_of, waterfall
 from crosscheck.show.error_figures import Wall, draw_wall, failure_map, length_changes, walls_of
 from crosscheck.show.figures import keeping
 from crosscheck.show.findings import correlations, in_brief, parameter_table
-from crosscheck.show.page import render, write_page
+from crosscheck.show.pictures import render, write_page
 from crosscheck.show.robot_figure import cables_of, projection
 from seecr import load_robot
 from seecr.effects import Term, Terms, layout_of

@@ -20,8 +20,8 @@ from crosscheck.show.error_recordings import (
     write_comparison_recording,
     write_diagnosis_recording,
 )
-from crosscheck.show.markdown import escaped
 from crosscheck.show.misfit import Misfit, predicted_poses, states_of, worst_row
+from crosscheck.show.texts import escaped
 from seecr.units import short
 
 pytestmark = pytest.mark.slow

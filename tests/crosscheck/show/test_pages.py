@@ -12,7 +12,7 @@ from written_pages import figures_of, text_of
 
 import crosscheck
 from crosscheck.planning.visibility import NAMED
-from crosscheck.show.page import render
+from crosscheck.show.pictures import render
 from seecr.files import Made
 
 pytestmark = pytest.mark.slow

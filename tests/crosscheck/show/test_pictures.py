@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 import crosscheck
 import seecr
-from crosscheck.show.page import render
+from crosscheck.show.pictures import render
 
 LINE = np.linspace([0.2, 0.25, 0.1, 1, 0, 0, 0], [0.6, 0.25, 0.1, 1, 0, 0, 0], 5)
 

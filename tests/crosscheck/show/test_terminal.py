@@ -24,7 +24,7 @@ from crosscheck.measurements.read import together
 from crosscheck.show.candidates import candidate_rows
 from crosscheck.show.comparison import print_comparison
 from crosscheck.show.diagnosis import print_diagnosis
-from crosscheck.show.fits import print_addition, print_calibration, why_not
+from crosscheck.show.models import print_addition, print_calibration, why_not
 from seecr.description.mjcf import load_robot
 from seecr.prediction.experiment import predict
 

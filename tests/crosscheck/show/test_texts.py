@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from crosscheck.show import suite
 from crosscheck.show.blocks import Bold, Code, Items, Line, TextTable, section
-from crosscheck.show.markdown import markdown, pose_heading
+from crosscheck.show.texts import markdown, pose_heading
 from crosscheck.suite.verdicts import Verdict
 
 HOME = np.array([0.1, -0.2, 0.3, 1.0, 0.0, 0.0, 0.0])

@@ -18,7 +18,7 @@ from seecr.importing.caspr import read_caspr
 from seecr.importing.draft import Draft
 from seecr.importing.wirex import read_wirex
 from seecr.pose import pose_add
-from seecr.show.new_words import home_lines, reason
+from seecr.show.pose_words import home_lines, reason
 
 # Elasticity is asked for: CASPR's files of ideal cables and some of WireX's have none.
 EA = "2e5N"
