@@ -155,6 +155,11 @@ def millimetres(length: float | np.floating[Any], digits: int = 4) -> str:
     return f"{value:{form}} mm"
 
 
+def newtons(force: float) -> str:
+    """A force [N] with three digits, without an exponent: 6000 N, not 6e+03 N."""
+    return f"{force:.3g} N" if abs(force) < 1e3 else f"{force:.0f} N"
+
+
 def joules(energy: float, form: str = ".3g") -> str:
     """An energy [J] in mJ, or from 1 J on in J."""
     return f"{energy:{form}} J" if abs(energy) >= 1.0 else f"{1e3 * energy:{form}} mJ"

@@ -92,7 +92,7 @@ def command(
     from seecr.cli.arguments import model_at, notes_of, robot_at
     from seecr.files import json_text, with_toml, write_texts
     from seecr.folders import check_ours, staged
-    from seecr.show.batch_words import chance_lines, turned_words
+    from seecr.show.batch_words import chance_lines, rope_lines, turned_words
     from seecr.show.files import corrected_csv, corrected_toml, lookup_csv
 
     machine = robot_at(robot, cable)
@@ -144,7 +144,8 @@ def command(
         given = given_with(cable, model)
         then = following("seecr", "sweep", robot, out / "corrected.csv", *given)
     chances = chance_lines(found, kept, aim == "minimum", highest is not None)
-    lines = [*untold(notes), *found.lines(), *chances, f"Results in {out}/", then]
+    said = [*found.lines(), *rope_lines(found, cable), *chances]
+    lines = [*untold(notes), *said, f"Results in {out}/", then]
     click.echo(text if as_json else "\n".join(lines))
     return status
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from seecr.commands import Commands
 from seecr.compiled.columns import RADIUS, STRAIN
 from seecr.counted import between, counted, rows_words
+from seecr.description.cables import NONE_BREAKS, breaking_words
 from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect
@@ -47,15 +48,15 @@ from seecr.tensions.distribution import (
 from seecr.tensions.max_margin import balances, counted_balance, holds_tightly
 from seecr.tensions.passive import driven_tables, with_passive
 from seecr.tensions.rest_lengths import Held, hold, holds_stably
-from seecr.units import millimetres, without_rounding
+from seecr.units import millimetres, newtons, without_rounding
 
 PREFERENCES = ("pose", "position")
 """What may change at a pose that cannot be held: position and orientation, or the orientation
 alone.
 """
 
-# Strain of a cable up to which the nearest poses are sought where no highest tension is given:
-# steel yields before, fibres tear. Without an end, poses near the edge take any tension.
+# Strain of a cable up to which the nearest poses are sought where no highest tension is given: most
+# ropes break before, fishing lines do not. Without an end, poses near the edge take any tension.
 _STRAIN = 0.05
 # The nearest pose leaves no cable shorter than this part of the shortest at the reference pose.
 _SHORT = 1e-2
@@ -174,23 +175,27 @@ class Correction(Result):
         return rows_words([row], self.commands.line)
 
     def _strain_lines(self, lost: NDArray[np.bool_]) -> list[str]:
-        """That strain bounds the nearest poses, and which answers strain cables beyond that."""
+        """How much cables are strained if nothing limits that, and which ropes this breaks."""
+        driven = self.robot.driven
+        every = np.where(self.found[:, None], self.solution.evaluation.states[..., STRAIN], 0.0)
+        strains = every[:, driven]
+        if not strains.any():
+            return []
+        row, k = np.unravel_index(int(np.argmax(strains)), strains.shape)
+        strain, pull = float(strains[row, k]), float(self.solution.tensions[row][driven][k])
+        endless, broken = self.strain_limit is not None, breaking_words(strain)
         out = []
-        if self.strain_limit is not None and np.any(lost):
+        if endless or broken:
+            name = self.robot.cable_names[int(np.flatnonzero(driven)[k])]
+            given = "no highest tension was given" if endless else "cables may break"
             out.append(
-                "no highest tension was given: nearest poses are sought with cables strained by "
-                f"at most {100.0 * self.strain_limit:g} %"
+                f"{given}: {name} pulls {newtons(pull)} at {self.place(int(row))}, which strains "
+                f"it by {100.0 * strain:.3g} %, {broken or NONE_BREAKS}"
             )
-        states = self.solution.evaluation.states
-        pulled = states[:, self.robot.driven, STRAIN].max(axis=1)
-        strains = np.where(self.found, pulled, 0.0)
-        beyond = strains > _STRAIN * (1.0 + 1e-6)
-        if np.any(beyond):
-            k, many = int(np.argmax(strains)), int(beyond.sum())
+        if endless and np.any(lost):
             out.append(
-                f"{counted(many, 'pose')} {'strains' if many == 1 else 'strain'} a cable by more "
-                f"than {100.0 * _STRAIN:g} %: up to "
-                f"{100.0 * strains[k]:.3g} % at {self.place(k)}; give a highest tension"
+                "nearest poses are sought with cables strained by at most "
+                f"{100.0 * _STRAIN:g} %; give a highest tension"
             )
         return out
 

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.counted import counted
+from seecr.description.cables import rope_of
+from seecr.description.mjcf import CABLES
 from seecr.inverse.correction import Correction
 from seecr.pose import Array, pose_difference, rotvec_from_quat
 from seecr.prediction.model import DataReach
@@ -21,7 +23,7 @@ from seecr.show.pose_words import (
     three_figures,
 )
 from seecr.statics.solution import Solution
-from seecr.units import millimetres, short
+from seecr.units import in_si, millimetres, newtons, short
 from seecr.workspace.grid import Workspace
 from seecr.workspace.spans import SlackSpan
 
@@ -119,6 +121,16 @@ def sweep_lines(
             "deviation, from the uncertainty of the model"
         )
     return lines
+
+
+def rope_lines(found: Correction, cable: str | None) -> Iterator[str]:
+    """How near the largest tension is to the breaking load of a rope that ``--cable`` names."""
+    if cable is None or cable in CABLES or in_si(cable, "N") is not None or not found.found.any():
+        return
+    rope, pulls = rope_of(cable), found.solution.tensions[:, found.robot.driven]
+    part = 100.0 * float(np.nanmax(pulls)) / rope.breaks
+    breaks = newtons(rope.breaks)
+    yield f"a new {rope.name} breaks at {breaks}: cables pull up to {part:.3g} % of it"
 
 
 def chance_lines(

@@ -13,6 +13,7 @@ from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.pose import LARGEST, Array, all_finite
 from seecr.statics.tables import by_row
+from seecr.units import newtons
 
 # Part of the load that may stay unbalanced, by rounding of the tensions.
 _BALANCED = 1e-9
@@ -246,7 +247,7 @@ def why_not_held(
     """
     if np.any(low > high):
         k = int(np.argmax(low - high))
-        least, most = _newtons(low[k]), _newtons(high[k])
+        least, most = newtons(low[k]), newtons(high[k])
         return f"{_who(names[k])} weighs {least}, more than the {most} it may pull"
     scale = _scale(load, low)
     outcome, beyond = _without_pushing(matrix, load, low, high, scale)
@@ -286,11 +287,6 @@ def _scale(load: Array, low: Array) -> float:
     return max(float(np.abs(load).max()), float(low.max())) or 1.0
 
 
-def _newtons(force: float) -> str:
-    """A force as it is typed: 6000 N, not 6e+03 N."""
-    return f"{force:.3g} N" if abs(force) < 1e3 else f"{force:.0f} N"
-
-
 def _who(name: str) -> str:
     return name if "cable" in name.lower() else f"cable {name}"
 
@@ -298,15 +294,15 @@ def _who(name: str) -> str:
 def _of_cable(name: str, beyond: float, low: float, high: float, of_weight: bool) -> str:
     who = _who(name)
     if beyond > 0.0:
-        return f"{who} would have to pull {_newtons(high + beyond)}, more than {_newtons(high)}"
+        return f"{who} would have to pull {newtons(high + beyond)}, more than {newtons(high)}"
     pull = low + beyond
     if pull >= 0.0:
-        least = f"the {_newtons(low)} that it weighs" if of_weight else f"{_newtons(low)}"
-        return f"{who} would have to pull {_newtons(pull)}, less than {least}"
+        least = f"the {newtons(low)} that it weighs" if of_weight else f"{newtons(low)}"
+        return f"{who} would have to pull {newtons(pull)}, less than {least}"
     if low > 0.0 and not of_weight:
-        push, least = _newtons(-pull), _newtons(low)
+        push, least = newtons(-pull), newtons(low)
         return f"{who} would have to push with {push} to keep the others at {least} or more"
-    return f"{who} would have to push with {_newtons(-pull)}"
+    return f"{who} would have to push with {newtons(-pull)}"
 
 
 def _without_pushing(

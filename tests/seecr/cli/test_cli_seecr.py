@@ -434,6 +434,16 @@ def test_correct_writes_commands_that_every_command_reads() -> None:
 
 
 @pytest.mark.slow
+def test_a_rope_of_the_catalogue_is_held_against_its_breaking_load() -> None:
+    """A steel rope of 3 mm was told to pull 18.8 kN, without a word; it breaks at 5.3 kN."""
+    Path("poses.csv").write_text("cmd_x_m,cmd_y_m,cmd_z_m\n0.4,0.25,1.5\n")
+    words = f"seecr correct {COGIRO} poses.csv --cable"
+    told = ran(f"{words} 'steel 7x19 3mm'").stdout
+    assert "pulls 18810 N" in told and "enough to break ropes of steel 7x19 (1.4 %)" in told
+    assert "a new steel 7x19 3mm breaks at 5289 N: cables pull up to 356 % of it" in told
+    assert " breaks at 5289 N" not in ran(f"{words} vectran").stdout
+
+
 def test_a_correction_without_answers_leaves_no_list_of_commands() -> None:
     Path("poses.csv").write_text(f"{POSES}0.4,0.25,0.1\n")
     words = f"seecr correct {COGIRO} poses.csv --out out"

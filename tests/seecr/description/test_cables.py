@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seecr.description.cables import MATERIALS, ea_of, rope_of
+from seecr.description.cables import MATERIALS, breaking_words, ea_of, rope_of
 from seecr.errors import InputError
 
 
@@ -16,6 +16,15 @@ def test_a_wire_rope_has_the_area_and_the_mass_of_the_standard() -> None:
     np.testing.assert_allclose(rope.weight, 0.381 * 9 / 100 * 9.80665)
     assert rope.name == "steel 7x19 3mm"
     np.testing.assert_allclose(rope_of("steel 6x19 6 mm").ea, 100e9 * 0.384 * 0.006**2)
+
+
+def test_ropes_break_at_the_loads_of_tables() -> None:
+    """DIN 3060 has 5.28 kN for 3 mm with a steel core; 6 mm of SK78 break at 40 to 48 kN."""
+    assert abs(rope_of("steel 7x19 3mm").breaks - 5280.0) < 30.0
+    assert 38e3 < rope_of("dyneema 6mm").breaks < 48e3
+    steel, elongation = rope_of("steel 7x19 3mm"), 5280.0 / (100e9 * 0.418 * 0.003**2)
+    assert breaking_words(0.99 * elongation) == ""
+    assert breaking_words(1.01 * steel.breaks / steel.ea).endswith("steel 7x19 (1.4 %)")
 
 
 def test_a_braid_is_near_what_rope_makers_say() -> None:

@@ -265,10 +265,9 @@ def test_without_a_highest_tension_the_nearest_poses_strain_cables_by_5_percent(
     told = "\n".join(found.lines())
     assert "nearest poses are sought with cables strained by at most 5 %" in told
     # a pose that can be held is held, and it is said what that takes
-    assert (
-        strains[1] > 0.3
-        and "1 pose strains a cable by more than 5 %: up to 30.7 % at pose 1" in told
-    )
+    assert strains[1] > 0.3
+    assert f"cable1 pulls {strains[1] * robot.ea[0]:.0f} N at pose 1, which strains it by" in told
+    assert "by 30.7 %, enough to break ropes of steel 7x19 (1.4 %), steel 6x19 (1.5 %), " in told
     free = seecr.correct(robot, poses[:2])
     assert np.array_equal(free.lengths, found.lengths[:2]) and free.strain_limit == 0.05
     assert "nearest" not in "\n".join(free.lines())
@@ -276,6 +275,11 @@ def test_without_a_highest_tension_the_nearest_poses_strain_cables_by_5_percent(
     given = seecr.correct(robot, poses[3], highest=0.1 * robot.ea[0])
     assert given.solution.tensions.max() == pytest.approx(0.1 * robot.ea[0], rel=1e-3)
     assert given.strain_limit is None and "no highest" not in "\n".join(given.lines())
+    assert given.lines()[-1].startswith("cables may break: ") and "by 10 %, enough" in str(given)
+    little = seecr.correct(robot, poses[0]).lines()[-1]
+    assert little.endswith("by 0.21 %, and a wire rope of steel breaks at 1.4 %")
+    mild = seecr.correct(robot, poses[0], highest=300.0)
+    assert "break" not in str(mild)
 
 
 def test_without_gravity_slack_cables_are_named_as_what_leaves_the_platform_free() -> None:
@@ -421,7 +425,7 @@ def test_the_strain_that_ends_the_search_is_by_the_law_of_the_models_cables(
     states = found.solution.evaluation.states
     assert not found.held.any() and found.stays.all()
     assert states[..., STRAIN].max() <= 0.05 * (1.0 + 1e-6)
-    assert "strains a cable by more" not in "\n".join(found.lines())
+    assert "strains it by 5 %, enough to break" in "\n".join(found.lines())
 
 
 # --- Wanted and commanded poses at which an anchor point is at its exit point, or in its pulley
