@@ -22,10 +22,9 @@ if TYPE_CHECKING:
     from crosscheck.comparison.models import ComparedValue, ModelComparison, compare_models
     from crosscheck.comparison.residuals import compare
     from crosscheck.comparison.result import Comparison
-    from crosscheck.controlled.control import control_in_time
+    from crosscheck.controlled.control import Timing, control_in_time
     from crosscheck.controlled.machine import Winches
     from crosscheck.controlled.result import TimedControl
-    from crosscheck.controlled.timed import Timing
     from crosscheck.diagnosis.diagnose import diagnose
     from crosscheck.diagnosis.result import Diagnosis, MissingEffect
     from crosscheck.diagnosis.tolerance import Tolerance
@@ -59,10 +58,9 @@ _MODULES = {
     "comparison.models": ("ComparedValue", "ModelComparison", "compare_models"),
     "comparison.residuals": ("compare",),
     "comparison.result": ("Comparison",),
-    "controlled.control": ("control_in_time",),
+    "controlled.control": ("Timing", "control_in_time"),
     "controlled.machine": ("Winches",),
     "controlled.result": ("TimedControl",),
-    "controlled.timed": ("Timing",),
     "diagnosis.result": ("Diagnosis", "MissingEffect"),
     "diagnosis.diagnose": ("diagnose",),
     "errors": ("CrosscheckError", "UnsolvedError"),

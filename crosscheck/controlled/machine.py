@@ -1,8 +1,9 @@
 """A robot in MuJoCo that moves: winches as actuators, cables that damp, and the platform's inertia.
 
 Each cable is an actuator on its tendon whose force is -(k (L - l) + c (dL/dt - dl/dt)), with the
-rest length l that the winch has paid out, k = EA/l and c = b k; it only pulls. MuJoCo integrates,
-and nothing here comes from seecr's statics.
+rest length l that the winch has paid out, k = EA/l and c = b k; it only pulls. Passive lines are
+the same with a rest length that never changes; springs may push, and a constant tension is one.
+MuJoCo integrates, and nothing here comes from seecr's statics.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ class Winches:
 
     Attributes:
         bandwidth: [Hz] of the first-order lag between told and paid-out length.
-        speed: [m/s] largest, of the paid-out length.
+        speed: [m/s] largest, of the rope: a block and tackle moves by as much less as it has falls.
         damping: of the slowest vibration, as a part of critical; proportional to stiffness, so
             that vibrations n times as fast have n times as much.
     """
@@ -60,7 +61,8 @@ class Machine:
     """MuJoCo's model and state of a robot with its true effects, at a time.
 
     Attributes:
-        true: the robot. winches: of it. told: (m,) [m] what the winches have reached.
+        true: the robot, with all its lines. winches: of it.
+        told: (m,) [m] what the winches have reached.
         step_s: [s] the longest time step. period: [s] of the slowest vibration, as last tuned.
     """
 
@@ -80,7 +82,7 @@ class Machine:
             )
         if not np.any(robot.inertia):
             raise CrosscheckError(f"robot {robot.name}: its inertia is not known")
-        self.true, self.winches = true_robot(robot, effects), winches
+        self.true, self.winches = true_robot(robot, effects, apart=False), winches
         self.model = _compiled(self.true)
         self.data = mujoco.MjData(self.model)
         self._pushed = bool(np.any(self.true.wrench))
@@ -128,7 +130,7 @@ class Machine:
         for sine, cosine, radius in true.run_out:
             angle = turned / radius
             out = out + sine * np.sin(angle) + cosine * (np.cos(angle) - 1.0)
-        return np.asarray(out)
+        return np.where(true.robot.driven, out, true.robot.rest_lengths)
 
     def place(self, pose: Array, told: Array) -> None:
         """Put the platform at a pose (7,) as its joints allow, at rest, with told lengths (m,)."""
@@ -155,7 +157,7 @@ class Machine:
         count = max(1, int(np.ceil(seconds / self.step_s - 1e-9)))
         step = self.model.opt.timestep = seconds / count
         lag = 1.0 - np.exp(-2.0 * np.pi * self.winches.bandwidth * step)
-        most, before = self.winches.speed * step, self.paid()
+        most, before = self.winches.speed * step / self.true.robot.falls, self.paid()
         for done in range(count):
             if np.abs(told - self.told).max() < _THERE and not self._pushed:
                 self.told = told.copy()
@@ -195,8 +197,8 @@ class Machine:
 
     @property
     def tensions(self) -> Array:
-        """(m,) [N], as sensors of MuJoCo's report them."""
-        return np.asarray(-self.data.sensordata[7:])
+        """(m,) [N] of each line, as sensors of MuJoCo's report them for all its falls together."""
+        return np.asarray(-self.data.sensordata[7:] / self.true.robot.falls)
 
     def read(self) -> tuple[Array, Array]:
         """What the robot's own sensors report: a pose (7,) and tensions (m,) [N]."""
@@ -262,7 +264,8 @@ def _compiled(true: TrueRobot) -> mujoco.MjModel:
         winch = spec.add_actuator(name=f"winch{i}", target=f"cable{i}")
         winch.trntype = mujoco.mjtTrn.mjTRN_TENDON
         winch.gaintype, winch.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
-        winch.forcelimited, winch.forcerange = True, [-1e30, 0.0]
+        winch.biasprm[0] = -true.robot.constant_tension_N[i]
+        winch.forcelimited, winch.forcerange = not true.robot.pushes[i], [-1e30, 0.0]
     for kind in (mujoco.mjtSensor.mjSENS_FRAMEPOS, mujoco.mjtSensor.mjSENS_FRAMEQUAT):
         spec.add_sensor(type=kind, objtype=mujoco.mjtObj.mjOBJ_XBODY, objname="platform")
     for i in range(true.n_cables):

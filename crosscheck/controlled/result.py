@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.controlled.timed import Trace
 from seecr.controlled.result import Control, Controlled
 from seecr.counted import between, counted, rows_words
 from seecr.pose import Array, pose_difference
@@ -18,6 +17,32 @@ from seecr.units import millimetres
 # A platform that moves less than this [m], rotations times its length, in a period of its slowest
 # vibration is at rest: what the suite allows after settling.
 STILL_M, STILL_RAD = 1e-6, 1e-5
+
+
+@dataclass(eq=False)
+class Trace:
+    """What happened, at k instants.
+
+    Attributes:
+        t: (k,) [s]. row: (k,) of the pose that it goes to. held: (k,) whether it is held there.
+        told, paid: (k, m) [m] told lengths, and what winches have reached of them. pose: (k, 7).
+        read: (k, 7) what the tracker reads, but for noise. tensions: (k, m) [N].
+        ends: index of the last instant of each pose.
+        ticks: errors (j, 6 + m) of the j readings that a feedback got, for each pose.
+        speeds: of each pose, the platform's in the end [m/s], rotations times the robot's length.
+    """
+
+    t: Array
+    row: Array
+    held: Array
+    told: Array
+    paid: Array
+    pose: Array
+    read: Array
+    tensions: Array
+    ends: Array
+    ticks: list[Array]
+    speeds: Array
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -109,6 +134,8 @@ class TimedScheme(Result):
 
     def lines(self) -> list[str]:
         """How far it is from where it should be, and from what it comes to without dynamics."""
+        if not len(self.rows):
+            return [f"{self.rest.scheme}: no command for any of the poses"]
         away, off = (np.linalg.norm(one[:, _MOVED], axis=1) for one in (self.error, self.off))
         n, same, lost = len(self.rows), self.same, self.diverges & ~self.same
         settled = self.rest.settled[self.rows]

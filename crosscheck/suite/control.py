@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.controlled.control import control_in_time
+from crosscheck.controlled.control import Timing, control_in_time
 from crosscheck.controlled.machine import Winches
-from crosscheck.controlled.timed import Timing
 from seecr.description.robot import Robot
 from seecr.effects import Term
 from seecr.pose import Array

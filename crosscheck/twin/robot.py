@@ -36,11 +36,11 @@ class PassiveLine:
 
 @dataclass(eq=False)
 class TrueRobot:
-    """Numbers for MuJoCo's model and the winches; m cables, all of them driven.
+    """Numbers for MuJoCo's model and the winches; m lines.
 
     Attributes:
-        robot: as described, without its passive lines.
-        passive: these.
+        robot: as described.
+        passive: its lines without winches, where they are set apart; then m is of the others.
         exit_points, anchor_points: (m, 3) [m] true positions.
         mass: [kg]; centre_of_mass: (3,) [m]; gravity: (3,) [m/s^2]; wrench: (6,) [N, N m].
         ea: (m,) [N]; quadratic, cubic: of T = EA (eps + quadratic eps^2 + cubic eps^3).
@@ -101,8 +101,12 @@ class TrueRobot:
         return self.hysteresis > 0 or self.friction > 0 or self.creep > 0
 
 
-def true_robot(robot: Robot, effects: Sequence[Effect] = ()) -> TrueRobot:
+def true_robot(robot: Robot, effects: Sequence[Effect] = (), apart: bool = True) -> TrueRobot:
     """The robot with its effects, in the order in which they act.
+
+    Args:
+        robot: as described. effects: that it really has.
+        apart: whether passive lines are set apart.
 
     Raises:
         CrosscheckError: an effect that has no truth here, such as a user's own.
@@ -134,7 +138,7 @@ def true_robot(robot: Robot, effects: Sequence[Effect] = ()) -> TrueRobot:
             f"frame_compliance {true.compliance:g} m/N sideways and {true.compliance_up:g} m/N "
             "upwards: MuJoCo cannot simulate this with pulley_radius; expected equal values"
         )
-    return true if robot.all_driven else _passive_apart(true)
+    return _passive_apart(true) if apart and not robot.all_driven else true
 
 
 def _passive_apart(true: TrueRobot) -> TrueRobot:

@@ -15,8 +15,11 @@ if TYPE_CHECKING:
 
 _AS_GOOD = "--believes and --is are the same: the controller knows the robot exactly"
 
-believes = options.option(
-    "--believes M.toml", "Model that the controller believes.  [default: plain SEECR]"
+believes = options.together(
+    options.passive,
+    options.option(
+        "--believes M.toml", "Model that the controller believes.  [default: plain SEECR]"
+    ),
 )
 truth = options.option(
     "--is TRUE.toml", "Model of what the robot really is.  [default: plain SEECR]", name="true"
@@ -183,7 +186,7 @@ def wanted_of(machine: Robot, poses: Path) -> tuple[Any, bool]:
             "contains rest lengths; expected the wanted poses, such as cmd_x_m cmd_y_m cmd_z_m: "
             "lengths are what a scheme of control computes",
         )
-    return wanted, wanted.any_orientation and machine.n_cables < machine.n_dof
+    return wanted, wanted.any_orientation and machine.n_driven < machine.n_dof
 
 
 def arguments(
@@ -198,7 +201,7 @@ def arguments(
         **more,
         "lowest": lowest,
         "highest": float("inf") if highest is None else highest,
-        "aim": aim_of(aim, machine.n_cables),
+        "aim": aim_of(aim, machine.n_driven),
         "holding": None if holding is None else parts_of(holding),
         "reads": parts_of(reads),
         "noise": SensorNoise(*(noise or (0.0, 0.0, 0.0)), seed=seed),

@@ -32,7 +32,7 @@ class TensionLimits:
     """Limits of tensions [N], where they should be within, and what stiffness is to be large.
 
     Attributes:
-        lowest, highest: one number or (m,). aim: as of :func:`seecr.correct`.
+        lowest, highest, aim: as of :func:`seecr.correct`.
         stiff: "least" or the name of a direction, see :mod:`seecr.controlled.stiffest`.
         holding: indices of the winches that hold tensions; None for a loop around all lengths.
         any_orientation: positions alone are wanted. prefer: what to keep of poses that cannot be
@@ -102,11 +102,12 @@ class Belief:
     def lengths(self, poses: Array) -> Array:
         """Lengths to tell (n, m) [m] that differ as the believed geometry does at poses (n, 7).
 
-        Only their differences count. Winches pay out what their believed gains make of them.
+        Only their differences count. Winches pay out what their believed gains make of them;
+        passive lines stay as long as they are.
         """
         setup = self.experiment.setup(self.effects)
-        spans = setup.geometric_lengths(poses) / setup.length_factor
-        return np.asarray(spans / (1.0 + setup.length_gain))
+        spans = setup.geometric_lengths(poses) / setup.length_factor / (1.0 + setup.length_gain)
+        return np.where(self.robot.driven, spans, self.robot.rest_lengths)
 
     @cached_property
     def jacobian(self) -> Array:
@@ -166,8 +167,9 @@ class Belief:
     @cached_property
     def pulls(self) -> Array:
         """Tensions (n, m) [N] that are read where they are those of the correction."""
-        setup, there = self.experiment.setup(self.effects), self.correction.solution.tensions
-        return read(self.effects, setup, self.commands.pose, np.nan_to_num(there)).tensions
+        setup = self.experiment.setup(self.effects)
+        there = np.nan_to_num(self.correction.solution.tensions * self.robot.falls)
+        return read(self.effects, setup, self.commands.pose, there).tensions
 
     def error(
         self, poses: Array, tensions: Array, rows: NDArray[np.intp], with_tensions: bool

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 
 from seecr.arguments import finite, silent, whole
 from seecr.controlled.belief import Belief, TensionLimits, readings_by_told
-from seecr.controlled.linear import largest_gain, spectral_radius
-from seecr.controlled.loop import Loop, Tuning, run
+from seecr.controlled.loop import Loop, Tuning, largest_gain, run, spectral_radius
 from seecr.controlled.plant import Plant, SensorNoise
 from seecr.controlled.result import Control, Controlled
 from seecr.controlled.schemes import READS, Scheme
@@ -88,13 +87,12 @@ def control(
     Raises:
         InputError: an unknown scheme, one that needs other readings, a gain or delay that holds
             nowhere even where the model is right, winches that hold tensions and leave the
-            platform free, or a robot with lines that no winch drives.
+            platform free, or a robot without winches.
 
     Example:
         ``seecr.control(robot, poses, scheme="elastic+pose_feedback", steps=5).schemes``
     """
     robot = robot_of(robot)
-    check_all_driven(robot)
     commands = commands_from(poses, robot)
     if commands.lengths is not None:
         raise InputError("control needs wanted poses (n, 7); got lengths")
@@ -128,11 +126,12 @@ def _winches(robot: Robot, names: Sequence[str] | None) -> tuple[int, ...] | Non
     """Indices of cables by name."""
     if names is None:
         return None
-    unknown = [name for name in names if name not in robot.cable_names]
+    known = [name for name in robot.cable_names if name not in robot.passive_names]
+    unknown = [name for name in names if name not in known]
     if unknown or not names:
         raise InputError(
             f"tension_feedback: expected cables of {robot.name} that hold tensions, of "
-            f"{some(robot.cable_names, robot.n_cables)}; got {some(unknown) or 'none'}"
+            f"{some(known, len(known))}; got {some(unknown) or 'none'}"
         )
     return tuple(sorted({robot.cable_names.index(name) for name in names}))
 
@@ -151,20 +150,6 @@ def _tuning(gain: float, rate: float, delay: float, steps: int, reads: Sequence[
     late = int(np.ceil(delay * rate - 1e-9))
     seen = [kind in reads for kind in READS[:2] for _ in range(3)]
     return Tuning(float(gain), late, whole(steps, "steps", 1), tuple(seen))
-
-
-def check_all_driven(robot: Robot) -> None:
-    """Check that every line is on a winch: a scheme would turn winches that are not there.
-
-    Raises:
-        InputError: some are not.
-    """
-    if not robot.all_driven:
-        raise InputError(
-            f"{robot.name}: no winch drives {', '.join(robot.passive_names)}, and schemes of "
-            "control drive every line; expected a robot without passive lines (seecr correct takes "
-            "them)"
-        )
 
 
 def _check_holds(scheme: Scheme, belief: Belief, tuning: Tuning) -> None:

@@ -1,7 +1,9 @@
 """A scheme on the true robot, step by step: it turns winches, the robot rests, sensors read.
 
 The reading of a step is used d steps later. Each wanted pose has a loop of its own, that begins
-with what is fed forward there.
+with what is fed forward there. About where it settles it is linearised: its state x changes by the
+error of a reading that is d steps old, x(k+1) = x(k) - g M x(k-d), and falls apart into one such
+loop for each eigenvalue of M.
 """
 
 from __future__ import annotations
@@ -14,13 +16,6 @@ from numpy.typing import NDArray
 
 from seecr.commands import Commands
 from seecr.controlled.belief import Belief
-from seecr.controlled.linear import (
-    Complex,
-    largest_delay,
-    largest_gain,
-    loop_eigenvalues,
-    spectral_radius,
-)
 from seecr.controlled.plant import Plant, Rows
 from seecr.controlled.schemes import Feedback, Scheme
 from seecr.description.robot import ABSURD, Robot
@@ -28,6 +23,10 @@ from seecr.inverse.lengths import REACHED
 from seecr.pose import Array
 from seecr.statics.solution import Solution
 
+Complex = NDArray[np.complex128]
+
+# Eigenvalues smaller than this are zero but for rounding: an exact model has eigenvalue one.
+_NEUTRAL = 1e-9
 # Steps of Newton's method to where a loop would settle.
 _NEWTON = 40
 # A loop is settled when its commands change by no more than this many standard deviations of what
@@ -37,6 +36,60 @@ _SIGMAS = 5.0
 _FINE = 1e-3
 # Singular values below this part of the largest are rounding.
 _SMALL = 1e-9
+
+
+def loop_eigenvalues(matrix: Array, states: Array) -> Complex:
+    """Eigenvalues (r,) of a loop M (k, k) for the states that its controller ever has.
+
+    Args:
+        matrix: M. states: (k, k) whose columns span these states.
+    """
+    left, sizes, _right = np.linalg.svd(states)
+    basis = left[:, sizes > _NEUTRAL * max(float(sizes.max(initial=0.0)), 1e-300)]
+    return np.asarray(np.linalg.eigvals(basis.T @ matrix @ basis), dtype=complex)
+
+
+def spectral_radius(eigenvalues: Complex, gain: float, delay: int) -> float:
+    """The factor by which errors change per step in the end: below one the loop settles.
+
+    It is the largest root of z^(d+1) - z^d + g lambda = 0, over all eigenvalues.
+
+    Args:
+        eigenvalues: (r,) of M. gain: g. delay: d, in steps.
+    """
+    largest = 0.0
+    for value in eigenvalues:
+        polynomial = np.zeros(delay + 2, dtype=complex)
+        polynomial[:2] = 1.0, -1.0
+        polynomial[-1] += gain * value
+        largest = max(largest, float(np.abs(np.roots(polynomial)).max(initial=0.0)))
+    return largest
+
+
+def largest_gain(eigenvalues: Complex, delay: int) -> float:
+    """The gain below which the loop settles; zero if it does with none.
+
+    A root leaves the unit circle at z = exp(i theta), where g lambda = z^d (1 - z). Its argument
+    gives theta = (pi/2 - |arg lambda|)/(d + 1/2), and its size g = 2 sin(theta/2)/|lambda|. For
+    lambda = 1 that is 2 sin(pi/(4 d + 2)) (Levin and May, Theoretical Population Biology 9, 1976).
+    """
+    room = 0.5 * np.pi - np.abs(np.angle(eigenvalues))
+    size = np.abs(eigenvalues)
+    if np.any(size <= _NEUTRAL) or np.any(room <= 0.0):
+        return 0.0
+    return float(np.min(2.0 * np.sin(room / (2 * delay + 1)) / size, initial=np.inf))
+
+
+def largest_delay(eigenvalues: Complex, gain: float) -> int | None:
+    """The most steps of delay with which a gain holds; None if it holds with none, or any do.
+
+    The bound of :func:`largest_gain`, solved for the delay.
+    """
+    if len(eigenvalues) == 0 or not gain < largest_gain(eigenvalues, 0):
+        return None
+    room = 0.5 * np.pi - np.abs(np.angle(eigenvalues))
+    most = 0.5 * (room / np.arcsin(0.5 * gain * np.abs(eigenvalues)) - 1.0)
+    return int(np.ceil(np.min(most))) - 1
 
 
 @dataclass(frozen=True)
@@ -62,7 +115,8 @@ class Course:
         solution: (n,) where that led.
         error: (k + 1, n, 6 + m) of the readings, but for noise, after each step; NaN after the end.
         steps: (n,) that the loop took until it was settled; -1 where it did not.
-        travel: (n, m) [m] that each winch turned at this row and on the way to it.
+        travel: (n, m) [m] of rope that each winch wound at this row and on the way to it: of a
+            block and tackle, with all its falls.
         eigenvalues: of the loop where it settles, for each row; None where no lengths hold the pose
             and for schemes without feedback.
     """
@@ -157,7 +211,7 @@ class Loop:
 def can_be_told(robot: Robot, lengths: Array) -> NDArray[np.bool_]:
     """(n,) whether winches can pay out lengths (n, m) [m]: some, and not ten times the frame."""
     known = (lengths > 0.0) & (lengths < ABSURD * robot.reach)
-    return np.asarray(known.all(axis=1))
+    return np.asarray((known | ~robot.driven).all(axis=1))
 
 
 def loop_of(scheme: Scheme, belief: Belief, commands: Commands, tuning: Tuning) -> Loop | None:
@@ -188,7 +242,8 @@ def run(scheme: Scheme, belief: Belief, plant: Plant, tuning: Tuning) -> Course:
     home = np.where(np.isnan(told), forward, told)
     turned += np.abs(first - belief.commands.before(home, robot.rest_lengths))
     solution = plant.led(commands, found) if loop is None else plant.solution(told, pose)
-    return Course(told, solution, error, steps, turned, tuple(values.get(k) for k in range(n)))
+    every = tuple(values.get(k) for k in range(n))
+    return Course(told, solution, error, steps, robot.falls * turned, every)
 
 
 def _groups(rows: Rows, plant: Plant) -> list[Rows]:

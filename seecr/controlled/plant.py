@@ -131,7 +131,8 @@ class Plant:
     def read(self, solution: Solution) -> Array:
         """What the tracker reads (n, 7) of poses at rest, but for noise."""
         setup = Experiment(self.robot, self.commands).setup(self.effects)
-        seen = read(self.effects, setup, solution.pose, solution.tensions)
+        pulls = solution.tensions * self.robot.falls
+        seen = read(self.effects, setup, solution.pose, pulls)
         return np.concatenate([seen.position, seen.quat_wxyz], axis=1)
 
     def _told(self, rows: Rows, told: Array) -> Experiment:

@@ -39,7 +39,8 @@ class Controlled(Result):
         within: (n,) whether tensions are within the limits.
         settled: (n,) whether the platform rests and, with feedback, the loop has settled.
         steps: (n,) that took, zero without feedback; -1 where it did not.
-        travel: (n, m) [m] that each winch turned on the way to the row and at it, to and fro.
+        travel: (n, m) [m] of rope that each winch wound on the way to the row and at it, to and
+            fro; of a block and tackle, with all its falls.
         radius: (n,) spectral radius of the linearised loop where it settles; below 1 it does. None
             without feedback, NaN at a pose that no lengths of the scheme hold.
         gain, delay: (n,) the largest with which it holds, delays in steps: -1 where it holds with
@@ -69,7 +70,7 @@ class Controlled(Result):
         """Of a course, with the poses that are believed and those that are read."""
         solution, loops, radius = course.solution, bool(scheme.feedbacks), course.radii(tuning)
         room = _ROUNDING * solution.tables.scale[:, None]
-        pulls = solution.tensions
+        pulls = (solution.tensions * solution.robot.falls)[:, solution.robot.driven]
         low, high = limits[0] - room, limits[1] + room
         within = np.asarray(((pulls >= low) & (pulls <= high)).all(axis=1))
         rests = solution.converged & np.isfinite(solution.pose).all(axis=1)
@@ -117,7 +118,10 @@ class Controlled(Result):
         n, rests = len(self), self.rests
         out = [self._errors()]
         if rests.any():
-            pulls, slack = self.solution.tensions[rests], self.solution.slack[rests]
+            driven = self.solution.robot.driven
+            pulls, slack = (
+                one[rests][:, driven] for one in (self.solution.tensions, self.solution.slack)
+            )
             most = int(slack.sum(axis=1).max())
             said = f"  tensions {between(max(pulls.min(), 0.0), pulls.max(), '.3g')} N"
             if most:
@@ -172,19 +176,21 @@ class Controlled(Result):
 
     def records(self) -> list[Record]:
         """One row per pose: errors, tensions, told lengths."""
-        m = [str(k + 1) for k in range(self.solution.robot.n_cables)]
+        driven = np.flatnonzero(self.solution.robot.driven)
+        cables = range(self.solution.robot.n_cables)
+        m, winches = ([str(k + 1) for k in some] for some in (cables, driven))
         none = np.full(len(self), np.nan)
         return rows_of({
             "scheme": [self.scheme] * len(self),
             **named("want_{}", COORDINATES, self.solution.command),
             **named("pose_{}", COORDINATES, self.solution.pose),
             **named("error_{}", MOTION, self.solution.deviation),
-            **named("length_{}_m", m, self.told),
+            **named("length_{}_m", winches, self.told[:, driven]),
             **named("tension_{}_N", m, self.solution.tensions),
             "slack": self.solution.slack.sum(axis=1),
             "within_limits": self.within, "settled": self.settled, "steps": self.steps,
             "spectral_radius": none if self.radius is None else self.radius,
-            **named("travel_{}_m", m, self.travel),
+            **named("travel_{}_m", winches, self.travel[:, driven]),
         })  # fmt: skip
 
     def head_json(self) -> Record:

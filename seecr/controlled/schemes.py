@@ -164,7 +164,8 @@ class TensionFeedback(Feedback):
     """Integral action on tensions, around the lengths that ``elastic`` feeds forward.
 
     Lengths change by dl = gain c (tau - tau*) [m], with tau* [N] the tensions of ``correct`` and
-    c_i [m/N] the believed compliance of cable i, l_i/(E S) of a plain one. Winches that hold
+    c_i [m/N] the believed compliance of cable i, l_i/(E S) of a plain one. Of a block and tackle
+    tau is that of all falls together, so many times what is read of its line. Winches that hold
     tensions do so by themselves, the others hold lengths. If none is named, all do, but of the
     error only what moves no platform, its part in the null space of W. So forces are controlled
     along some directions and positions along the others (Raibert and Craig, Hybrid position/force
@@ -178,13 +179,17 @@ class TensionFeedback(Feedback):
     def gains(self, belief: Belief, seen: NDArray[np.bool_]) -> Array:
         slope, share = belief.rates.by_length, self._share(belief)
         softness = -np.divide(1.0, slope, out=np.zeros_like(slope), where=slope != 0.0)
-        out = -softness[:, :, None] * share
+        out = -softness[:, :, None] * share * belief.robot.falls
         return np.concatenate([np.zeros((*softness.shape, 6)), out], axis=2)
 
     def _share(self, belief: Belief) -> Array:
-        """(n, m, m) the part of errors of tensions that is done away with; none of slack cables."""
-        m, holding, pulls = belief.robot.n_cables, belief.limits.holding, belief.rates.by_tension
-        taut = (belief.rates.by_length != 0.0) & belief.correction.found[:, None]
+        """(n, m, m) the part of errors of tensions that is done away with; none of slack cables.
+
+        Nor of passive lines, which follow from where the platform is.
+        """
+        m, holding, driven = belief.robot.n_cables, belief.limits.holding, belief.robot.driven
+        pulls = belief.rates.by_tension * driven
+        taut = (belief.rates.by_length != 0.0) & driven & belief.correction.found[:, None]
         if holding is not None:
             chosen = taut & np.isin(np.arange(m), holding)
             return np.asarray(np.eye(m) * chosen[:, None, :])
@@ -214,19 +219,25 @@ class TensionFeedback(Feedback):
         )
 
     def _leaves_free(self, belief: Belief, holding: tuple[int, ...]) -> str:
-        """Why the lengths of the other winches do not hold the platform; "" if they do."""
-        names, pulls = belief.robot.cable_names, belief.rates.by_tension[belief.correction.found]
-        others = [k for k in range(len(names)) if k not in holding]
+        """Why the lengths of the other lines do not hold the platform; "" if they do.
+
+        Passive springs keep their lengths as well. A constant tension holds nothing.
+        """
+        robot, pulls = belief.robot, belief.rates.by_tension[belief.correction.found]
+        others = np.delete(np.arange(robot.n_cables), holding)
         whole, left = (np.linalg.matrix_rank(p, tol=_HELD) for p in (pulls, pulls[:, :, others]))
         free = np.flatnonzero(left < whole)
         if len(free) == 0:
             return ""
-        held, more = whole[free[0]], len(others)
+        held, most = int(whole[free[0]]), int(np.sum(robot.ea > 0.0))
+        more, springs = int(robot.driven[others].sum()), most - robot.n_driven
+        keep = counted(more, "winch").replace("winchs", "winches")
+        keep += f" and {counted(springs, 'spring')}" if springs else ""
         return (
-            f"if {some([names[k] for k in holding])} hold tensions, only "
-            f"{counted(more, 'winch').replace('winchs', 'winches')} hold lengths, which leaves the "
-            f"platform free to move: cables hold {counted(int(held), 'degree')} of freedom there; "
-            f"expected at most {len(names) - held} that hold tensions"
+            f"if {some([robot.cable_names[k] for k in holding])} hold tensions, only {keep} hold "
+            f"lengths, which leaves the platform free to move: cables hold "
+            f"{counted(held, 'degree')} of freedom there; expected at most {most - held} that hold "
+            "tensions"
         )
 
 

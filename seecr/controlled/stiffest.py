@@ -16,12 +16,14 @@ import numpy as np
 from seecr.compiled.columns import TENSION
 from seecr.controlled.belief import Belief
 from seecr.counted import some
+from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.statics import batch
 from seecr.statics.tables import Tables, assemble, take
 from seecr.tensions.balance import balance_of, here, rest_for, with_rest
 from seecr.tensions.distribution import tension_limits
+from seecr.tensions.passive import driven_tables, with_passive
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 """Directions of a force or moment, base frame; "least" is that of the least stiffness."""
@@ -34,10 +36,11 @@ _FOUND, _UNBOUNDED = 0, 3  # how SciPy's linear program ends
 
 
 def stiffest_tensions(belief: Belief) -> Array:
-    """Aims (n, m) [N] for :func:`seecr.correct`; those of the belief where nothing balances.
+    """Aims (n, k) [N] for :func:`seecr.correct`; those of the belief where nothing balances.
 
-    Cables with weight, and others whose K is not linear, are taken as linear about the tensions of
-    the belief's own aim.
+    They are of the k driven cables, as read of their lines. Passive lines are part of the load and
+    of the stiffness. Cables with weight, and others whose K is not linear, are taken as linear
+    about the tensions of the belief's own aim.
 
     Raises:
         InputError: an unknown direction, or a stiffness that grows with tensions without end.
@@ -48,18 +51,22 @@ def stiffest_tensions(belief: Belief) -> Array:
             f"stiffness: expected least or one of {some(DIRECTIONS, 6)} as its direction, "
             f"got {along!r}"
         )
-    low, high = tension_limits(belief.robot, limits.lowest, limits.highest)
-    tables = assemble(belief.experiment.setup(belief.effects))
-    found = belief.correction
-    aims = np.clip(np.nan_to_num(found.solution.tensions), low, high)
+    robot, found = belief.robot, belief.correction
+    low, high = tension_limits(robot, limits.lowest, limits.highest)
+    whole = assemble(belief.experiment.setup(belief.effects))
+    tables = driven_tables(whole, robot)
+    pulls = np.nan_to_num(found.solution.tensions * robot.falls)[:, robot.driven]
+    aims = np.clip(pulls, low, high)
     matrices, loads = balance_of(tables, low, np.maximum(aims, _LEAST * tables.scale[:, None]))
     for i in np.flatnonzero(found.held):
         least = np.maximum(low, _LEAST * tables.scale[i])
-        shape = _Shape.of(take(tables, np.array([i])), np.maximum(aims[i], least), along)
+        row = np.array([i])
+        start = np.maximum(aims[i], least)
+        shape = _Shape.of(robot, take(whole, row), take(tables, row), start, along)
         best = _largest(shape, matrices[i], loads[i], least, high)
         if best is not None:
             aims[i] = np.clip(best, low, high)
-    return aims
+    return aims / robot.falls[robot.driven]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +74,7 @@ class _Shape:
     """K = base + sum (tau_i - start_i) slopes_i at one pose, and what of it is to be large.
 
     Attributes:
-        start: (m,) [N]. base: (d, d) [N/m]. slopes: (m, d, d) [1/m].
+        start: (k,) [N] of the driven cables. base: (d, d) [N/m]. slopes: (k, d, d) [1/m].
         force: (d,) of a direction; None for the least eigenvalue.
         root: (d, d) with root root^T the products of the coordinates' motions.
     """
@@ -79,24 +86,26 @@ class _Shape:
     root: Array
 
     @classmethod
-    def of(cls, table: Tables, start: Array, along: str) -> _Shape:
-        m = len(start)
-        step = max(1e-3 * float(table.scale[0]), 1e-6 * float(start.max()))
-        trials = start + step * np.concatenate([np.zeros((1, m)), np.eye(m)])
-        many = take(table, np.zeros(m + 1, dtype=np.intp))
-        strung = with_rest(many, rest_for(many, trials))
+    def of(cls, robot: Robot, whole: Tables, driven: Tables, start: Array, along: str) -> _Shape:
+        """Of one pose, with the tables of all lines and those of the driven cables."""
+        k = len(start)
+        step = max(1e-3 * float(driven.scale[0]), 1e-6 * float(start.max()))
+        trials = start + step * np.concatenate([np.zeros((1, k)), np.eye(k)])
+        many, own = (take(one, np.zeros(k + 1, dtype=np.intp)) for one in (whole, driven))
+        strung = with_rest(many, with_passive(robot, rest_for(own, trials)))
         there = batch.evaluate(strung, here(strung))
         matrices = batch.stiffness(strung, there)
         # not the tensions asked for where cables have weight, but those that these lengths have
-        apart = np.diagonal(there.states[1:, :, TENSION] - there.states[0, :, TENSION])
+        pulls = there.states[:, robot.driven, TENSION]
+        apart = np.diagonal(pulls[1:] - pulls[0])
         slopes = (matrices[1:] - matrices[0]) / apart[:, None, None]
         motions = batch.motions(strung, there)[0]
         force = None if along == "least" else motions[:, DIRECTIONS.index(along)]
         root = np.linalg.cholesky(motions @ motions.T)
-        return cls(there.states[0, :, TENSION], matrices[0], slopes, force, root)
+        return cls(pulls[0], matrices[0], slopes, force, root)
 
     def value(self, tensions: Array) -> tuple[float, Array]:
-        """The stiffness [N/m] with tensions (m,), and its derivative (m,) [1/m] by them."""
+        """The stiffness [N/m] with tensions (k,), and its derivative (k,) [1/m] by them."""
         matrix = self.base + np.einsum("m,mde->de", tensions - self.start, self.slopes)
         inverse = np.linalg.inv(self.root)
         values, vectors = np.linalg.eigh(inverse @ matrix @ inverse.T)
@@ -110,7 +119,7 @@ class _Shape:
 
 
 def _largest(shape: _Shape, matrix: Array, load: Array, low: Array, high: Array) -> Array | None:
-    """Tensions (m,) [N] with the largest stiffness; None if none within the limits balance."""
+    """Tensions (k,) [N] with the largest stiffness; None if none within the limits balance."""
     from scipy.optimize import linprog  # takes a while to import
 
     m, cuts, ends = len(low), [], []

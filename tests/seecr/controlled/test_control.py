@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from called import as_json, ran, refused_in_a_line
+from called import BARE, as_json, ran, refused_in_a_line
+from passive_files import FOLDER, KINDS
 from scipy.linalg import null_space
 
 import seecr
@@ -29,12 +32,12 @@ def in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("true.toml").write_text('[[effect]]\nname = "stiffness"\nparameters = { factor = 0.8 }\n')
 
 
-@pytest.mark.parametrize("name", seecr.model_names())
+@pytest.mark.parametrize("name", [*seecr.model_names(), *(f"{kind}.xml" for kind in KINDS)])
 def test_open_loop_is_what_sweep_and_correct_say(name: str) -> None:
-    """To rounding, on every shipped robot, whatever the truth is."""
+    """To rounding, on every shipped robot, whatever the truth is; passive lines are left alone."""
     from crosscheck.suite.cases import robot_sweep
 
-    robot = seecr.load_robot(seecr.model_path(name))
+    robot = seecr.load_robot(FOLDER / name if name.endswith("xml") else seecr.model_path(name))
     poses = robot_sweep(robot, 4)
     true = [seecr.Term.of(robot, "stiffness", factor=0.9)]
     believed = [seecr.Term.of(robot, "platform_mass", added_kg=0.01 * robot.mass)]
@@ -53,6 +56,27 @@ def test_open_loop_is_what_sweep_and_correct_say(name: str) -> None:
         assert mine.tensions == pytest.approx(other.tensions, abs=1e-9 * robot.usual_load)
     assert np.array_equal(found["elastic"].told[known], corrected.lengths[known])
     assert np.isnan(found["elastic"].solution.pose[~known]).all()
+    still = [found[one].told[:, ~robot.driven] for one in ("geometric", "elastic")]
+    assert np.nanmax(np.abs(still - robot.rest_lengths[~robot.driven]), initial=0.0) == 0.0
+
+
+@pytest.mark.parametrize("scheme", ["stiffness", "elastic+pose_feedback", "tension_feedback"])
+def test_a_block_and_tackle_is_as_many_ropes_with_a_part_of_the_tension_each(scheme: str) -> None:
+    """With limits of its line it is told, step by step, what a plain cable of all falls is."""
+    falls = np.array([1.0, 2.0, 4.0, 1.0, 0.5, 2.0, 3.0, 1.0])
+    true = [seecr.Term.of(COGIRO, "stiffness", factor=0.8)]
+    plain, reeved = (
+        seecr.control(
+            robot, POSES, scheme=scheme, true=true, lowest=0.3 / robot.falls,
+            highest=20.0 / robot.falls,
+        )[scheme]
+        for robot in (COGIRO, replace(COGIRO, falls=falls))
+    )  # fmt: skip
+    assert reeved.told == pytest.approx(plain.told, abs=1e-12)
+    assert reeved.travel == pytest.approx(plain.travel * falls, abs=1e-12)
+    assert reeved.solution.tensions == pytest.approx(plain.solution.tensions / falls, abs=1e-9)
+    for name in ("within", "steps", "settled"):
+        assert np.array_equal(getattr(reeved, name), getattr(plain, name))
 
 
 def stiffness_of(robot: seecr.Robot, tensions: Array) -> Array:
@@ -79,15 +103,22 @@ def stiffness_of(robot: seecr.Robot, tensions: Array) -> Array:
     return out * np.outer(size, size)
 
 
+@pytest.mark.parametrize("passive", [(), ("cable3",)])
 @pytest.mark.parametrize("along", ["least", "z", "rx"])
-def test_no_tensions_within_the_limits_are_stiffer(along: str) -> None:
-    """Of all on a fine grid of what balances, and it is the stiffness that solving says."""
-    robot = seecr.load_robot(seecr.model_path("ipanema"))
+def test_no_tensions_within_the_limits_are_stiffer(along: str, passive: tuple[str, ...]) -> None:
+    """Of all on a fine grid of what balances, and it is the stiffness that solving says.
+
+    A passive line pulls with what its stretch makes of it: 0.1 %, since it is wound no more.
+    """
+    robot = seecr.load_robot(seecr.model_path("ipanema"), passive)
+    robot = replace(robot, rest_lengths=robot.rest_lengths / np.where(robot.driven, 1.0, 1.001))
+    driven, pulled = robot.driven, robot.ea * (robot.reference_lengths / robot.rest_lengths - 1.0)
     low, high = 100.0, 1000.0
     belief = Belief(
         robot, [], seecr.Commands(robot.reference_pose[None]), TensionLimits(low, high, stiff=along)
     )
-    best = stiffest_tensions(belief)[0]
+    best = np.where(driven, 0.0, pulled)
+    best[driven] = stiffest_tensions(belief)[0]
     arm = robot.anchor_points
     pull = robot.exit_points - robot.reference_pose[:3] - arm
     pull /= np.linalg.norm(pull, axis=1, keepdims=True)
@@ -102,10 +133,13 @@ def test_no_tensions_within_the_limits_are_stiffer(along: str) -> None:
         k = ("x", "y", "z", "rx", "ry", "rz").index(along)
         return 1.0 / float(np.linalg.inv(matrix)[k, k])
 
-    spare = null_space(matrix)
-    grid = np.linspace(-1200.0, 1200.0, 41)
-    others = [best + spare @ [a, b] for a in grid for b in grid]
-    sizes = [size(one) for one in others if np.all((one >= low) & (one <= high))]
+    spare = np.zeros((robot.n_cables, robot.n_driven - 6))
+    spare[driven] = null_space(matrix[:, driven])
+    grid = np.linspace(-1200.0, 1200.0, 41 if spare.shape[1] == 2 else 1601)
+    steps = np.stack(np.meshgrid(*spare.shape[1] * [grid]), axis=-1).reshape(-1, spare.shape[1])
+    others = best + steps @ spare.T
+    kept = np.all(((others >= low) & (others <= high))[:, driven], axis=1)
+    sizes = [size(one) for one in others[kept]]
     assert len(sizes) > 30 and size(best) >= max(sizes) * (1.0 - 1e-9)
     found = seecr.control(
         robot, robot.reference_pose[None], scheme=["elastic", "stiffness"],
@@ -210,63 +244,85 @@ def test_a_loop_that_runs_away_ends_where_winches_do() -> None:
     assert "the loop winds on at 1" in str(found) and "settles" not in str(found)
 
 
-ROBOT = "seecr control demobot_cogiro poses.csv"
+LOOP = "elastic+pose_feedback"
+LESS = "holds at none of these poses, even where the robot is as believed; expected a gain below"
 REFUSED = {
-    "--gain 3 --scheme pose_feedback": (
-        "scheme pose_feedback: a gain of 3 holds at none of these poses, even where the robot is "
-        "as believed; expected a gain below 2"
-    ),
-    "--gain 0.9 --delay 0.31 --rate 10 --scheme elastic+pose_feedback": (
-        "scheme elastic+pose_feedback: a gain of 0.9 and a delay of 4 steps holds at none of these "
-        "poses, even where the robot is as believed; expected a gain below 0.347"
+    "--gain 3 --scheme pose_feedback": f"scheme pose_feedback: a gain of 3 {LESS} 2",
+    f"--gain 0.9 --delay 0.31 --rate 10 --scheme {LOOP}": (
+        f"scheme {LOOP}: a gain of 0.9 and a delay of 4 steps {LESS} 0.347"
     ),
     "--scheme pose_feedback --reads tensions": (
-        "scheme pose_feedback: for pose_feedback it needs readings of position or "
-        "orientation, and this "
-        "robot reads tensions; leave the scheme out, or say what is read"
+        "scheme pose_feedback: for pose_feedback it needs readings of position or orientation, and "
+        "this robot reads tensions; leave the scheme out, or say what is read"
     ),
     "--scheme tension_feedback --reads position,orientation": (
-        "scheme tension_feedback: for tension_feedback it needs readings of tensions, and "
-        "this robot "
-        "reads position and orientation"
+        "scheme tension_feedback: for tension_feedback it needs readings of tensions, and this "
+        "robot reads position and orientation"
     ),
     "--scheme tension_feedback --holding cable1,cable2,cable3": (
         "scheme tension_feedback: if cable1, cable2, cable3 hold tensions, only 5 winches hold "
         "lengths, which leaves the platform free to move: cables hold 6 degrees of freedom there; "
         "expected at most 2 that hold tensions"
     ),
-    "--scheme tension_feedback --holding cable9": (
-        "tension_feedback: expected cables of demobot_cogiro that hold tensions, of cable1, "
+    # a band that is slack here holds nothing, but keeps its length
+    "--scheme tension_feedback --passive cable8 --holding cable1,cable2": (
+        "if cable1, cable2 hold tensions, only 5 winches and 1 spring hold lengths"
     ),
+    "--scheme tension_feedback --passive cable8 --holding cable8": (
+        "tension_feedback: expected cables of demobot_cogiro that hold tensions, of cable1, "
+        "cable2, cable3, cable4, cable5, cable6, cable7; got cable8"
+    ),
+    "--scheme tension_feedback --holding cable9": "that hold tensions, of cable1, ",
+    f"--passive {','.join(COGIRO.cable_names)}": "no winch drives any of its lines",
     "--scheme pid": "scheme 'pid': expected geometric, elastic, stiffness, pose_feedback, ",
     "--scheme geometric+elastic": (
         "scheme 'geometric+elastic': expected one feed-forward and feedbacks on top of it"
     ),
+    "--scheme stiffness --stiff up": "'up' is not one of 'least', 'x', 'y', 'z', 'rx', 'ry', 'rz'",
     "--gain 0": "gain: expected a number above 0, got 0",
-    "--rate 0": "rate: expected a number above 0 [Hz], got 0",
+    "--rate 0": "rate: expected a number above 0",
     "--delay -1": "delay: expected a number from 0 on [s], got -1",
     "--reads eyes": "reads: expected some of position, orientation, tensions, got eyes",
-    "--believes other.toml": "other.toml: ",
+    "--believes other.toml": "other.toml: line 1: effect cable_stiffness: ",
+    "--is other.toml": "other.toml: line 1: effect cable_stiffness: ",
 }
 
 
+@pytest.mark.parametrize("program", ["seecr", "crosscheck"])
 @pytest.mark.parametrize("options", REFUSED)
-def test_bad_input_is_one_sentence_and_nothing_is_written(options: str) -> None:
+def test_bad_input_is_one_sentence_and_nothing_is_written(program: str, options: str) -> None:
     Path("other.toml").write_text(OTHER)
-    line = refused_in_a_line(f"{ROBOT} {options}")
+    before = set(Path().iterdir())
+    line = refused_in_a_line(f"{program} control demobot_cogiro poses.csv {options}")
     assert REFUSED[options] in line
-    assert not Path("seecr-control").exists()
+    assert set(Path().iterdir()) == before
 
 
 OTHER = '[[effect]]\nname = "cable_stiffness"\nparameters = { factor_99 = 1.1 }\n'
 
 
-def test_a_model_of_another_robot_and_lengths_are_refused() -> None:
+@pytest.mark.parametrize("program", ["seecr", "crosscheck"])
+def test_lengths_are_no_wanted_poses(program: str) -> None:
     Path("lengths.csv").write_text("length_1_m,length_2_m\n1,1\n")
-    assert "lengths.csv" in refused_in_a_line("seecr control demobot_cogiro lengths.csv")
+    assert "lengths.csv" in refused_in_a_line(f"{program} control demobot_cogiro lengths.csv")
     ran("seecr correct demobot_cogiro poses.csv --out c", 0)
-    line = refused_in_a_line("seecr control demobot_cogiro c/corrected.csv")
+    line = refused_in_a_line(f"{program} control demobot_cogiro c/corrected.csv")
     assert "contains rest lengths; expected the wanted poses" in line
+
+
+@pytest.mark.parametrize("program", ["seecr", "crosscheck"])
+def test_where_solving_fails_the_status_says_so(program: str) -> None:
+    """No command within the limits, or no rest on cables that stretch to the floor and beyond."""
+    said = ran(
+        f"{program} control demobot_cogiro poses.csv --scheme elastic --highest 0.01 --out few", 3
+    ).stdout  # fmt: skip
+    words = {"seecr": "rests at no pose", "crosscheck": "elastic: no command for any of the poses"}
+    assert words[program] in said and (Path("few") / "control.json").exists()
+    text = seecr.model_path("planar_vertical").read_text(encoding="utf-8")
+    Path("soft.xml").write_text(re.sub('stiffness="[^"]*"', 'stiffness="0.01"', text))
+    Path("one.csv").write_text("cmd_x_m,cmd_y_m,cmd_z_m\n0.4,0,0.3\n")
+    ran(f"{program} control soft.xml one.csv --scheme geometric --out soft {BARE}", 3)
+    assert json.loads((Path("soft") / "control.json").read_text())["exit_status"] == 3
 
 
 def test_robots_without_a_cable_to_spare_have_no_tensions_to_control() -> None:
@@ -278,10 +334,3 @@ def test_robots_without_a_cable_to_spare_have_no_tensions_to_control() -> None:
         seecr.control(ipanema, ipanema.reference_pose, scheme="stiffness", lowest=10.0)
     with pytest.raises(seecr.InputError, match="expected least or one of x, y, z, rx, ry, rz"):
         seecr.control(COGIRO, POSES, scheme="stiffness", stiff="up")
-
-
-def test_lines_that_no_winch_drives_are_refused() -> None:
-    """A scheme would have commanded them as if they were on winches."""
-    robot = seecr.load_robot(seecr.model_path("planar_vertical"), passive=["cable4"])
-    with pytest.raises(seecr.InputError, match="no winch drives cable4, and schemes of control"):
-        seecr.control(robot, robot.reference_pose[None], scheme="geometric")

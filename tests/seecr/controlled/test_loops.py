@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from passive_files import FOLDER, LINE
 from random_robots import random_poses, random_robot
 
 import seecr
 from seecr.controlled.belief import Belief, TensionLimits
-from seecr.controlled.linear import largest_delay, largest_gain, loop_eigenvalues, spectral_radius
+from seecr.controlled.loop import largest_delay, largest_gain, loop_eigenvalues, spectral_radius
 from seecr.pose import Array, pose_difference, quat_from_rotvec, quat_rotate
 
 COGIRO = seecr.load_robot(seecr.model_path("demobot_cogiro"))
@@ -76,7 +78,13 @@ def test_the_jacobian_is_that_of_the_pulls() -> None:
     arm = quat_rotate(turn, COGIRO.anchor_points)
     pull = COGIRO.exit_points - pose[0, :3] - arm
     pull /= np.linalg.norm(pull, axis=1, keepdims=True)
-    assert belief.jacobian[0] == pytest.approx(-np.hstack([pull, np.cross(arm, pull)]), abs=1e-9)
+    rows = -np.hstack([pull, np.cross(arm, pull)])
+    assert belief.jacobian[0] == pytest.approx(rows, abs=1e-9)
+    # a line that no winch drives is told nothing
+    banded = replace(COGIRO, driven=np.arange(8) != 2)
+    belief = Belief(banded, [], seecr.Commands(pose), TensionLimits())
+    rows[2] = 0.0
+    assert belief.jacobian[0] == pytest.approx(rows, abs=1e-9)
 
 
 def test_drums_that_pay_out_more_are_told_less() -> None:
@@ -109,8 +117,10 @@ def turned_tracker(robot: seecr.Robot, place: Array, angle: float) -> Any:
     return seecr.Term.of(robot, "tracker_frame", **frame)
 
 
+WEIGHED = seecr.load_robot(FOLDER / "counterweight.xml")
 CASES = {
     "cogiro": (COGIRO, POSES[:1], [turned_tracker(COGIRO, POSES[0, :3], 0.15)]),
+    "counterweight": (WEIGHED, WEIGHED.reference_pose[None], []),
     **{
         kind: (robot := random_robot(np.random.default_rng(seed), kind, cables),
                random_poses(np.random.default_rng(seed), robot, 1), [])
@@ -241,3 +251,27 @@ def test_winches_hold_tensions() -> None:
     pull /= np.linalg.norm(pull, axis=1, keepdims=True)
     spare = null_space(np.vstack([pull.T, np.cross(arm, pull).T]))
     assert np.abs(off @ spare).max() < 0.1 < 10.0 < np.abs(before @ spare).max()
+
+
+@pytest.mark.parametrize("kind", ["spring", "counterweight"])
+def test_passive_lines_follow_where_the_winches_of_the_others_lead(kind: str) -> None:
+    """Poses are reached, tensions come back to those of `correct`, and what pulls is no winch's."""
+    robot = seecr.load_robot(FOLDER / f"{kind}.xml")
+    poses = np.tile(robot.reference_pose, (2, 1))
+    poses[1, :3] += [0.1, 0.0, 0.05]
+    passive, true = robot.cable_names.index(LINE[kind]), softer(robot, 0.8)
+    for name in ("pose_feedback", LOOP):
+        found = of(name, robot, poses, true=true)
+        assert found.settled.all() and found.position_rms < 3e-6
+        told = seecr.Commands(poses, lengths=found.told, told=True)
+        assert seecr.solve(robot, told, effects=true).pose == pytest.approx(poses, abs=1e-5)
+        assert np.all(found.told[:, passive] == robot.rest_lengths[passive])
+        assert not found.travel[:, passive].any()
+    if kind == "counterweight":  # with a cable to spare
+        limits = {"lowest": 3.0, "highest": 100.0}
+        want = seecr.correct(robot, poses, **limits).solution.tensions
+        before, after = (
+            of(name, robot, poses, true=true, **limits).solution.tensions
+            for name in ("elastic", "tension_feedback")
+        )
+        assert np.abs(after - want).max() < 0.2 * np.abs(before - want).max()
