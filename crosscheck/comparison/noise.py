@@ -94,12 +94,17 @@ class Coloured:
     @property
     def words(self) -> str:
         """The noise in a few words."""
-        sizes = ", ".join(
+        few = f"; {counted(self.outliers, 'outlier')}" if self.outliers else ""
+        return f"{self.sizes}{few}"
+
+    @property
+    def sizes(self) -> str:
+        """The same without the outliers."""
+        return ", ".join(
             f"{name} {self.scale[name]:.2f} times the assumed noise"
             + (f", with a correlation of {rho:.2f} from row to row" if rho > 0.05 else "")
             for name, rho in self.rho.items()
         )
-        return sizes + (f"; {counted(self.outliers, 'outlier')}" if self.outliers else "")
 
 
 def coloured_noise(problem: Problem, state: State, factor: Array) -> Coloured | None:

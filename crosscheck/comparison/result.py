@@ -405,7 +405,7 @@ class Comparison(Result):
         if w.is_noise:
             said = noise_sentence(w, self._known_as, self.associations)
         elif self.coloured is not None:
-            noise = self.coloured.words
+            noise = self.coloured.sizes if self.outliers.any() else self.coloured.words
             said = f"Model and data agree: the residuals are noise ({noise})."
             if self.coloured.open:
                 said = (
@@ -417,7 +417,10 @@ class Comparison(Result):
             said = misfit_sentence(w, self.times_noise, self._known_as, self.associations)
         if not self.outliers.any():
             return said
-        rows = counted(int(self.outliers.sum()), "outlier")
+        further = 0 if w.is_noise or self.coloured is None else self.coloured.outliers
+        rows = counted(int(self.outliers.sum()) + further, "outlier")
+        if further:
+            return f"{said} {rows} left out of this, or given little weight."
         return f"{said} {rows} ({self.problem.data.lines_of(self.outliers)}) left out of this."
 
     @property

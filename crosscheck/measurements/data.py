@@ -121,7 +121,7 @@ Names = NDArray[np.str_]
 _FILLED_IN: Any = None
 _PER_ROW = (
     "run", "t_s", "command_pose", "command_lengths", "wanted", "position", "quat_wxyz",
-    "angles_rad", "tensions", "temperature_C", "stands", "sigma_ratio", "file", "line",
+    "angles_rad", "tensions", "temperature_C", "stands", "sigma_ratio", "file", "line", "copied",
 )  # fmt: skip
 
 
@@ -244,6 +244,7 @@ class Measurements(Result):
         files: their names, if there are several; file: (n,) index of each row's file.
         origins: names by which models know the files, if there are several.
         line: (n,) line in the file (row, for Parquet) of each row.
+        copied: (n,) bool, rows whose readings another row has too, beside another command.
         driven: (m,) bool, cables on winches; commanded lengths of the others have no columns.
         unused_columns: names of columns without a known meaning.
         notes: sentences for the reader: what was assumed, filled in or left out.
@@ -281,6 +282,7 @@ class Measurements(Result):
     file: NDArray[np.int64] = _FILLED_IN
     origins: tuple[str, ...] = ()
     line: NDArray[np.int64] = _FILLED_IN
+    copied: Mask = _FILLED_IN
     driven: Mask = _FILLED_IN
     unused_columns: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -304,6 +306,7 @@ class Measurements(Result):
             "line": np.arange(2, n + 2),
             "driven": np.ones(m, dtype=bool),
             "stands": np.zeros(n, dtype=bool),
+            "copied": np.zeros(n, dtype=bool),
             "file": np.zeros(n, dtype=np.int64),
             "sigma_ratio": np.ones((n, len(fields(Sigma)))),
         }
@@ -320,7 +323,7 @@ class Measurements(Result):
         widths = {"command_pose": 7, "command_lengths": m, "position": 3, "quat_wxyz": 4}
         widths |= {"angles_rad": 3, "tensions": m, "wanted": 7, "sigma_ratio": len(fields(Sigma))}
         shapes: dict[str, tuple[int, ...]] = {k: (n, width) for k, width in widths.items()}
-        shapes |= dict.fromkeys(("t_s", "temperature_C", "line", "stands", "file"), (n,))
+        shapes |= dict.fromkeys(("t_s", "temperature_C", "line", "stands", "file", "copied"), (n,))
         for name, shape in shapes.items():
             value = getattr(self, name)
             if value is not None and np.shape(value) != shape:

@@ -13,12 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crosscheck.measurements.copied import copied
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.dwells import mean_rotation
 from seecr.columns.known import ANGLES, POSITION, Column, Columns
 from seecr.columns.plausible import away_from, scalar_may_be_last, turned_from
-from seecr.counted import some
 from seecr.errors import Faults, InputFileError
 from seecr.pose import Array, quat_conjugate, quat_from_rxyz, quat_multiply, rxyz_from_quat
 
@@ -44,7 +42,6 @@ _FOLLOWS, _AGAINST, _RATE_OFF, _AS_FAR = 0.9, 0.95, 0.25, 0.5
 _ASTRAY, _NEARER = 0.5, 4.0
 # At least so many nines, such as 999 or -99999, and nothing else, mean "not read" in every row.
 _NINES = 3
-_MOST_LINES = 8
 
 _REMEDY = "leave the cells empty where nothing was read"
 _SURVEY = ", and subtract a constant from coordinates in a survey's grid"
@@ -70,8 +67,6 @@ def check_readings(columns: Columns, robot: Robot, data: Measurements) -> list[s
         *placed,
         *turned,
         *_other_order(columns, robot, data),
-        *twice(data),
-        *copied(data),
     ]
 
 
@@ -345,6 +340,8 @@ def _elsewhere(pairs: _Pairs) -> list[str]:
     usual, spread = _usual(read - told), _usual_spread(told)
     if not which or usual <= max(_ASTRAY * spread, _OFF * pairs.robot.reach):
         return []
+    if _usual_spread(read) == 0.0:  # a tracker that stood still, which is another matter
+        return []
     said = ""
     for i, j in combinations(range(len(which)), 2):
         other = read.copy()
@@ -384,22 +381,4 @@ def _other_order(columns: Columns, robot: Robot, data: Measurements) -> list[str
         f"The measured quaternions are {here:.0f} deg from the commanded ones, and only "
         f"{there:.0f} deg if their last number is the scalar: are meas_qw meas_qx meas_qy meas_qz "
         "in the right order?"
-    ]
-
-
-def twice(data: Measurements) -> list[str]:
-    """A note about rows equal to others to the last digit, which noise never produces."""
-    columns = [column for name, column in data.columns() if name != "run"]
-    first: dict[tuple[object, ...], int] = {}
-    pairs = []
-    for row, (read, *values) in enumerate(zip(data.read.tolist(), *columns, strict=True)):
-        if read:
-            before = first.setdefault(tuple(values), row)
-            if before != row:
-                pairs.append(f"{data.place(row)} as {data.place(before)}")
-    if not pairs:
-        return []
-    return [
-        f"Identical rows: line {some(pairs, _MOST_LINES)}; they count twice, so remove one of "
-        "each pair if it was measured only once."
     ]

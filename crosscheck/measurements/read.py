@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.given import GivenRobot, robot_of
-from crosscheck.measurements.copied import copied
 from crosscheck.measurements.data import (
     EXAMPLE,
     LEAST_NOISE,
@@ -28,7 +27,8 @@ from crosscheck.measurements.data import (
     parse_quantity,
 )
 from crosscheck.measurements.dwells import averaged_dwells
-from crosscheck.measurements.plausible import check_readings, twice
+from crosscheck.measurements.plausible import check_readings
+from crosscheck.measurements.repeated import repetitions
 from seecr.columns.commands import (
     CHOICES,
     began,
@@ -217,13 +217,12 @@ def together(parts: Sequence[Measurements]) -> Measurements:
         origins=tuple(_short_names([part.path.resolve() for part in parts], 2)),
         file=np.repeat(np.arange(len(parts)), [part.n_rows for part in parts]),
         line=np.concatenate([part.line for part in parts]),
+        copied=np.concatenate([part.copied for part in parts]),
         unused_columns=tuple(dict.fromkeys(name for part in parts for name in part.unused_columns)),
         notes=(*notes, *said, *lost_times, *lost_warmth),
     )
-    # repetitions within a file are in its own notes already
-    own = any(twice(part) for part in parts)
-    whole = whole if own else whole.with_notes(twice(whole))
-    return whole.with_notes(() if any(copied(part) for part in parts) else copied(whole))
+    said, copied = repetitions(whole, across=True)
+    return replace(whole, copied=whole.copied | copied, notes=(*said, *whole.notes))
 
 
 def _check_alike(parts: Sequence[Measurements]) -> None:
@@ -546,8 +545,10 @@ def _load(columns: Columns, robot: Robot, toml: Path | None) -> Measurements:
         line=columns.table.line,
         unused_columns=columns.unused,
     )
-    notes = [*columns.notes, *_way_points(data), *check_readings(columns, robot, data)]
-    return replace(data, notes=tuple(notes))
+    repeated, copied = repetitions(data)
+    odd = check_readings(columns, robot, data)
+    notes = (*repeated, *columns.notes, *_way_points(data), *odd)
+    return replace(data, copied=copied, notes=notes)
 
 
 def _way_points(data: Measurements) -> list[str]:

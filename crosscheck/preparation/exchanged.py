@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.fit.problem import TENSION, Problem
+from crosscheck.preparation.unread import rows_of_files
 from seecr.pose import Array, quat_from_rxyz
 from seecr.prediction.experiment import Prediction
 from seecr.units import short
@@ -48,13 +49,6 @@ def exchange_doubts(problem: Problem, pulls: Pulls) -> list[str]:
     """Sentences that name columns of lengths or tensions that seem exchanged."""
     # where lengths are exchanged the platform is not where it is predicted
     return list(_lengths(problem)) or list(_tensions(problem, pulls))
-
-
-def rows_of_files(problem: Problem) -> Iterator[tuple[str, NDArray[np.bool_]]]:
-    """Each file's name, as a sentence begins with it, and its rows (n,) with readings."""
-    data = problem.data
-    for k in np.unique(data.file):
-        yield (f"{data.files[k]}: " if data.files else ""), data.read & (data.file == k)
 
 
 def _lengths(problem: Problem) -> Iterator[str]:

@@ -50,8 +50,6 @@ def refusal_of(problem: Problem, predicted: Array, stated: Sigma) -> Refusal | N
     poses = 1 + int(np.sum(~_resting(problem, commands, used)))
     if poses < LEAST_POSES:
         return Refusal(Unfit.FEW_POSES, poses, lost, readings)
-    if _frozen(problem, used):
-        return Refusal(Unfit.FROZEN_READINGS, n, lost, readings)
     apart = _contradicting(problem, commands, predicted, stated)
     if apart is not None:
         places = problem.data.places(np.isin(np.arange(len(problem.use)), apart))
@@ -74,16 +72,6 @@ def _resting(problem: Problem, commands: Array, used: NDArray[np.intp]) -> NDArr
     same = np.all(np.abs(np.diff(commands[used], axis=0)) <= _SAME, axis=1)
     # a way point in between would have moved the robot
     return np.asarray(same & (run[1:] == run[:-1]) & (np.diff(used) == 1))
-
-
-def _frozen(problem: Problem, used: NDArray[np.intp]) -> bool:
-    """Whether every channel was read in all rows and never changed."""
-    data = problem.data
-    turned = data.angles_rad if data.quat_wxyz is None else data.quat_wxyz
-    table = np.concatenate([data.position, turned, data.tensions], axis=1)[used]
-    whole = table[:, np.isfinite(table).all(axis=0)]
-    partly = np.isfinite(table).any(axis=0).sum() != whole.shape[1]
-    return whole.shape[1] > 0 and not partly and bool(np.all(np.ptp(whole, axis=0) == 0.0))
 
 
 def _contradicting(

@@ -16,7 +16,8 @@ from crosscheck.inference.held_out import blocks_note
 from crosscheck.measurements.data import Measurements
 from crosscheck.preparation.fitness import refusal_of
 from crosscheck.preparation.freed import freed, groups_of, laid_out
-from crosscheck.preparation.suspect import filled_in_note, suspicions, without_constants
+from crosscheck.preparation.suspect import suspicions
+from crosscheck.preparation.unread import locked_note, without_unread
 from seecr.description.robot import Robot
 from seecr.effects import Terms, catalogue
 from seecr.equilibrium.strange import strange
@@ -80,7 +81,7 @@ def prepare(
         return Prepared(problem, terms, (*robot.notes, *data.notes), "", none)
     laid = laid_out(data, terms)
     plain = problem.experiment.predict(laid.terms.effects)
-    problem, constants = without_constants(_solved_rows(problem, plain), plain)
+    problem, unread = without_unread(_solved_rows(problem, plain), plain)
     problem, estimates = estimate_sigma(problem, plain)
     found = freed(problem, laid)
     terms, said = found.terms, (*laid.notes, *found.notes)
@@ -94,7 +95,7 @@ def prepare(
         problem = problem.with_sigma(others.sigma)
     asked, odd = suspicions(problem, plain)
     notes = (
-        *robot.notes, *strange(robot), *data.notes, *filled_in_note(problem), *constants, *asked,
+        *data.notes, *robot.notes, *strange(robot), *locked_note(problem), *unread, *asked,
         *oversized(problem, plain), *problem.left_out, *estimates, *said,
     )  # fmt: skip
     problem = problem.with_groups(groups_of(data, terms))

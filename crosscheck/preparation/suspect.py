@@ -1,28 +1,32 @@
-"""Data that look wrong beside the model: of another robot, another unit or convention, or unread.
+"""Data that look wrong beside the model: of another robot, another unit or another convention.
 
 For each kind of reading there is a table of what may have happened to it. If what one entry makes
 of the readings is far nearer to what the model predicts than the readings as they stand, no effect
 of a robot is to be sought in the difference: that is asked in a note, or, where the readings then
-agree with the commands too, no verdict is passed. Exchanged columns are in ``exchanged``.
+agree with the commands too, no verdict is passed. Exchanged columns are in
+``exchanged``, cells that nobody read in ``unread``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.fit.problem import ORIENTATION, POSITION, TENSION, Problem
 from crosscheck.fit.reasons import Refusal, Unfit
-from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.dwells import mean_rotation
-from crosscheck.preparation.exchanged import Pulls, exchange_doubts, rows_of_files
-from crosscheck.preparation.filled import filled_in
+from crosscheck.preparation.exchanged import Pulls, exchange_doubts
+from crosscheck.preparation.unread import (
+    LEAST_TURN,
+    SEVERAL,
+    is_frozen,
+    mean_distances,
+    rows_of_files,
+)
 from seecr.columns.plausible import turned_from
-from seecr.counted import counted, some
+from seecr.counted import counted
 from seecr.effects.base import Readings
 from seecr.pose import (
     Array,
@@ -35,17 +39,16 @@ from seecr.pose import (
 from seecr.prediction.experiment import Prediction
 from seecr.units import short
 
-# Least number of rows from which a usual size is known, and from which a convention is.
-_SEVERAL, _LEAST_ROWS = 4, 8
+# Least number of rows from which a convention is known.
+_LEAST_ROWS = 8
 # Orientations: what four rows in five are off by counts: one in ten may be an outlier. Another
 # convention brings that so many times nearer to what the model expects. If only rather nearer, that
 # is asked and no more: where platforms turn little, conventions differ little.
 _PART, _NEARER, _RATHER_NEARER = 0.8, 2.0, 1.5
 # What is beyond noise, or beyond a platform that tilts to the other side, is so by this factor.
 _FAR = 10.0
-# Angles [rad] of less, or of less than so many times the stated noise, are not worth a word; the
-# model is to expect turns of so much.
-_LEAST, _NOISE, _LEAST_TURN = np.radians(0.01), 3.0, np.radians(0.1)
+# Angles [rad] of less, or of less than so many times the stated noise, are not worth a word.
+_LEAST, _NOISE = np.radians(0.01), 3.0
 # Positions: a model is worse than none if it is so many times as far off as the commands are.
 _WORSE = 3.0
 # Units of other load cells [N]. Scales of load cells, masses and loads are wrong by less than a
@@ -53,14 +56,12 @@ _WORSE = 3.0
 _UNITS, _AS_GOOD = {"kgf": 9.80665, "lbf": 4.44822, "grams (gf)": 9.80665e-3}, 1.4
 # What differs by so much must have another cause than effects; radians are 57 times degrees.
 _OTHER = 20.0
-# Columns: numbers that differ by less are the same. They are to change by such parts of the robot's
-# size and of the usual tension, or by the least turn.
-_SAME, _MOVES, _PULLS = 1e-12, 0.02, 0.05
-_MOST_NAMED = 8
 
 
 def suspicions(problem: Problem, at: Prediction) -> tuple[list[str], Refusal | None]:
     """Sentences that ask about what looks wrong, and why no verdict is passed, if so."""
+    if is_frozen(problem):  # then whatever else looks odd follows from that
+        return [], Refusal(Unfit.FROZEN_READINGS, int(problem.data.read.sum()))
     readings, pulls = at.readings, Pulls.of(problem, at)
     asked, refusal = misread_orientations(problem, readings)
     notes = [
@@ -76,19 +77,6 @@ def suspicions(problem: Problem, at: Prediction) -> tuple[list[str], Refusal | N
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
-
-
-def _spreads(read: Array, expected: Array, seen: NDArray[np.bool_]) -> Array:
-    """(2, k) mean distances from the median of columns (n, k); NaN where rows are few.
-
-    An outlier can only make them larger.
-    """
-    out = np.full((2, seen.shape[1]), np.nan)
-    for k, rows in enumerate(seen.T):
-        if rows.sum() >= _SEVERAL:
-            both = np.stack([read[rows, k], expected[rows, k]])
-            out[:, k] = np.abs(both - np.median(both, axis=1, keepdims=True)).mean(axis=1)
-    return out
 
 
 # orientations
@@ -150,8 +138,8 @@ def misread_orientations(problem: Problem, readings: Readings) -> tuple[list[str
         found = _misread(problem, readings, rows) if rows.sum() >= _LEAST_ROWS else None
         if found is None:
             continue
-        off, left, convention, certain = found
-        if certain:
+        off, left, convention, ask = found
+        if not ask:
             file = f" of {name.removesuffix(': ')}" if name else ""
             return [], Refusal(
                 Unfit.OTHER_CONVENTION, problem.data.n_rows, off=off, left=left,
@@ -159,18 +147,19 @@ def misread_orientations(problem: Problem, readings: Readings) -> tuple[list[str
             )  # fmt: skip
         asked.append(
             f"{name}The measured orientations are {off} from those that the model expects, and "
-            f"{left} if {convention}: is that how they are written?"
+            f"{left} if {convention}: {ask}"
         )
     return asked[:1], None
 
 
 def _misread(
     problem: Problem, readings: Readings, rows: NDArray[np.bool_]
-) -> tuple[str, str, str, bool] | None:
+) -> tuple[str, str, str, str] | None:
     """How far some rows are off as they stand, and by which convention they seem to be written.
 
     Returns:
-        Both angles in words, the convention, and whether it is certain; None if it is the file's.
+        Both angles in words, the convention, and the question to ask, "" if it is certain; None if
+        it is the file's.
     """
     assert problem.data.quat_wxyz is not None
     read, expected = problem.data.quat_wxyz[rows], readings.quat_wxyz[rows]
@@ -184,10 +173,14 @@ def _misread(
     near = _off(by[best], expected)
     if here < max(least, _RATHER_NEARER * near):
         return None
+    ask = "" if here >= _NEARER * near else "is that how they are written?"
     if best not in _ALIKE and not _is_no_tilt(read, expected, _told(problem)[rows], by[best]):
-        return None
+        if here < _FAR * near:
+            return None
+        # where commands are level, both are the same rotations
+        ask = "is that how they are written, or does the platform tilt to the other side?"
     off, left = (_deg(float(np.median(turned_from(x, expected)))) for x in (read, by[best]))
-    return off, left, best, here >= _NEARER * near
+    return off, left, best, ask
 
 
 def _deg(angle: float) -> str:
@@ -235,12 +228,12 @@ def _other_turns(problem: Problem, readings: Readings) -> list[str]:
     else:
         both = np.stack([quat, readings.quat_wxyz])
         read, expected = rotvec_from_quat(quat_multiply(both, home))
-    spreads = _spreads(read, expected, problem.counted[:, ORIENTATION])
+    spreads = mean_distances(read, expected, problem.counted[:, ORIENTATION])
     spreads = spreads[:, np.isfinite(spreads[0])]
     if not spreads.size:
         return []
     small, large = np.sqrt(np.mean(spreads**2, axis=1)).tolist()
-    if large < _LEAST_TURN or small * _OTHER > large:
+    if large < LEAST_TURN or small * _OTHER > large:
         return []
     return [
         f"Rotations change by {_deg(small)} where the model expects {_deg(large)} (mean distance "
@@ -260,7 +253,7 @@ def _worse_than_commands(problem: Problem, readings: Readings) -> Iterator[str]:
     off, noise = read - readings.position, problem.reading_sigma[:, POSITION]
     for name, mine in rows_of_files(problem):
         rows = problem.counted[:, POSITION] & mine[:, None]
-        if rows.any(axis=1).sum() < _SEVERAL:
+        if rows.any(axis=1).sum() < SEVERAL:
             continue
         model, plain = _rms(off[rows]), _rms((read - told[:, :3])[rows])
         if model > _WORSE * plain and _rms((off / noise)[rows]) > _FAR:
@@ -375,7 +368,7 @@ def unit_of(part: Array) -> str | None:
 
     ``part`` (k,) of the load is what they carry as newtons, row by row.
     """
-    if len(part) < _SEVERAL:
+    if len(part) < SEVERAL:
         return None
     low, high = np.quantile(part, [0.25, 0.75]).tolist()
     for name, newtons in _UNITS.items():
@@ -387,7 +380,7 @@ def unit_of(part: Array) -> str | None:
 def _other_tensions(problem: Problem, readings: Readings) -> list[str]:
     """That tensions are of another order than the model expects, for whatever reason."""
     seen = problem.counted[:, TENSION] & np.isfinite(readings.tensions)
-    if seen.any(axis=1).sum() < _SEVERAL:
+    if seen.any(axis=1).sum() < SEVERAL:
         return []
     usual, there = _rms(problem.data.tensions[seen]), _rms(readings.tensions[seen])
     if usual <= 0.0 or there <= 0.0 or 1.0 / _OTHER < usual / there < _OTHER:
@@ -397,92 +390,3 @@ def _other_tensions(problem: Problem, readings: Readings) -> list[str]:
         "(rms): is it another unit, the file of another robot, or a pretension that the model "
         "lacks?"
     ]
-
-
-# columns that nobody read
-
-
-def filled_in_note(problem: Problem) -> list[str]:
-    """A note about parts of the pose that the joints lock, and that nothing read."""
-    said = (
-        f"{_names(problem.filled_in)}: not counted as readings, because the joints allow no such "
-        "motion and the file has the same number in every row"
-    )
-    return [said] if problem.filled_in.any() else []
-
-
-def without_constants(problem: Problem, at: Prediction) -> tuple[Problem, list[str]]:
-    """The problem without columns that hold one number in all rows of a file, and notes on these.
-
-    Instruments repeat a number only if what they read changes by less than their last digit. Where
-    the model expects more, whoever wrote the file filled it in. If nothing else was read the data
-    are left as they are.
-    """
-    data, quat, notes = problem.data, problem.data.quat_wxyz, []
-    angles, there = data.angles_rad if quat is None else rxyz_from_quat(quat), at.readings
-    read = np.concatenate([data.position, angles, data.tensions], axis=1)
-    turned = rxyz_from_quat(there.quat_wxyz)
-    expected = np.concatenate([there.position, turned, there.tensions], axis=1)
-    seen = problem.counted & np.isfinite(expected)
-    usual = _rms(there.tensions[seen[:, TENSION]]) if seen[:, TENSION].any() else 0.0
-    least = np.full(len(seen.T), _PULLS * usual)
-    least[:6] = np.repeat([_MOVES * problem.robot.reach, _LEAST_TURN], 3)
-    odd = np.zeros_like(seen)
-    for name, rows in rows_of_files(problem):
-        mine = seen & rows[:, None]
-        columns = _constant(read, expected, mine, least)
-        some = filled_in(read, expected, mine & ~columns, least)
-        odd |= (rows[:, None] & columns) | some
-        if some.any():
-            which = f"{name}{_names(np.asarray(some.any(axis=0)))}"
-            notes.append(
-                f"{which}: {data.lines_of(some.any(axis=1))} not counted as readings, because the "
-                "same number stands there again and again where the model expects changes; leave "
-                "the cells empty where nothing was read"
-            )
-        if columns.any():
-            notes.append(
-                f"{name}{_names(columns)}: not counted as readings, because the file has the same "
-                "number in every row where the model expects changes; leave the cells empty where "
-                "nothing was read"
-            )
-    if not notes or odd[seen].all():
-        return problem, []
-    rest = _without(data, np.where(odd, np.nan, read))
-    own = problem.use, problem.left_out, problem.considered
-    return Problem(problem.robot, rest, problem.sigma, *own), notes
-
-
-def _without(data: Measurements, left: Array) -> Measurements:
-    """Data of which only some readings (n, 6 + m) are left: positions, angles and tensions."""
-    angles, quat = left[:, ORIENTATION], data.quat_wxyz
-    lost = np.isnan(angles)
-    if quat is None or lost.all() or (lost != lost[:, :1]).any():
-        quat = None  # single angles can only be left out of angles
-    else:
-        quat, angles = np.where(lost[:, :1], np.nan, quat), data.angles_rad
-    masks: dict[str, Any] = dict.fromkeys(("position_mask", "angle_mask", "tension_mask"))
-    return replace(
-        data, position=left[:, POSITION], quat_wxyz=quat, angles_rad=angles,
-        tensions=left[:, TENSION], **masks,
-    )  # fmt: skip
-
-
-def _constant(
-    read: Array, expected: Array, seen: NDArray[np.bool_], least: Array
-) -> NDArray[np.bool_]:
-    """(6 + m,) columns that never change though the model expects changes of more than ``least``.
-
-    A cable that reads nothing in all rows may be slack, unless no tension ever changes.
-    """
-    small, large = _spreads(read, expected, seen)
-    odd = (small <= _SAME) & (large > least)
-    if (small[TENSION] > _SAME).any():
-        odd[TENSION] &= np.where(seen, read, 0.0)[:, TENSION].any(axis=0)
-    return np.asarray(odd)
-
-
-def _names(columns: NDArray[np.bool_]) -> str:
-    pose = [*"xyz", *(f"rotation about {axis}" for axis in "xyz")]
-    names = [pose[k] if k < 6 else f"tension_{k - 5}" for k in np.flatnonzero(columns).tolist()]
-    return some(names, _MOST_NAMED)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.words import rms_words
 from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.preparation.suspect import without_constants
+from crosscheck.preparation.unread import without_unread
 from seecr.counted import counted
 from seecr.description.robot import Robot
 from seecr.effects import Terms
@@ -58,7 +58,7 @@ class Thinned:
             return ()
         problem = Problem(self.robot, self.whole, sigma, self.others)
         at = problem.experiment.predict(terms.effects)
-        problem = without_constants(problem.only(at.solved), at)[0]
+        problem = without_unread(problem.only(at.solved), at)[0]
         raw = problem.residuals(at.readings)
         squares = np.where(problem.counted, (raw / problem.reading_sigma) ** 2, 0.0).sum(axis=1)
         size = np.sqrt(squares / np.maximum(problem.counted.sum(axis=1), 1))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from made_columns import columns_of
 from rectangle import RECTANGLE
 
 from crosscheck.measurements.data import Measurements
-from crosscheck.measurements.plausible import check_readings, twice
+from crosscheck.measurements.plausible import check_readings
 from crosscheck.measurements.read import load_commands, load_measurements
 from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
@@ -122,15 +121,6 @@ def test_a_platform_that_is_turned_in_either_order_is_not_told_to_be_in_another(
     # 120 degrees about (1, 1, 1) is (1, 1, 1, 1)/2, in whatever order
     third = quat_from_rotvec(np.full((5, 3), 2.0 * np.pi / 3.0 / 3**0.5))
     assert notes_on(told, quat_wxyz=quat_multiply(wobble, third)) == []
-
-
-def test_rows_that_are_the_same_are_listed_up_to_eight() -> None:
-    told, run = np.tile(HOME, (12, 1)), np.full(12, "a")
-    data = Measurements(Path("a.csv"), 4, run, command_pose=told, position=np.zeros((12, 3)))
-    (note,) = twice(data)
-    assert "9 as 2" in note and "10 as 2 and 3 more" in note
-    other = replace(data, position=np.arange(36.0).reshape(12, 3))
-    assert twice(other) == []
 
 
 @pytest.mark.parametrize(("unit", "factor", "name"), [

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from made_data import measured
 
-from crosscheck.measurements.copied import copied
+import crosscheck
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.read import load_measurements
+from crosscheck.measurements.repeated import repetitions
 from seecr import load_robot
 
 ROBOT = load_robot("demobot_parallel")
@@ -86,6 +89,51 @@ def test_hundreds_of_rows_with_few_digits_accuse_nobody(seed: int) -> None:
     file = np.repeat([0, 1], 300)
     data = Measurements(Path("m"), 8, np.full(600, "a"), pose, position=read, file=file,
                         files=("a", "b"))  # fmt: skip
-    assert copied(data) == []
+    assert not repetitions(data)[1].any()
     read[300:310] = read[:10]
-    assert len(copied(data)) == 1
+    notes, copied = repetitions(data)
+    assert notes[0].startswith("Repeated")
+    assert copied[[*range(10), *range(300, 310)]].all() and copied.sum() <= 26  # 3 more by chance
+
+
+def test_rows_that_are_the_same_are_listed_up_to_eight() -> None:
+    told = np.tile(ROBOT.reference_pose, (12, 1))
+    data = Measurements(Path("a"), 8, np.full(12, "a"), told, position=np.zeros((12, 3)))
+    (note,) = repetitions(data)[0]
+    assert "9 as 2" in note and "10 as 2 and 3 more" in note
+    assert repetitions(replace(data, position=np.arange(36.0).reshape(12, 3)))[0] == []
+    assert repetitions(data, across=True)[0] == []
+
+
+def test_copied_rows_are_said_first_and_once_and_none_counts(shared_data: Path) -> None:
+    """They were 6 outliers, then 8 in the same sentence, and all counted as measured."""
+    folder = shared_data / "public" / "22-payload-grid"
+    files = [folder / name for name in ("load_0.csv", "load_25_part_copied.csv")]
+    found = crosscheck.compare(folder / "robot.xml", files)
+    assert found.notes[0].startswith(
+        "Repeated readings: load_25_part_copied.csv lines 2, 5, 8, 11, 14, 17, 20, 23, 26, 29, 32, "
+    )
+    assert "so none of them counts as long as others do" in found.notes[0]
+    assert found.is_noise and "outlier" not in " ".join([found.sentence, *found.notes])
+    assert int(found.problem.use.sum()) == 60
+
+
+def test_a_tracker_that_froze_is_one_note() -> None:
+    """In some rows, whose readings were "all counted" and "not counted"; and in all of them."""
+    data = measured(ROBOT, points=4)
+    for count in (12, data.n_rows):
+        there = {"position": data.position.copy(), "quat_wxyz": data.quat_wxyz.copy()}
+        for name in there:
+            there[name][-count:] = there[name][-count]
+        stopped = crosscheck.Measurements.from_arrays(
+            ROBOT, commands=data.command_pose, positions=there["position"],
+            quaternions=there["quat_wxyz"], runs=data.run.tolist(), sigma="0.03mm",
+        )  # fmt: skip
+        found = crosscheck.compare(ROBOT, stopped)
+        odd = [n for n in found.notes if "eading" in n or "stop" in n or "follow" in n]
+        if count == 12:
+            assert [note[:18] for note in odd] == ["Repeated readings:"]
+            assert int(found.problem.use.sum()) == data.n_rows - 12
+        else:
+            assert odd == []
+            assert "all readings are the same although the commands differ" in found.sentence

@@ -1,0 +1,144 @@
+"""Readings that another row has too, to the last digit: rows that count twice, and copied ones.
+
+Noise does not repeat all numbers of a row, unless they are so coarse that chance does.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from crosscheck.measurements.data import Mask, Measurements
+from seecr.counted import plural, some
+from seecr.pose import Array
+
+# A note is wrong in one of so many files whose readings are as coarse.
+_WRONG = 1e-3
+# Single numbers repeat where a robot is symmetric; so many together do not.
+_LEAST_COLUMNS = 2
+_MOST_TWICE, _MOST_COPIED = 8, 20
+# The median of a normal difference's size, in standard deviations.
+_USUAL = 0.6745
+
+Pair = tuple[int, int]
+"""A row, and the first one before it that it repeats."""
+
+
+def repetitions(data: Measurements, across: bool = False) -> tuple[list[str], Mask]:
+    """Notes about rows that repeat others, and which rows (n,) have the readings of another one.
+
+    Args:
+        data: what was measured.
+        across: whether only repetitions of another file's rows count: each file knows its own.
+    """
+    twice, copies = _pairs(data, across)
+    notes, copied = list[str](), np.zeros(data.n_rows, dtype=bool)
+    if copies and _by_chance(data, len(copies)) <= _WRONG:
+        copied[np.ravel(copies)] = True
+        by_files: dict[Pair, list[Pair]] = {}
+        for row, before in copies:
+            files = int(data.file[row]), int(data.file[before])
+            by_files.setdefault(files, []).append((row, before))
+        notes += [_words(data, *files, found) for files, found in by_files.items()]
+    if twice:
+        pairs = [f"{data.place(row)} as {data.place(before)}" for row, before in twice]
+        notes.append(
+            f"Identical rows: line {some(pairs, _MOST_TWICE)}; they count twice, so remove one of "
+            "each pair if it was measured only once."
+        )
+    return notes, copied
+
+
+def _pairs(data: Measurements, across: bool) -> tuple[list[Pair], list[Pair]]:
+    """Rows that repeat another one whole, and those that do beside another command or load."""
+    read = _readings(data)
+    columns = {k: v for k, v in data.columns() if k != "run" and not k.startswith(_READ)}
+    whole = list(zip(*columns.values(), strict=True))
+    told = [v for k, v in columns.items() if k != "t_s"]
+    commands = list(zip(*told, data.file.tolist(), strict=True))
+    number = np.isfinite(read).sum(axis=1)
+    same, first = dict[object, int](), dict[object, int]()
+    twice, copies = list[Pair](), list[Pair]()
+    for row in np.flatnonzero(number).tolist():
+        key = read[row].tobytes()
+        whole_before = same.setdefault((key, whole[row]), row)
+        before = first.setdefault(key, row)
+        if whole_before != row and not (across and data.file[whole_before] == data.file[row]):
+            twice.append((row, whole_before))
+        if across and data.file[before] == data.file[row]:
+            continue
+        if number[row] >= _LEAST_COLUMNS and commands[before] != commands[row]:
+            copies.append((row, before))
+    return twice, copies
+
+
+_READ = ("meas_", "tension_")
+
+
+def _readings(data: Measurements) -> Array:
+    """The readings (n, k) as written; 0 and -0 are the same, NaN is not read."""
+    columns = [values for name, values in data.columns() if name.startswith(_READ)]
+    return np.array(columns, dtype=float).reshape(len(columns), data.n_rows).T + 0.0
+
+
+def _by_chance(data: Measurements, count: int) -> float:
+    """The probability that so many rows or more repeat another one by chance.
+
+    Pairs are counted as if they were independent (Poisson): those of one command, whose numbers
+    differ by noise, and all others.
+    """
+    from scipy import special  # takes a while to import, and few files need it
+
+    place = data.command_pose if data.command_lengths is None else data.command_lengths
+    assert place is not None
+    read = _readings(data)
+    rows = np.isfinite(read).sum(axis=1) >= _LEAST_COLUMNS
+    read = read[rows]
+    _places, which = np.unique(place[rows].round(9), axis=0, return_inverse=True)
+    which = which.ravel()
+    order = np.argsort(which, kind="stable")
+    same = order[np.flatnonzero(np.diff(which[order]) == 0)[:, None] + [0, 1]]
+    same = same[(read[same[:, 0]] != read[same[:, 1]]).any(axis=1)]  # what repeats is in question
+    alike, every, once = 1.0, 1.0, np.unique(read, axis=0)
+    for column, single in zip(read.T, once.T, strict=True):
+        values, often = np.unique(single[np.isfinite(single)], return_counts=True)
+        if len(values) < 2:
+            continue
+        step, spread = float(np.diff(values).min()), float(np.ptp(values)) / math.sqrt(12.0)
+        pairs = float(len(single) * (len(single) - 1))
+        anywhere = max(float(np.sum(often * (often - 1.0))) / pairs, _density(step, spread))
+        apart = np.abs(np.diff(column[same], axis=1))
+        every *= anywhere
+        if len(apart):
+            noise = float(np.nanmedian(apart)) / _USUAL
+            anywhere = max(float(np.mean(apart == 0.0)), _density(step, noise))
+        alike *= anywhere
+    sizes = np.bincount(which).astype(float)
+    expected = 0.5 * float(np.sum(sizes * (sizes - 1.0))) * alike
+    expected += 0.5 * len(read) * (len(read) - 1.0) * every
+    return float(special.pdtrc(count - 1, expected))
+
+
+def _density(step: float, spread: float) -> float:
+    """The probability that a normal difference is 0 when rounded to a step."""
+    return min(step / (math.sqrt(2.0 * math.pi) * spread), 1.0) if spread > 0.0 else 1.0
+
+
+def _words(data: Measurements, file: int, other: int, found: list[Pair]) -> str:
+    rows, before = (
+        f"{plural(len(lines), 'line')} {some(lines, _MOST_COPIED)}"
+        for k in (0, 1)
+        for lines in [list(dict.fromkeys(str(data.line[pair[k]]) for pair in found))]
+    )
+    here, there = (f"{data.files[k]} " if data.files else "" for k in (file, other))
+    why = (
+        "copied from one file to the other"
+        if file != other
+        else "copied, or the tracker stood still"
+    )
+    return (
+        f"Repeated readings: {here}{rows} have those of {there}{before} to the last digit, beside "
+        f"another command, load or file. Noise does not repeat: were they {why}? At most one of "
+        "each was measured, so none of them counts as long as others do."
+    )
