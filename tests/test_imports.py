@@ -128,10 +128,10 @@ USERS = {
     "seecr importlib.import_module": "seecr: cli.group lazy",
     "crosscheck importlib.import_module": "",
     "seecr rerun": (
-        "seecr.show: control_recording layout map_recording plots scene stream sweep_recording"
+        "seecr.show: layout map_recording plots scene stream sweep_recording"
     ),
     "crosscheck rerun": (
-        "crosscheck.show: case_recording control_recording error_recordings misfit"
+        "crosscheck.show: case_recording error_recordings misfit"
     ),
 }
 

@@ -106,7 +106,7 @@ def command(
         if figure != "none":
             timed_figure(folder / f"control.{figure}", result)
         if not no_recording:
-            from crosscheck.show.control_recording import write_timed_recording
+            from crosscheck.show.control import write_timed_recording
 
             for name, one in result.schemes.items():
                 write_timed_recording(one, folder / f"{name}.rrd")

@@ -250,7 +250,7 @@ def _plot_views(drawn: _Drawn) -> list[rrb.TimeSeriesView]:
     titles = [title for title, _colour in _QUANTITIES.values()]
     return [
         *views,
-        plots.tension_view(drawn.tensions, names, drawn.size(TENSION), roots),
+        plots.cables_view("Tension [N]", drawn.tensions, names, drawn.size(TENSION), roots),
         plots.plot(
             "log10 |SEECR - MuJoCo| (crosses: before the polish, lines: limits)",
             [f"{SETTLED}/**", f"{DIFFERENCE}/**", f"{LIMIT}/**"],
@@ -382,7 +382,7 @@ def _write_curves(
 def _style(recording: Recording, drawn: _Drawn) -> None:
     """Lines for SEECR and dots for MuJoCo, or two kinds of dots if poses are unrelated."""
     names = drawn.result.robot.cable_names
-    said, _legend = plots.curves_of_cables(drawn.tensions, names, drawn.size(TENSION))
+    said, _legend = plots.merged_curves(drawn.tensions, names, drawn.size(TENSION))
     shades = colours.cable_colours(len(names))
     curves = [(TENSION, name, said.get(k, name), shades[k]) for k, name in enumerate(names)]
     for name, colour in _COMPONENTS.items():

@@ -11,7 +11,7 @@ from crosscheck.controlled.result import TimedControl, TimedScheme
 from seecr.columns.csv import table_text
 from seecr.pose import Array, pose_difference
 from seecr.result import COORDINATES, Record, named
-from seecr.show.colours import COLOURS
+from seecr.show.colours import COLOURS, COMMAND, MUJOCO, SERIES
 from seecr.show.control import LEAST, schemes_json
 from seecr.show.figures import figure
 
@@ -22,6 +22,10 @@ def timed_json(result: TimedControl) -> dict[str, Record]:
     for name, one in result.schemes.items():
         out[name]["timed"] = one.records()
     return out
+
+
+# Instants that a recording shows.
+_MOST_INSTANTS = 4000
 
 
 def trace_csv(one: TimedScheme) -> str:
@@ -71,3 +75,37 @@ def _cables(ax: Any, one: TimedScheme, values: Array, what: str) -> None:
     ax.set_ylabel(f"{one.rest.scheme}\n{what}")
     if len(one.rest.solution.robot.cable_names) <= len(COLOURS):
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
+
+
+def write_timed_recording(one: TimedScheme, path: str | Path) -> None:
+    """Write what happened under a scheme over time: wanted, believed, true and read platform.
+
+    Raises:
+        InputFileError: the file cannot be written.
+    """
+    from seecr.show.scene import States
+    from seecr.show.stream import settling_index
+    from seecr.show.sweep_recording import Curves, Platform, write_platforms
+
+    trace, robot = one.trace, one.rest.solution.robot
+    some = slice(None, None, max(1, len(trace.t) // _MOST_INSTANTS))
+    row, poses, pulls, paid = (
+        values[some] for values in (trace.row, trace.pose, trace.tensions, trace.paid)
+    )
+    shown = {
+        "wanted": Platform("wanted", one.rest.solution.command[row], COMMAND),
+        "believed": Platform("believed", one.rest.believed[row], SERIES[2]),
+        "read": Platform("read", trace.read[some], SERIES[4]),
+        "true": Platform("mujoco", poses, MUJOCO, solid=True),
+    }
+    away = np.log10(np.maximum(away_mm(one)[some], LEAST))
+    turned = dict(zip(robot.cable_names, 1e3 * (paid - robot.rest_lengths).T, strict=True))
+    curves = [
+        Curves("plot/error", "From the wanted position, 10^… mm", {one.rest.scheme: away}),
+        Curves("plot/winches", "Winches from home [mm]", turned),
+    ]
+    write_platforms(
+        path, f"{robot.name} {one.rest.scheme}", robot, [settling_index(trace.t[some])],
+        list(shown.values()), ("mujoco", States(poses, pulls, paid, pulls <= 0.0)), curves,
+        {who: shown[who].colour for who in ("wanted", "read", "true")},
+    )  # fmt: skip

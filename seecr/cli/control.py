@@ -155,7 +155,7 @@ def command(
         if figure != "none":
             control_figure(folder / f"control.{figure}", result)
         if not no_recording:
-            from seecr.show.control_recording import write_control_recording
+            from seecr.show.control import write_control_recording
 
             write_control_recording(result, folder / "control.rrd")
     given = [part for o, p in (("--believes", believes), ("--is", true)) if p for part in (o, p)]

@@ -1,4 +1,4 @@
-"""What schemes of control did: rows for files, and a figure."""
+"""What schemes of control did: rows for files, a figure, and a recording."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from seecr.columns.csv import table_text
 from seecr.controlled.result import Control, Controlled
 from seecr.pose import Array
 from seecr.result import Record
-from seecr.show.colours import COLOURS
+from seecr.show.colours import COLOURS, COMMAND, SERIES, cable_colours
 from seecr.show.figures import figure
 from seecr.show.files import SweepRows
 from seecr.show.sweep_figure import along
@@ -119,3 +119,45 @@ def _settling(ax: Any, result: Control) -> None:
     ax.xaxis.get_major_locator().set_params(integer=True)
     ax.set_xlabel("step")
     ax.set_ylabel("largest error\nread [mm]")
+
+
+def write_control_recording(result: Control, path: str | Path) -> None:
+    """Write a recording: the wanted platform, and where it rests under each scheme.
+
+    With a single scheme also where its controller believes the platform, and what is read.
+
+    Raises:
+        InputFileError: the file cannot be written.
+    """
+    from seecr.show.stream import sweep_index
+    from seecr.show.sweep_recording import Curves, Platform, states_of_solution, write_platforms
+
+    every = list(result.schemes.values())
+    wanted, last = every[0].solution.command, every[-1]
+    shades = cable_colours(len(every))
+    shown = [
+        Platform("wanted", wanted, COMMAND),
+        *(
+            Platform(one.scheme, one.solution.pose, shade, solid=True)
+            for one, shade in zip(every, shades, strict=True)
+        ),
+    ]
+    who = {one.name: one.colour for one in shown[:3]}
+    if len(every) == 1:
+        more = [Platform("believed", last.believed, SERIES[2]),
+                Platform("read", last.read, SERIES[4])]  # fmt: skip
+        shown += more
+        who = {one.name: one.colour for one in (shown[0], *more)}
+    errors = Curves(
+        "plot/error", "Position error, 10^… mm", {one.scheme: _decade(one) for one in every}
+    )
+    write_platforms(
+        path, f"{result.robot.name} control", result.robot, sweep_index(wanted), shown,
+        (last.scheme, states_of_solution(last.solution)), [errors], who, last.rests,
+    )  # fmt: skip
+
+
+def _decade(one: Controlled) -> Array:
+    """Decimal logarithms (n,) of the distances [mm] from the wanted positions."""
+    off = 1e3 * np.linalg.norm(one.solution.deviation[:, :3], axis=1)
+    return np.asarray(np.log10(np.maximum(off, LEAST)))

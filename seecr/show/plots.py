@@ -196,29 +196,31 @@ def _reach(values: Array, low: float, high: float, wide: float, *, left: bool, t
     return float(near.max()) - low if top else high - float(near.min())
 
 
-def curves_of_cables(
+def merged_curves(
     curves: Sequence[Array], names: Sequence[str], size: tuple[float, float]
 ) -> tuple[dict[int, str], Legend]:
     """Curves that coincide are drawn once, if their legend has room; else each by itself.
 
     Returns:
-        For each cable that is drawn the names that its curve stands for, and the legend.
+        For each curve that is drawn the names that it stands for, and the legend.
     """
     said = {group[0]: joined([names[k] for k in group]) for group in alike(curves)}
     legend = legend_of(curves, list(said.values()), size)
     return (said if legend.fits else dict(enumerate(names))), legend
 
 
-def tension_view(
-    curves: Sequence[Array], names: Sequence[str], size: tuple[float, float], roots: Sequence[str]
-) -> rrb.TimeSeriesView:
-    """Tensions, with a legend if there is room for one; lanes have the same colours.
+def cables_view(
+    title: str, curves: Sequence[Array], names: Sequence[str], size: tuple[float, float],
+    roots: Sequence[str],
+) -> rrb.TimeSeriesView:  # fmt: skip
+    """A curve for each cable, with a legend if there is room for one; lanes have the same colours.
 
     Args:
-        curves, names, size: see :func:`curves_of_cables`. roots: under which they are logged.
+        title: of the plot. curves, names, size: see :func:`merged_curves`.
+        roots: under which they are logged.
     """
-    said, legend = curves_of_cables(curves, names, size)
-    title = "Tension [N]" + ("" if legend.fits else ", cables in the colours of their lanes")
+    said, legend = merged_curves(curves, names, size)
+    title += "" if legend.fits else ", cables in the colours of their lanes"
     contents = [f"{root}/{entity_of(names[k])}" for root in roots for k in said]
     return plot(title, contents, legend, listed=legend.fits)
 

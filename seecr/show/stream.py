@@ -106,9 +106,15 @@ def place_index(axis: str, places: Array) -> rr.TimeColumn | None:
 
 
 def opening(index: Sequence[rr.TimeColumn]) -> tuple[str, float]:
-    """The timeline that a recording opens with, and its step between two poses."""
+    """The timeline that a recording opens with, and its step between two poses.
+
+    Time plays at its own speed.
+    """
+    name = str(index[-1].timeline_name())
+    if name == SETTLING:
+        return name, 1.0
     steps = np.abs(np.diff(index[-1].as_arrow_array().to_numpy(zero_copy_only=False)))
-    return str(index[-1].timeline_name()), float(np.median(steps)) if len(steps) else 1.0
+    return name, float(np.median(steps)) if len(steps) else 1.0
 
 
 def settling_index(t_s: Array) -> rr.TimeColumn:

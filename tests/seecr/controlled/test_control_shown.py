@@ -9,9 +9,8 @@ from recordings import Readback
 
 import crosscheck
 import seecr
-from crosscheck.show.control_recording import write_timed_recording
-from seecr.show.control import control_figure
-from seecr.show.control_recording import write_control_recording
+from crosscheck.show.control import write_timed_recording
+from seecr.show.control import control_figure, write_control_recording
 
 COGIRO = seecr.load_robot(seecr.model_path("demobot_cogiro"))
 POSES = np.array([[x, 0.25, 0.15, 1, 0, 0, 0] for x in (0.3, 0.4, 0.5)])
