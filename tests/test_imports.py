@@ -127,12 +127,8 @@ USERS = {
     "crosscheck numba": "",
     "seecr importlib.import_module": "seecr: cli.group lazy",
     "crosscheck importlib.import_module": "",
-    "seecr rerun": (
-        "seecr.show: layout map_recording plots scene stream sweep_recording"
-    ),
-    "crosscheck rerun": (
-        "crosscheck.show: case_recording error_recordings misfit"
-    ),
+    "seecr rerun": ("seecr.show: layout map_recording plots scene stream sweep_recording"),
+    "crosscheck rerun": ("crosscheck.show: case_recording error_recordings"),
 }
 
 

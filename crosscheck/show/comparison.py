@@ -12,7 +12,6 @@ from crosscheck.comparison.quantities import QuantityKind, channels
 from crosscheck.comparison.result import Comparison, WorstRow
 from crosscheck.comparison.result import Group as Rows
 from crosscheck.fit.problem import Kind
-from crosscheck.show.arrows import Standing
 from crosscheck.show.blocks import (
     Block,
     Bold,
@@ -30,6 +29,7 @@ from crosscheck.show.blocks import (
     section,
     size_cells,
 )
+from crosscheck.show.misfit import Standing
 from crosscheck.show.residuals import (
     association_section,
     facts_of,

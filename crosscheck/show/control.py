@@ -85,7 +85,7 @@ def write_timed_recording(one: TimedScheme, path: str | Path) -> None:
     """
     from seecr.show.scene import States
     from seecr.show.stream import settling_index
-    from seecr.show.sweep_recording import Curves, Platform, write_platforms
+    from seecr.show.sweep_recording import Curves, MovingPlatform, write_platforms
 
     trace, robot = one.trace, one.rest.solution.robot
     some = slice(None, None, max(1, len(trace.t) // _MOST_INSTANTS))
@@ -93,10 +93,10 @@ def write_timed_recording(one: TimedScheme, path: str | Path) -> None:
         values[some] for values in (trace.row, trace.pose, trace.tensions, trace.paid)
     )
     shown = {
-        "wanted": Platform("wanted", one.rest.solution.command[row], COMMAND),
-        "believed": Platform("believed", one.rest.believed[row], SERIES[2]),
-        "read": Platform("read", trace.read[some], SERIES[4]),
-        "true": Platform("mujoco", poses, MUJOCO, solid=True),
+        "wanted": MovingPlatform("wanted", one.rest.solution.command[row], COMMAND),
+        "believed": MovingPlatform("believed", one.rest.believed[row], SERIES[2]),
+        "read": MovingPlatform("read", trace.read[some], SERIES[4]),
+        "true": MovingPlatform("mujoco", poses, MUJOCO, solid=True),
     }
     away = np.log10(np.maximum(away_mm(one)[some], LEAST))
     turned = dict(zip(robot.cable_names, 1e3 * (paid - robot.rest_lengths).T, strict=True))

@@ -18,22 +18,27 @@ from crosscheck.comparison.quantities import channels
 from crosscheck.comparison.result import Comparison
 from crosscheck.diagnosis.path import Stage
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.fit.problem import Kind, kinds_read
+from crosscheck.fit.problem import Kind
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.state import State
-from crosscheck.show import misfit
+from crosscheck.show.blocks import Bold
 from crosscheck.show.comparison import pose_errors_text, verdict_text
 from crosscheck.show.diagnosis import diagnosis_text, pose_of_step_text, step_text
-from crosscheck.show.misfit import MEASURED, Misfit
+from crosscheck.show.misfit import Misfit, predicted_poses
+from seecr.compiled.columns import REST
 from seecr.pose import Array
 from seecr.show import colours, layout, plots
 from seecr.show.colours import Rgba
 from seecr.show.plots import Legend, legend_of
-from seecr.show.scene import Scene, extent
+from seecr.show.scene import Scene, States, extent
 from seecr.show.stream import MODEL_STEP, Index, Recording, pose_index, recording_file
 from seecr.units import short
 
 VERDICT, NOW = "text/verdict", "text/now"
+MEASURED: colours.Rgba = colours.MUJOCO
+# Radii of arrows relative to the robot's size; of dots, rings and thin arrows in points of the
+# screen at any zoom, which Rerun expects as negative numbers.
+_ARROW, _DOT, _RING, _THIN = 0.0021, -5.0, -9.0, -0.8
 _STEPS_A_SECOND = 1.0
 # Size of a plot of a diagnosis and of a comparison, in points of a window of 1920 by 1080.
 _PLOT, _HALF = (820.0, 250.0), (630.0, 445.0)
@@ -61,15 +66,15 @@ def _scene_view(shown: Misfit, name: str, aspect: float) -> rrb.Spatial3DView:
 
 def _pose_by_pose(recording: Recording, scene: Scene, shown: Misfit, state: State) -> rr.TimeColumn:
     """What was measured and a model at each pose, and the maps, on which a ring follows."""
-    problem, states = shown.problem, misfit.states_of(state)
+    problem, states = shown.problem, states_of(state)
     index = pose_index(problem.data.n_rows)
     measured = np.where(problem.use[:, None], shown.measured, np.nan)
     scene.platform("measured", index, measured, MEASURED)
-    predicted = np.where(states.known[:, None], misfit.predicted_poses(state), np.nan)
+    predicted = np.where(states.known[:, None], predicted_poses(state), np.nan)
     scene.platform("model", index, predicted, colours.SEECR, solid=True)
     scene.cables("model", index, states)
-    misfit.maps(recording, pose_index(1), shown, [shown.first])
-    misfit.cursor(recording, index, shown)
+    maps(recording, pose_index(1), shown, [shown.first])
+    cursor(recording, index, shown)
     return index
 
 
@@ -93,12 +98,12 @@ def write_comparison_recording(found: Comparison, path: str | Path) -> None:
         top = colours.round_up(float(np.nanmax(found.state.prediction.tensions, initial=0.0)))
         scene = Scene(recording, problem.robot, shown.seen, top)
         scene.surroundings()
-        misfit.arrows(recording, pose_index(1), shown, [found.state], scene.size)
+        arrows(recording, pose_index(1), shown, [found.state], scene.size)
         index = _pose_by_pose(recording, scene, shown, found.state)
         for kind in kinds:
             _reading_plots(recording, index, found, kind)
         recording.texts(NOW, index, [pose_errors_text(found, k) for k in range(n)])
-        recording.text(VERDICT, verdict_text(found, kinds, misfit.misfit_words(shown)))
+        recording.text(VERDICT, verdict_text(found, kinds, misfit_words(shown)))
 
 
 def _comparison_layout(found: Comparison, shown: Misfit, name: str) -> rrb.Blueprint:
@@ -106,8 +111,8 @@ def _comparison_layout(found: Comparison, shown: Misfit, name: str) -> rrb.Bluep
     root = rrb.Horizontal(
         _scene_view(shown, name, 0.76),
         rrb.Vertical(
-            *misfit.map_views(shown),
-            misfit.panels(shown, [_reading_legend(found, kind) for kind in shown.kinds]),
+            *map_views(shown),
+            panels(shown, [_reading_legend(found, kind) for kind in shown.kinds]),
             row_shares=[*[1.0] * many, float(many)],
         ),
         _texts(2.4, 2.0),
@@ -162,25 +167,24 @@ def write_diagnosis_recording(found: Diagnosis, path: str | Path) -> None:
     name = f"diagnosis of {problem.robot.name}, {problem.data.name}"
     tensions = [stage.state.prediction.tensions for stage in (stages[0], stages[-1])]
     top = colours.round_up(float(np.nanmax(tensions, initial=0.0)))
-    with recording_file(path, name, _diagnosis_layout(found, stages, shown, name)) as recording:
+    with recording_file(path, name, _diagnosis_layout(stages, shown, name)) as recording:
         scene = Scene(recording, problem.robot, shown.seen, top)
         scene.surroundings()
         _over_steps(recording, scene, found, stages, shown)
         _over_poses(recording, scene, stages, shown)
-        recording.text(VERDICT, diagnosis_text(found, misfit.misfit_words(shown)))
+        recording.text(VERDICT, diagnosis_text(found, misfit_words(shown)))
 
 
-def _diagnosis_layout(
-    found: Diagnosis, stages: Sequence[Stage], shown: Misfit, name: str
-) -> rrb.Blueprint:
-    low, many = bars_share(found, stages), len(shown.kinds)
+def _diagnosis_layout(stages: Sequence[Stage], shown: Misfit, name: str) -> rrb.Blueprint:
+    many = len(shown.kinds)
+    low = bars_share(many, len(stages))
     legends = [_model_legend(stages, shown, kind) for kind in shown.kinds]
     root = rrb.Horizontal(
         rrb.Vertical(
-            _scene_view(shown, name, 1.22), misfit.panels(shown, legends), row_shares=[3.0, 1.3]
+            _scene_view(shown, name, 1.22), panels(shown, legends), row_shares=[3.0, 1.3]
         ),
         rrb.Vertical(
-            *misfit.map_views(shown), _bars_view(found, stages),
+            *map_views(shown), _bars_view(many, len(stages)),
             row_shares=[*[(1.0 - low) / many] * many, low],
         ),
         _texts(1.6, 2.0),
@@ -193,17 +197,17 @@ def _over_steps(
     recording: Recording, scene: Scene, found: Diagnosis, stages: Sequence[Stage], shown: Misfit
 ) -> None:
     """Everything that changes from model to model."""
-    count, worst = len(stages), misfit.worst_row(shown)
+    count, worst = len(stages), shown.worst_row
     index = rr.TimeColumn(MODEL_STEP, sequence=range(count))
     states = [stage.state for stage in stages]
-    misfit.arrows(recording, index, shown, states, scene.size)
-    misfit.maps(recording, index, shown, states)
+    arrows(recording, index, shown, states, scene.size)
+    maps(recording, index, shown, states)
     for block, kind in enumerate(shown.kinds):
         _bars_of(recording, index, found, stages, kind, block * _block_height(count))
     scene.platform("measured", index, np.tile(shown.measured[worst], (count, 1)), MEASURED)
-    predicted = np.stack([misfit.predicted_poses(state)[worst] for state in states])
+    predicted = np.stack([predicted_poses(state)[worst] for state in states])
     scene.platform("model", index, predicted, colours.SEECR, solid=True)
-    scene.cables("model", index, misfit.stacked([(state, worst) for state in states]))
+    scene.cables("model", index, _row_of_each(states, worst))
     line = int(shown.problem.data.line[worst])
     texts = [step_text(found, stages, k, shown.kinds, line) for k in range(count)]
     recording.texts(NOW, index, texts)
@@ -213,7 +217,7 @@ def _over_poses(recording: Recording, scene: Scene, stages: Sequence[Stage], sho
     """The measured poses one by one, under the first and the last model."""
     index = _pose_by_pose(recording, scene, shown, stages[-1].state)
     if len(stages) > 1:
-        scene.platform("first", index, misfit.predicted_poses(shown.first), colours.PINK)
+        scene.platform("first", index, predicted_poses(shown.first), colours.PINK)
     for kind in shown.kinds:
         _model_plots(recording, index, stages, shown, kind)
     problem, n = shown.problem, shown.problem.data.n_rows
@@ -227,7 +231,7 @@ def _model_plots(
     """The error of each pose under each model; over the steps, that on all test runs."""
     starts = shown.problem.experiment.commands.starts
     for k, stage in enumerate(stages):
-        sizes = kind.sizes(shown.problem, stage.state.raw) * kind.factor
+        sizes = shown.sizes(stage.state, kind)
         shade = colours.VERMILION if k == 0 else _BETWEEN[(k - 1) % len(_BETWEEN)]
         shade = colours.SKY if 0 < k == len(stages) - 1 else shade
         entity = f"plot/{kind.name}/model_{k}"
@@ -241,48 +245,171 @@ def _model_plots(
 
 def _model_legend(stages: Sequence[Stage], shown: Misfit, kind: Kind) -> Legend:
     """Its corner only: a longer axis would leave little room for the one curve over the steps."""
-    sizes = [kind.sizes(shown.problem, stage.state.raw) * kind.factor for stage in stages]
+    sizes = [shown.sizes(stage.state, kind) for stage in stages]
     legend = legend_of([np.stack(sizes, axis=1)], [stage.label for stage in stages], _PLOT)
     return replace(legend, values=None)
+
+
+# --- arrows and maps -----------------------------------------------------------------------------
+
+
+def states_of(state: State) -> States:
+    """The model's platform and cables at every row; NaN without equilibrium."""
+    prediction = state.prediction
+    pose = np.where(prediction.solved[:, None], prediction.pose, np.nan)
+    lengths = prediction.tables.cables[..., REST]
+    return States(pose, prediction.tensions, lengths, prediction.slack)
+
+
+def _row_of_each(states: Sequence[State], k: int) -> States:
+    """One row under several models."""
+    some = [states_of(state) for state in states]
+    return States(*(np.stack([getattr(one, name)[k] for one in some]) for name in vars(some[0])))
+
+
+def _shades(misfit: Misfit, state: State, kind: Kind) -> colours.Colours:
+    """(k, 4) colours of the rows that count."""
+    sizes = np.nan_to_num(misfit.sizes(state, kind)[misfit.rows])
+    return colours.scale_colours(sizes, misfit.top(kind))
+
+
+def arrows(
+    recording: Recording, index: Index, misfit: Misfit, states: list[State], size: float
+) -> None:
+    """At each time the errors of one model: arrows of position, or dots if none was read."""
+    rows, place = misfit.rows, misfit.place
+    count = [len(rows)] * len(states)
+    kind = misfit.kinds[0]
+    shade = np.concatenate([_shades(misfit, state, kind) for state in states])
+    origins = np.tile(place[rows], (len(states), 1))
+    if misfit.magnify:
+        vectors = np.concatenate([misfit.magnify * misfit.errors(state)[rows] for state in states])
+        columns = rr.Arrows3D.columns(origins=origins, vectors=vectors, colors=shade)
+        recording.rows("scene/errors", index, columns.partition(count))
+        recording.always("scene/errors", rr.Arrows3D.from_fields(radii=[_ARROW * size]))
+    else:
+        columns = rr.Points3D.columns(positions=origins, colors=shade)
+        recording.rows("scene/errors", index, columns.partition(count))
+        dots = rr.Points3D.from_fields(radii=[4.0 * _ARROW * size])
+        recording.always("scene/errors", dots)
+
+
+def maps(recording: Recording, index: Index, misfit: Misfit, states: list[State]) -> None:
+    """One map per kind of reading, with dots coloured by the error."""
+    rows = misfit.rows
+    for kind in misfit.kinds:
+        words = f"{misfit.top(kind):g} {kind.unit}"
+        draw_axes(recording, f"map/{kind.name}", _flat(misfit, misfit.place)[rows], words)
+    points = np.tile(_flat(misfit, misfit.place)[rows], (len(states), 1))
+    count = [len(rows)] * len(states)
+    for kind in misfit.kinds:
+        entity = f"map/{kind.name}/errors"
+        shade = np.concatenate([_shades(misfit, state, kind) for state in states])
+        columns = rr.Points2D.columns(positions=points, colors=shade)
+        recording.rows(entity, index, columns.partition(count))
+        recording.always(entity, rr.Points2D.from_fields(radii=[_DOT]))
+        if kind.name == "position" and misfit.magnify:
+            vectors = [
+                misfit.magnify * _flat(misfit, misfit.errors(state))[rows] for state in states
+            ]
+            thin = rr.Arrows2D.columns(vectors=np.concatenate(vectors), origins=points)
+            recording.rows(f"map/{kind.name}/arrows", index, thin.partition(count))
+            style = rr.Arrows2D.from_fields(radii=[_THIN], colors=[colours.SILVER])
+            recording.always(f"map/{kind.name}/arrows", style)
+
+
+def panels(misfit: Misfit, legends: Sequence[Legend]) -> rrb.Tabs:
+    """The plots of the errors, one per kind of reading, each with its legend."""
+    return rrb.Tabs(
+        *(
+            plots.plot(
+                f"{kind.name.capitalize()} error [{kind.unit}]", [f"plot/{kind.name}/**"], legend
+            )
+            for kind, legend in zip(misfit.kinds, legends, strict=True)
+        )
+    )
+
+
+def cursor(recording: Recording, index: Index, misfit: Misfit) -> None:
+    """A ring around the dot of the current row, on every map."""
+    points = _flat(misfit, misfit.place)
+    for kind in misfit.kinds:
+        entity = f"map/{kind.name}/here"
+        recording.rows(entity, index, rr.Points2D.columns(positions=points))
+        white = rr.Points2D.from_fields(radii=[_RING], colors=[(255, 255, 255, 120)])
+        recording.always(entity, white)
+
+
+def _flat(misfit: Misfit, vectors: Array) -> Array:
+    """(n, 2) coordinates in the map's plane, with the second axis up."""
+    first, second = misfit.views[0]
+    return np.stack([vectors[:, first], -vectors[:, second]], axis=1)
+
+
+def map_views(misfit: Misfit) -> list[rrb.Spatial2DView]:
+    """The maps' views."""
+    points = _flat(misfit, misfit.place)[misfit.rows]
+    across, down = bounds(points)
+    plane = ", ".join("xyz"[k] for k in misfit.views[0])
+    arrows = f", arrows {misfit.scale}" if misfit.magnify else ""
+    return [
+        rrb.Spatial2DView(
+            name=f"{kind.name.capitalize()} error [{kind.unit}] over {plane} [m]"
+            + arrows * (kind.name == "position"),
+            origin=f"map/{kind.name}",
+            background=rrb.Background(color=layout.GROUND),
+            visual_bounds=rrb.VisualBounds2D(x_range=across, y_range=down),
+        )
+        for kind in misfit.kinds
+    ]
+
+
+def misfit_words(misfit: Misfit) -> Sequence[str]:
+    """The meaning of arrows and colours, in a sentence or two."""
+    kind = misfit.kinds[0]
+    scale = f"from dark (none) to yellow ({misfit.top(kind):g} {kind.unit} or more)"
+    if not misfit.magnify:
+        return [f"Dots are measured poses, coloured by their {kind.name} error {scale}."]
+    return [
+        "Arrows at the measured poses point from the predicted to the measured position; they are "
+        "drawn ",
+        Bold(misfit.scale),
+        f" and coloured {scale}.",
+    ]
 
 
 # --- bars of the errors, model by model, compared with the noise; the current one is bright -------
 
 _BARS = "bars"
 # The drawing is 100 wide; y points down, with one row per model.
-_LEFT, _RIGHT, _ROW, _HEAD = 31.0, 82.0, 4.4, 5.6
+_BEGIN, _END, _ROW, _TITLE_ROW = 31.0, 82.0, 4.4, 5.6
 _DIM, _LABEL = 0.45, 2.2
 # Screen points per unit of the drawing, of the title, of a column; largest part of a column.
 _POINTS, _TITLE, _COLUMN, _MOST = 5.2, 32.0, 1010.0, 0.6
 
 
-def _bars_view(found: Diagnosis, stages: Sequence[Stage]) -> rrb.Spatial2DView:
+def _bars_view(kinds: int, models: int) -> rrb.Spatial2DView:
     """The bars' view."""
-    assert found.path is not None
-    height = _height(found, stages)
     return rrb.Spatial2DView(
         name="rms error on test runs, logarithmic; the line is the noise",
         origin=_BARS,
         background=rrb.Background(color=layout.GROUND),
-        visual_bounds=rrb.VisualBounds2D(x_range=(0.0, 100.0), y_range=(-1.0, height)),
+        visual_bounds=rrb.VisualBounds2D(
+            x_range=(0.0, 100.0), y_range=(-1.0, kinds * _block_height(models))
+        ),
     )
 
 
-def bars_share(found: Diagnosis, stages: Sequence[Stage]) -> float:
+def bars_share(kinds: int, models: int) -> float:
     """Height relative to a column in a window of 1080 points, with room for the labels.
 
     The viewer's letters keep their size whatever the size of the drawing.
     """
-    return min((_POINTS * _height(found, stages) + _TITLE) / _COLUMN, _MOST)
-
-
-def _height(found: Diagnosis, stages: Sequence[Stage]) -> float:
-    assert found.path is not None
-    return len(kinds_read(found.path.problem)) * _block_height(len(stages))
+    return min((_POINTS * kinds * _block_height(models) + _TITLE) / _COLUMN, _MOST)
 
 
 def _block_height(rows: int) -> float:
-    return _HEAD + rows * _ROW + 1.5
+    return _TITLE_ROW + rows * _ROW + 1.5
 
 
 def _bars_of(
@@ -293,10 +420,10 @@ def _bars_of(
     values = np.array([kind.factor * (s.held_out.rms[kind.key] or 0.0) for s in stages])
     floor = kind.factor * (found.floor.get(kind.key) or 0.0)
     ends = _bar_ends(values, values, floor)
-    rows = top + _HEAD + _ROW * (np.arange(len(stages)) + 0.5)
+    rows = top + _TITLE_ROW + _ROW * (np.arange(len(stages)) + 0.5)
     lit = np.array([_lit(stage, found) for stage in stages], dtype=np.uint8)
     root = f"{_BARS}/{kind.name}"
-    strips = [np.array([[_LEFT, y], [x, y]]) for x, y in zip(ends, rows, strict=True)]
+    strips = [np.array([[_BEGIN, y], [x, y]]) for x, y in zip(ends, rows, strict=True)]
     thick = 0.3 * _ROW
     # the viewer draws 2D boxes as outlines only, so bars are thick lines
     dim = (_DIM * lit).astype(np.uint8)
@@ -313,21 +440,21 @@ def _bars_of(
     # above their points, as the viewer draws labels below them
     above = rows - _LABEL
     names, numbers = [s.label for s in stages], [f"{short(v)} {kind.unit}" for v in values]
-    recording.labels(f"{root}/names", [(0.5 * _LEFT, y) for y in above], names)
+    recording.labels(f"{root}/names", [(0.5 * _BEGIN, y) for y in above], names)
     recording.labels(f"{root}/numbers", np.stack([ends + 8.0, above], axis=1), numbers)
     title = f"{kind.name} [{kind.unit}], noise {short(floor)}"
-    place = (0.5 * (_LEFT + _RIGHT), top + 0.55 * _HEAD - _LABEL)
+    place = (0.5 * (_BEGIN + _END), top + 0.55 * _TITLE_ROW - _LABEL)
     recording.labels(f"{root}/title", [place], [title])
 
 
 def _bar_ends(values: np.ndarray, every: np.ndarray, floor: float) -> np.ndarray:
     """Ends of the bars: logarithmic from half the noise, or linear without noise."""
     if floor <= 0.0:
-        return _LEFT + (_RIGHT - _LEFT) * values / max(float(every.max()), 1e-300)
+        return _BEGIN + (_END - _BEGIN) * values / max(float(every.max()), 1e-300)
     low = np.log(0.5 * min(floor, float(every[every > 0].min(initial=floor))))
     high = np.log(max(float(every.max()), 2.0 * floor))
     part = (np.log(np.maximum(values, 1e-300)) - low) / (high - low)
-    return np.asarray(_LEFT + (_RIGHT - _LEFT) * np.clip(part, 0.01, 1.0))
+    return np.asarray(_BEGIN + (_END - _BEGIN) * np.clip(part, 0.01, 1.0))
 
 
 def _lit(stage: Stage, found: Diagnosis) -> Rgba:
@@ -335,3 +462,72 @@ def _lit(stage: Stage, found: Diagnosis) -> Rgba:
         calm = found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
         return colours.SILVER if calm else colours.VERMILION
     return colours.SKY
+
+
+# --- axes of maps ---------------------------------------------------------------------------------
+
+# Ticks of an axis; slices of the bar; radii of lines in points of the screen.
+_TICKS, _SLICES, _LINE = 3, 32, 0.8
+# Margin of the dots, and positions of axes and bar in it, relative to the larger side of the map.
+_MARGIN, _ABOVE, _BELOW, _BAR = 0.08, 0.12, 0.24, 0.14
+# Numbers are left of the map, the bar and its words right of it; text keeps its size in points.
+_LEFT, _RIGHT = 0.3, 0.7
+_TICK, _THICK, _WORDS = 0.02, 0.035, 0.27
+
+
+def bounds(points: Array) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Ranges of a view along both axes, for a map of points (n, 2)."""
+    low, high, size = _box(points)
+    return (low[0] - _LEFT * size, high[0] + _RIGHT * size), (
+        low[1] - _ABOVE * size,
+        high[1] + _BELOW * size,
+    )
+
+
+def draw_axes(recording: Recording, entity: str, points: Array, words: str) -> None:
+    """Two axes with round numbers in metres, for points (n, 2) whose second axis points down; the
+    bar of colours ends at ``words``, such as "5 mm".
+    """
+    low, high, size = _box(points)
+    corner = np.array([low[0], high[1]])
+    tick = _TICK * size
+    lines = [np.array([corner, [high[0], high[1]]]), np.array([corner, [low[0], low[1]]])]
+    labels, places = [], []
+    for value in _round(low[0], high[0]):
+        lines.append(np.array([[value, high[1]], [value, high[1] + tick]]))
+        labels.append(f"{value:g}")
+        places.append((value, high[1] + tick))
+    for value in _round(-high[1], -low[1]):
+        lines.append(np.array([[low[0] - tick, -value], [low[0], -value]]))
+        labels.append(f"{value:g}")
+        # the viewer draws labels below their points
+        places.append((low[0] - 5.0 * tick, -value - 2.2 * tick))
+    strips = rr.LineStrips2D(lines, radii=-_LINE, colors=colours.FRAME)
+    recording.always(f"{entity}/axes", strips)
+    _bar(recording, f"{entity}/scale", low, high, size)
+    x = high[0] + (_BAR + _WORDS) * size
+    ends = [(x, low[1] - 2.2 * tick), (x, high[1] - 2.2 * tick)]
+    recording.labels(f"{entity}/numbers", [*places, *ends], [*labels, words, "0"])
+
+
+def _bar(recording: Recording, entity: str, low: Array, high: Array, size: float) -> None:
+    """The colour scale, with 0 at the bottom."""
+    x, y = high[0] + _BAR * size, np.linspace(high[1], low[1], _SLICES + 1)
+    pieces = [np.array([[x, y[i]], [x, y[i + 1]]]) for i in range(_SLICES)]
+    shades = colours.scale_colours(np.linspace(0.0, 1.0, _SLICES), 1.0)
+    radius = 0.5 * _THICK * size
+    recording.always(entity, rr.LineStrips2D(pieces, radii=radius, colors=shades))
+
+
+def _box(points: Array) -> tuple[Array, Array, float]:
+    """Corners of the axes' frame, and the map's larger side, positive even for one point."""
+    size = max(float(np.max(np.ptp(points, axis=0))), 1e-9)
+    margin = _MARGIN * size
+    return points.min(axis=0) - margin, points.max(axis=0) + margin, size
+
+
+def _round(low: float, high: float) -> Array:
+    """Round numbers within a range."""
+    step = colours.round_up((high - low) / _TICKS)
+    # the smallest integer above -0.3 is -0, which would be written so
+    return step * np.arange(np.ceil(low / step), np.floor(high / step) + 1.0) + 0.0

@@ -15,14 +15,9 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backend_bases import RendererBase
-from matplotlib.backends.backend_agg import FigureCanvasAgg, RendererAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from matplotlib.lines import Line2D
-from matplotlib.patches import PathPatch
-from matplotlib.path import Path
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from seecr.pose import Array
@@ -38,6 +33,9 @@ _ROOM = 0.09
 
 # Of the ticks for which Matplotlib sees room: labels such as 0.003 are wider than it thinks.
 _OF_ROOM = 0.7
+
+# The same figure is the same file.
+_NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 
 MANY = 400
 """More marks than this are drawn as an image: the page is to stay small."""
@@ -55,6 +53,7 @@ _STYLE: Any = {
     **dict.fromkeys(("xtick.labelsize", "ytick.labelsize"), 7.5),
     **dict.fromkeys(("xtick.major.width", "ytick.major.width"), 0.6),
     "figure.dpi": 72, "savefig.dpi": 130,
+    "path.simplify": False,  # it would take dots for needless points of a line
 }  # fmt: skip
 
 
@@ -65,12 +64,14 @@ def styled() -> Iterator[None]:
         yield
 
 
-def blank(height: float, width: float = WIDTH, *, constrained: bool = True) -> Figure:
-    """An empty figure, so high and wide [in], in which Matplotlib finds room for all labels if it
-    is ``constrained``, which takes its time.
+def blank(height: float, width: float = WIDTH, *, layout: str = "constrained") -> Figure:
+    """An empty figure, so high and wide [in].
+
+    Matplotlib finds room for all labels, which takes its time: "constrained", or "compressed" for
+    panels of equal scales. With "none" the caller does.
     """
-    layout = ConstrainedLayoutEngine(w_pad=_ROOM) if constrained else None
-    figure = Figure(figsize=(width, height), layout=layout)
+    engine = ConstrainedLayoutEngine(w_pad=_ROOM, compress=layout == "compressed")
+    figure = Figure(figsize=(width, height), layout=None if layout == "none" else engine)
     FigureCanvasSVG(figure)
     return figure
 
@@ -80,111 +81,78 @@ def grid(axes: Axes, axis: str = "both") -> None:
     axes.grid(True, axis=axis, color=FAINT, linewidth=0.7)  # type: ignore[arg-type]
 
 
-_folder: ContextVar[FilePath | None] = ContextVar("folder", default=None)
-
-
-@contextmanager
-def keeping(folder: FilePath | None) -> Iterator[None]:
-    """Figures that are drawn meanwhile are kept in a folder too, as SVG and PNG."""
-    token = _folder.set(folder)
-    try:
-        yield
-    finally:
-        _folder.reset(token)
-
-
-_collected: ContextVar[dict[str, Figure] | None] = ContextVar("collected", default=None)
+_drawn: ContextVar[dict[str, Figure] | None] = ContextVar("drawn", default=None)
 
 
 @contextmanager
 def collecting() -> Iterator[dict[str, Figure]]:
-    """The figures that are drawn meanwhile, by the names of the files they would be kept in."""
+    """The figures that are drawn meanwhile, by the names of the files they are kept in."""
     drawn: dict[str, Figure] = {}
-    token = _collected.set(drawn)
+    token = _drawn.set(drawn)
     try:
         yield drawn
     finally:
-        _collected.reset(token)
+        _drawn.reset(token)
 
 
-def _keep(figure: Figure, svg: bytes, words: str) -> None:
-    folder, drawn = _folder.get(), _collected.get()
-    name = re.sub(r"[^a-z0-9]+", "-", words.lower()).strip("-")
-    if drawn is not None:
-        drawn[name] = figure
-    if folder is None:
-        return
-    (folder / f"{name}.svg").write_bytes(svg)
-    FigureCanvasAgg(figure)
-    figure.savefig(folder / f"{name}.png", metadata={"Software": None})
-    FigureCanvasSVG(figure)
+@contextmanager
+def keeping(folder: FilePath) -> Iterator[None]:
+    """Figures that are drawn meanwhile are kept in a folder too, as SVG and PNG."""
+    with collecting() as drawn:
+        yield
+    with styled():
+        for name, figure in drawn.items():
+            for kind, metadata in (("svg", _NO_METADATA), ("png", {"Software": None})):
+                path = folder / f"{name}.{kind}"
+                figure.savefig(path, metadata=metadata, bbox_inches="tight", pad_inches=_ROOM)
 
 
-def image(figure: Figure, words: str) -> str:
-    """The figure as an element of the page; ``words`` say what it shows to who cannot see it."""
+def image(figure: Figure, words: str, *, cut: bool = False) -> str:
+    """The figure as an element of the page; ``words`` say what it shows to who cannot see it.
+
+    ``cut`` to what is drawn, where the layout leaves room around it.
+    """
     buffer = io.BytesIO()
     if (layout := figure.get_layout_engine()) is not None:
         # else Matplotlib draws all of it once more, to find that out
         layout.execute(figure)
         figure.set_layout_engine("none")
-    nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
-    figure.savefig(buffer, format="svg", metadata=nothing)
-    _keep(figure, buffer.getvalue(), words)
+    around = figure.get_tightbbox().padded(_ROOM) if cut else figure.bbox_inches
+    box = around if cut else None
+    figure.savefig(buffer, format="svg", metadata=_NO_METADATA, bbox_inches=box)
+    if (drawn := _drawn.get()) is not None:
+        drawn[re.sub(r"[^a-z0-9]+", "-", words.lower()).strip("-")] = figure
     text = base64.b64encode(buffer.getvalue()).decode("ascii")
     alt = html.escape(words, quote=True)
     # a narrower figure is that part of the page's width: its letters are as large as others'
-    part = figure.get_figwidth() / WIDTH
+    part = around.width / WIDTH
     style = f' style="--part: {part:.3f}"' if part < 1.0 else ""
     return f'<img alt="{alt}"{style} src="data:image/svg+xml;base64,{text}">'
 
 
-class _Dots(PathPatch):
-    """Lines from a point to itself with round ends: dots in SVG, in a tenth of the text.
-
-    Agg leaves out lines without length: for it they are drawn as markers.
-    """
-
-    def __init__(self, points: Array, size: float, colour: str, order: float) -> None:
-        codes = np.tile(np.array([Path.MOVETO, Path.LINETO], dtype=np.uint8), len(points))
-        path = Path(np.repeat(points, 2, axis=0), codes)
-        path.should_simplify = False  # it would take dots for needless points of a line
-        super().__init__(
-            path, fill=False, edgecolor=colour, linewidth=size, capstyle="round", zorder=order
-        )
-        self._markers = Line2D(*points.T, **_as_markers(size, colour))
-
-    def draw(self, renderer: RendererBase) -> None:
-        """Draw them as the renderer shows them."""
-        if not isinstance(renderer, RendererAgg):
-            super().draw(renderer)
-            return
-        assert self.axes is not None
-        self._markers.set_figure(self.axes.figure)
-        self._markers.set_transform(self.axes.transData)
-        self._markers.set_clip_path(self.axes.patch)
-        self._markers.draw(renderer)
-
-
-def _as_markers(size: float, colour: str) -> dict[str, Any]:
-    return {
-        "linestyle": "none", "marker": "o", "markersize": size, "markeredgewidth": 0,
-        "color": colour,
-    }  # fmt: skip
+# A dot is a line so long, as a part of the axis, with round ends.
+_POINT = 1e-5
 
 
 def dots(axes: Axes, x: Array, y: Array, size: float, colour: str, order: float) -> None:
-    """Round dots of one colour, so many points wide."""
-    seen = np.isfinite(x) & np.isfinite(y)
-    points = np.stack([x[seen], y[seen]], axis=1)
-    if len(points) == 0:
+    """Round dots of one colour, so many points wide, on an axis whose limits are known.
+
+    As lines from each point to next to it they are a tenth of the text of markers in an SVG. Many
+    are an image anyway.
+    """
+    x, y = x[np.isfinite(x) & np.isfinite(y)], y[np.isfinite(x) & np.isfinite(y)]
+    if len(x) > MANY:
+        axes.plot(
+            x, y, linestyle="none", marker="o", markersize=size, markeredgewidth=0, color=colour,
+            zorder=order,
+        )  # fmt: skip
         return
-    if len(points) > MANY:
-        axes.plot(*points.T, zorder=order, **_as_markers(size, colour))
-        return
-    # add_patch would look for the bends of each dot
-    axes.add_artist(_Dots(points, size, colour, order))
-    axes.update_datalim(points)
-    axes.autoscale_view()
+    low, high = axes.get_xlim()
+    ends = np.stack([x, x + _POINT * (high - low), np.full(len(x), np.nan)], axis=1)
+    axes.plot(
+        ends.ravel(), np.repeat(y, 3), color=colour, linewidth=size, solid_capstyle="round",
+        zorder=order, snap=False,
+    )  # fmt: skip
 
 
 class _Decades(LogLocator):

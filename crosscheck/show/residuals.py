@@ -6,7 +6,6 @@ from collections.abc import Iterable
 
 from crosscheck.comparison.associations import Association
 from crosscheck.fit.problem import Problem, kinds_read
-from crosscheck.show.arrows import Drawn
 from crosscheck.show.blocks import (
     Bar,
     Cell,
@@ -19,6 +18,7 @@ from crosscheck.show.blocks import (
     pieces,
     section,
 )
+from crosscheck.show.misfit import Drawn
 from seecr.counted import counted
 from seecr.description.robot import Robot
 from seecr.units import chance, in_unit, short

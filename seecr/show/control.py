@@ -130,22 +130,27 @@ def write_control_recording(result: Control, path: str | Path) -> None:
         InputFileError: the file cannot be written.
     """
     from seecr.show.stream import sweep_index
-    from seecr.show.sweep_recording import Curves, Platform, states_of_solution, write_platforms
+    from seecr.show.sweep_recording import (
+        Curves,
+        MovingPlatform,
+        states_of_solution,
+        write_platforms,
+    )
 
     every = list(result.schemes.values())
     wanted, last = every[0].solution.command, every[-1]
     shades = cable_colours(len(every))
     shown = [
-        Platform("wanted", wanted, COMMAND),
+        MovingPlatform("wanted", wanted, COMMAND),
         *(
-            Platform(one.scheme, one.solution.pose, shade, solid=True)
+            MovingPlatform(one.scheme, one.solution.pose, shade, solid=True)
             for one, shade in zip(every, shades, strict=True)
         ),
     ]
     who = {one.name: one.colour for one in shown[:3]}
     if len(every) == 1:
-        more = [Platform("believed", last.believed, SERIES[2]),
-                Platform("read", last.read, SERIES[4])]  # fmt: skip
+        more = [MovingPlatform("believed", last.believed, SERIES[2]),
+                MovingPlatform("read", last.read, SERIES[4])]  # fmt: skip
         shown += more
         who = {one.name: one.colour for one in (shown[0], *more)}
     errors = Curves(

@@ -35,7 +35,7 @@ _WIDTH, _HEIGHT, _TITLE = 850.0, 1000.0, 55.0
 
 
 @dataclass(frozen=True, eq=False)
-class Platform:
+class MovingPlatform:
     """A platform as it is drawn: poses (n, 7), its colour, solid or its edges alone."""
 
     name: str
@@ -64,12 +64,12 @@ def write_sweep_recording(solution: Solution, path: str | Path, commanded: bool 
     Raises:
         InputFileError: the file cannot be written.
     """
-    robot, shown = solution.robot, [Platform("seecr", solution.pose, SEECR, solid=True)]
+    robot, shown = solution.robot, [MovingPlatform("seecr", solution.pose, SEECR, solid=True)]
     curves: list[Curves] = []
     who = {"SEECR": SEECR}
     index = [pose_index(len(solution))]
     if commanded:
-        shown.append(Platform("command", solution.command, COMMAND))
+        shown.append(MovingPlatform("command", solution.command, COMMAND))
         who, index = {"command": COMMAND, **who}, sweep_index(solution.command)
         off = plots.deviation(solution.pose, solution.command)
         moved = {name: off.pop(name) for name in plots.TRANSLATIONS}
@@ -89,7 +89,7 @@ def states_of_solution(solution: Solution) -> States:
 
 def write_platforms(
     path: str | Path, name: str, robot: Robot, index: Sequence[rr.TimeColumn],
-    platforms: Sequence[Platform], cables: tuple[str, States], curves: Sequence[Curves],
+    platforms: Sequence[MovingPlatform], cables: tuple[str, States], curves: Sequence[Curves],
     who: Mapping[str, Rgba], known: NDArray[np.bool_] | None = None,
 ) -> None:  # fmt: skip
     """Write a recording of platforms over timelines.

@@ -16,7 +16,7 @@ from PIL import Image
 
 from crosscheck.show import error_figures
 from crosscheck.show.error_figures import rows_per_arrow
-from crosscheck.show.figures import MANY, blank, dots, image, keeping, plain_log, styled
+from crosscheck.show.figures import MANY, blank, collecting, dots, image, plain_log, styled
 
 
 def drawn(points: int) -> str:
@@ -51,15 +51,16 @@ def test_dots_that_were_not_read_are_not_drawn(points: int) -> None:
         assert text.count("<use") >= points - 1
 
 
-def kept_dots(folder: Path, points: int) -> tuple[float, float, float]:
-    """Of one dot among so many that are kept as PNG: its middle and width, in parts of the page."""
-    with styled(), keeping(folder):
-        figure = blank(2.0, 2.0, constrained=False)
+def dots_on_png(folder: Path, points: int) -> tuple[float, float, float]:
+    """Of one dot among so many on a PNG: its middle and width, in parts of the picture."""
+    with styled(), collecting() as drawn:
+        figure = blank(2.0, 2.0, layout="none")
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        dots(axes, np.full(points, 0.25), np.full(points, 0.75), 14.4, "#ff0000", 1.0)
         axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+        dots(axes, np.full(points, 0.25), np.full(points, 0.75), 14.4, "#ff0000", 1.0)
         axes.set_axis_off()
-        image(figure, "dots")
+        image(figure, "some dots")
+    drawn["some-dots"].savefig(folder / "dots.png", dpi=130)
     with Image.open(folder / "dots.png") as taken:
         red = np.asarray(taken.convert("RGB"))[..., 1] < 128
     down, across = np.nonzero(red)
@@ -70,7 +71,7 @@ def kept_dots(folder: Path, points: int) -> tuple[float, float, float]:
 @pytest.mark.parametrize("points", [1, MANY + 2])
 def test_dots_are_on_the_png_too_where_they_are_and_as_large(tmp_path: Path, points: int) -> None:
     """14.4 pt are a tenth of 2 in."""
-    assert kept_dots(tmp_path, points) == pytest.approx((0.25, 0.75, 0.1), abs=0.01)
+    assert dots_on_png(tmp_path, points) == pytest.approx((0.25, 0.75, 0.1), abs=0.01)
 
 
 @pytest.mark.parametrize(("rows", "every"), [(1, 1), (250, 1), (251, 2), (1000, 4)])
@@ -104,7 +105,7 @@ def test_dots_of_small_errors_stand_out_from_light_and_dark_pages() -> None:
 
 def test_labels_of_a_wide_range_are_plain_numbers_that_do_not_touch() -> None:
     with styled():
-        figure = blank(1.2, 3.0, constrained=False)
+        figure = blank(1.2, 3.0, layout="none")
         axes = figure.subplots()
         plain_log(axes)
         for low, top, least in ((0.01, 30.0, 4), (1.0, 1e2, 5), (1e-2, 1e3, 5)):

@@ -12,7 +12,7 @@ from made_data import soft_cogiro
 from recordings import Readback
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.show.misfit import draw_axes
+from crosscheck.show.error_recordings import draw_axes
 from seecr.errors import InputFileError
 from seecr.show import layout, plots
 from seecr.show.map_recording import write_map_recording

@@ -55,7 +55,11 @@ def test_a_timed_recording_goes_by_the_clock(tmp_path: Path) -> None:
     seen = Readback(tmp_path / "timed.rrd")
     drawn = seen.entities("settling_time")
     assert {f"/scene/{who}/platform" for who in ("wanted", "believed", "read", "mujoco")} <= drawn
-    assert {"/plot/error", "/plot/tension/cable1", "/plot/winches/cable8"} <= drawn
-    assert np.allclose(seen.seconds("/plot/error"), one.trace.t, atol=1e-6)
+    assert {
+        "/plot/error/elastic\\+pose_feedback",
+        "/plot/tension/cable1",
+        "/plot/winches/cable8",
+    } <= drawn
+    assert np.allclose(seen.seconds("/plot/error/elastic\\+pose_feedback"), one.trace.t, atol=1e-6)
     pulls = seen.scalars("/plot/tension/cable3", "settling_time")
     assert np.allclose(pulls, one.trace.tensions[:, 2])
