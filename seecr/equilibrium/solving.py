@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from seecr.arguments import finite, whole
 from seecr.commands import Commands
-from seecr.compiled.columns import STRAIN
 from seecr.counted import counted, some
 from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
@@ -228,7 +227,7 @@ def strained_rows(solution: Solution) -> tuple[str, ...]:
     """
     known = np.isfinite(solution.tensions).all(axis=1)
     robot, rests = solution.robot, np.flatnonzero(solution.converged & known)
-    strains = solution.evaluation.states[rests, :, STRAIN] * robot.driven
+    strains = solution.evaluation.strain[rests] * robot.driven
     if not np.any(strains >= _ODD) or strained(robot):
         return ()
     at = int(np.argmax(strains.max(axis=1)))

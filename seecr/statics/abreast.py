@@ -22,20 +22,21 @@ class Rested:
     Attributes:
         outcome: -1 where the descent is left to the compiled loop.
         count: evaluations. residual: relative to the load. energy: [J].
-        deviation: (n, 7). values: (n, d) of joints. pulls: (n, m) tensions [N], negative where a
-            cable is slack.
+        deviation: (n, 7). values: (n, d) of joints. pulls: (n, m) tensions [N].
+            longer: (n, m) cables that are longer than their span, where not lanes found the rest.
     """
 
     def __init__(self, n: int, m: int, d: int) -> None:
         self.outcome, self.count = np.full(n, -1), np.zeros(n, dtype=np.int64)
         self.residual, self.energy = np.empty(n), np.empty(n)
-        self.deviation, self.pulls = np.empty((n, 7)), np.empty((n, m))
-        self.values = np.zeros((n, d))
+        self.deviation, self.values = np.empty((n, 7)), np.zeros((n, d))
+        self.pulls, self.longer = np.zeros((n, m)), np.zeros((n, m), dtype=bool)
 
-    def put(self, rows: NDArray[np.intp], found: Any, check: Any, pulls: Array) -> None:
+    def put(self, rows: NDArray[np.intp], found: Any, check: Any) -> None:
         """Overwrite rows with what the compiled loop found, and with an evaluation there."""
         self.outcome[rows], self.count[rows] = found.outcome, found.count
-        self.deviation[rows], self.pulls[rows] = check.deviation, pulls
+        self.deviation[rows], self.pulls[rows] = check.deviation, check.tension
+        self.longer[rows] = check.loose
         self.values[rows] = check.values
         self.residual[rows], self.energy[rows] = check.residual, check.energy
 
@@ -71,15 +72,13 @@ def _places(tables: Tables) -> list[int] | None:
 
 def descend_in_lanes(
     tables: Tables, start: Array | None, start_values: Array | None, limit: int,
-    threads: int | None,
-) -> Rested:  # fmt: skip
+    threads: int | None, out: Rested,
+) -> None:  # fmt: skip
     """Descend from the deviations ``start`` (n, 7), none by default, and joints' values (n, d)."""
     from seecr.compiled.lanes import descend_abreast  # takes a while to import
 
     cables, paid, load = told_apart(tables)
-    n, m = paid.shape[:2]
-    places = _places(tables)
-    out, axes = Rested(n, m, tables.n_dof), np.zeros((4, 3))
+    n, places, axes = len(paid), _places(tables), np.zeros((4, 3))
     first = np.zeros((n, 4 if places else 0))
     starts = np.zeros((0, 7)) if start is None else np.array(start, order="C")
     values = first.copy()
@@ -98,9 +97,9 @@ def descend_in_lanes(
         )  # fmt: skip
 
     in_parts(run, n, threads)
+    np.maximum(out.pulls, 0.0, out=out.pulls)  # negative where a cable is slack
     if places:
         out.values = values[:, places]
-    return out
 
 
 def stiffness_in_lanes(tables: Tables, deviation: Array) -> Array:

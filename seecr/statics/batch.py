@@ -30,6 +30,7 @@ from seecr.compiled.columns import (
     SINGULAR,
     SLACK,
     STALLED,
+    STRAIN,
     TENSION,
     TOLERANCE,
 )
@@ -46,7 +47,17 @@ from seecr.statics.abreast import (
     descend_in_lanes,
     stiffness_in_lanes,
 )
-from seecr.statics.tables import ByRow, Tables, by_row, rest_lengths_of, take
+from seecr.statics.tables import (
+    PORTION,
+    ByRow,
+    Tables,
+    by_row,
+    portions,
+    rest_lengths_of,
+    shared_cables,
+    take,
+    told_apart,
+)
 
 
 @dataclass(eq=False)
@@ -96,6 +107,16 @@ class Evaluation(ByRow):
         """(n, m) [N] tensions."""
         return np.asarray(self.states[..., TENSION])
 
+    @property
+    def strain(self) -> Array:
+        """(n, m) strains of the cables."""
+        return np.asarray(self.states[..., STRAIN])
+
+    @property
+    def loose(self) -> NDArray[np.bool_]:
+        """(n, m) cables that are longer than their span."""
+        return np.asarray(self.states[..., SLACK] > 0.5)
+
     def there(self) -> Evaluation:
         """Nothing evaluated yet, with the platform and its catenaries where they are here."""
         out = Evaluation.empty(*self.slopes.shape)
@@ -103,21 +124,23 @@ class Evaluation(ByRow):
         return out
 
 
-class Abreast(Evaluation):
-    """What lanes found: where the platforms rest, and the pulls of the cables.
+class Brief(Evaluation):
+    """Where many platforms rest, and what their cables do: tensions, and which are loose.
 
-    All else takes more memory, and longer to write than the rest to find: it is evaluated when it
-    is asked for.
+    All else takes more memory, and longer to write than a rest takes to find in lanes: it is
+    evaluated when it is asked for.
     """
 
     tables: Tables
+    for_lanes: bool
     pulls: Array
-    alone: NDArray[np.bool_]  # (n,) rows that lanes left to the compiled loop
+    longer: NDArray[np.bool_]
+    alone: NDArray[np.bool_]  # (n,) rows of the compiled loop, not of lanes
 
     @classmethod
-    def of(cls, tables: Tables, found: Rested, alone: NDArray[np.bool_]) -> Abreast:
+    def of(cls, tables: Tables, found: Rested, for_lanes: bool, alone: NDArray[np.bool_]) -> Brief:
         out = cls.__new__(cls)
-        vars(out).update(vars(found), tables=tables, alone=alone)
+        vars(out).update(vars(found), tables=tables, for_lanes=for_lanes, alone=alone)
         return out
 
     def columns(self) -> dict[str, NDArray[Any]]:
@@ -133,18 +156,25 @@ class Abreast(Evaluation):
     def _with(self, tables: Tables, of: Callable[[NDArray[Any]], NDArray[Any]]) -> Self:
         """The same with other arrays: all that there are so far."""
         out = type(self).__new__(type(self))
-        own = {name: of(each) for name, each in vars(self).items() if name != "tables"}
-        vars(out).update(own, tables=tables)
+        arrays = {k: of(each) for k, each in vars(self).items() if isinstance(each, np.ndarray)}
+        vars(out).update(arrays, tables=tables, for_lanes=self.for_lanes)
         return out
 
     def put(self, rows: NDArray[np.integer] | NDArray[np.bool_], other: Evaluation) -> None:
         super().put(rows, other)  # type: ignore[arg-type]
-        self.pulls[rows] = np.where(other.states[..., SLACK] > 0.5, -1.0, other.tension)
-        self.alone[rows] = True
+        self.pulls[rows], self.longer[rows], self.alone[rows] = other.tension, other.loose, True
 
     @property
     def tension(self) -> Array:
-        return np.maximum(self.pulls, 0.0)
+        return self.pulls
+
+    @property
+    def loose(self) -> NDArray[np.bool_]:
+        return self.longer
+
+    @property
+    def strain(self) -> Array:
+        return self._evaluated(lambda at: at.strain)
 
     def there(self) -> Evaluation:
         out = Evaluation.at_commands(self.tables)
@@ -154,15 +184,25 @@ class Abreast(Evaluation):
     def __getattr__(self, name: str) -> Array:
         if name not in {field.name for field in fields(Evaluation)} or "tables" not in vars(self):
             raise AttributeError(name)
-        if name == "hessian" and self.tables.screws.shape[1] == 0:
-            vars(self)[name] = stiffness_in_lanes(self.tables, self.deviation)
-        elif name == "guess":
-            vars(self)[name] = np.zeros((*self.pulls.shape, 3))
+        own = vars(self)
+        if name == "hessian" and self.for_lanes and self.tables.screws.shape[1] == 0:
+            own[name] = stiffness_in_lanes(self.tables, self.deviation)
+        elif name == "guess" and self.for_lanes:  # straight cables have none
+            own[name] = np.zeros((*self.pulls.shape, 3))
+        elif len(self.outcome) > PORTION:
+            own[name] = self._evaluated(lambda at: getattr(at, name))
         else:
             at = evaluate(self.tables, self, threads=None)
-            for each in ("gradient", "hessian", "states", "slopes"):
-                vars(self).setdefault(each, getattr(at, each))
-        return np.asarray(vars(self)[name])
+            for each in ("gradient", "hessian", "states", "slopes", "guess"):
+                own.setdefault(each, getattr(at, each))
+        return np.asarray(own[name])
+
+    def _evaluated(self, of: Callable[[Evaluation], Array]) -> Array:
+        """What is asked of evaluations of some rows at a time, of which nothing else stays."""
+        every = np.arange(len(self.outcome))
+        if len(every) <= PORTION:
+            return of(evaluate(self.tables, self, threads=None))
+        return np.concatenate([self.only(rows)._evaluated(of) for rows in portions(every)])
 
 
 def _are_at_rest(outcome: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -181,23 +221,25 @@ def descend(
     another equilibrium by it. ``guess`` (n, m, 3) are the catenaries at the start, if known.
 
     Many poses with straight linear cables descend in lanes, the same way and sixteen abreast; those
-    whose descent takes another way are left to the compiled loop.
+    whose descent takes another way are left to the compiled loop. Very many go through that loop in
+    portions, and little is kept of each.
     """
-    if not staged and are_for_lanes(tables):
-        found = descend_in_lanes(tables, start, start_values, limit, threads)
-        is_left = found.outcome < 0
-        left = np.flatnonzero(is_left)
-        if len(left):
-            first, values = (None if s is None else s[left] for s in (start, start_values))
-            some = take(tables, left)
-            alone = _descend_alone(some, first, limit, threads, values, staged, None)
-            check = evaluate(some, alone)
-            slack = check.states[..., SLACK] > 0.5
-            found.put(left, alone, check, np.where(slack, -1.0, check.tension))
-        out = Abreast.of(tables, found, is_left)
-        _refuse_no_length(tables, out)
-        return out
-    return _descend_alone(tables, start, limit, threads, start_values, staged, guess)
+    for_lanes = not staged and are_for_lanes(tables)
+    n, m = len(tables), rest_lengths_of(tables).shape[1]
+    if not for_lanes and (staged or n <= PORTION or guess is not None):
+        return _descend_alone(tables, start, limit, threads, start_values, staged, guess)
+    found = Rested(n, m, tables.n_dof)
+    if for_lanes:
+        descend_in_lanes(tables, start, start_values, limit, threads, found)
+    is_left = found.outcome < 0
+    for rows in portions(np.flatnonzero(is_left)):
+        first, values = (None if s is None else s[rows] for s in (start, start_values))
+        some = take(tables, rows)
+        alone = _descend_alone(some, first, limit, threads, values, staged, None)
+        found.put(rows, alone, evaluate(some, alone, threads))
+    out = Brief.of(tables, found, for_lanes, is_left)
+    _refuse_no_length(tables, out)
+    return out
 
 
 def _descend_alone(
@@ -422,10 +464,8 @@ def without_idle(tables: Tables, at: Evaluation) -> Evaluation:
 def is_slack(tables: Tables, at: Evaluation) -> NDArray[np.bool_]:
     """Slack cables, (n, m): those longer than their span, which may sag, or without tension."""
     nothing = at.tension < IDLE * tables.scale[:, None]
-    if isinstance(at, Abreast):
-        return nothing
-    nothing &= tables.cables[..., PUSHES] == 0.0
-    return np.asarray((at.states[..., SLACK] > 0.5) | nothing)
+    nothing &= shared_cables(tables)[..., PUSHES] == 0.0
+    return np.asarray(at.loose | nothing)
 
 
 def joints_at_rest(tables: Tables, at: Evaluation) -> Array:
@@ -454,7 +494,9 @@ def stiffness(tables: Tables, at: Evaluation) -> Array:
 
 def under_moment(tables: Tables) -> NDArray[np.bool_]:
     """Rows (n,) with an external moment."""
-    return np.asarray(np.any(tables.load[:, EXTERNAL_MOMENT : EXTERNAL_MOMENT + 3], axis=1))
+    load = told_apart(tables)[2]
+    pushed = np.any(load[:, EXTERNAL_MOMENT : EXTERNAL_MOMENT + 3], axis=1)
+    return np.broadcast_to(pushed, len(tables))
 
 
 def residual_size(gradient: Array) -> Array:

@@ -19,11 +19,9 @@ from seecr.compiled.columns import (
     FALLING,
     FORCE_OF_WEIGHT,
     ITERATIONS,
-    REST,
     SINGULAR,
     SPINNING,
     STALLED,
-    TENSION,
     TOLERANCE,
     UNSTABLE,
 )
@@ -42,7 +40,15 @@ from seecr.pose import (
 from seecr.result import COORDINATES, Record, Result, named, rows_of
 from seecr.statics import batch
 from seecr.statics.starts import start_of
-from seecr.statics.tables import Tables, by_row, rest_lengths_of, spanless, take
+from seecr.statics.tables import (
+    Tables,
+    by_row,
+    portions,
+    rest_lengths_of,
+    shared_cables,
+    spanless,
+    take,
+)
 from seecr.statics.verification import Verification, verification_of
 from seecr.units import joules, millimetres
 
@@ -296,10 +302,10 @@ class Solution(Result):
         these resolve. Points and lengths are rounded to 1 in 2^52 of the frame's size, and the
         force of a taut cable by its stiffness times that.
         """
-        cables = self.tables.cables
-        taut = self.evaluation.states[..., TENSION] > 0.0
+        taut = self.evaluation.tension > 0.0
         with np.errstate(divide="ignore", invalid="ignore"):
-            stiffness = np.where(taut, cables[..., EA] / cables[..., REST], 0.0).sum(axis=1)
+            each = shared_cables(self.tables)[..., EA] / rest_lengths_of(self.tables)
+            stiffness = np.where(taut, each, 0.0).sum(axis=1)
         hidden = np.finfo(float).eps * self.robot.reach * stiffness / self.tables.scale
         return np.asarray(self.residual + hidden)
 
@@ -484,8 +490,8 @@ class Solution(Result):
 
 def certify(robot: Robot, tables: Tables, found: batch.Evaluation) -> Solution:
     """Recompute wrench, stiffness and energy at the result, and derive its status."""
-    # lanes have evaluated what they leave, and others what lanes have left
-    known = isinstance(found, batch.Abreast)
+    # what is kept of many rows was evaluated where they rest
+    known = isinstance(found, batch.Brief)
     check = found if known else batch.evaluate(tables, found, threads=None)
     check.count = found.count
     rest = rest_lengths_of(tables)
@@ -495,9 +501,8 @@ def certify(robot: Robot, tables: Tables, found: batch.Evaluation) -> Solution:
     if not rest.min(initial=np.inf) >= SMALLEST:
         no_length |= np.any(rest < SMALLEST, axis=1)
     # a pulley pays out some cable even where an anchor point is commanded to its exit point
-    failed = np.flatnonzero(~_IS_BALANCED[ends])
-    if len(failed):
-        no_length[failed] |= spanless(take(tables, failed)).any(axis=1)
+    for rows in portions(np.flatnonzero(~_IS_BALANCED[ends])):
+        no_length[rows] |= spanless(take(tables, rows)).any(axis=1)
     status = _STATUSES[ends]
     status[no_length] = Status.NO_LENGTH
     # not the deviations in ``found``: SciPy's search on joints leaves these at zero
@@ -523,13 +528,14 @@ def _energies(
     rows = np.array([i for i in np.flatnonzero(pushed) if status[i] in _BALANCED], int)
     if len(rows) == 0:
         return check.energy
-    some, at = take(tables, rows), check.only(rows)
-    poses = batch.platform_poses(some, at.deviation)
-    start, values = start_of(robot, some, poses)
-    assert start is not None and values is not None
-    at.deviation, at.values = start, values
     out = check.energy.copy()
-    out[rows] = batch.evaluate(some, at).energy
+    for each in portions(rows):
+        some, at = take(tables, each), check.only(each)
+        poses = batch.platform_poses(some, at.deviation)
+        start, values = start_of(robot, some, poses)
+        assert start is not None and values is not None
+        at.deviation, at.values = start, values
+        out[each] = batch.evaluate(some, at).energy
     return out
 
 

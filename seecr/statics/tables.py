@@ -49,6 +49,16 @@ def by_row(compiled: Callable[..., None], *given: Any, threads: int | None = Non
     in_parts(run, len(given[0]), threads)
 
 
+# So many rows are solved or evaluated at once by the compiled loop: what it reads and writes takes
+# up to 6 kB for each, and is kept for none where there are more.
+PORTION = 8192
+
+
+def portions(rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    """Rows in as many portions as their number needs."""
+    return [rows[k : k + PORTION] for k in range(0, len(rows), PORTION)]
+
+
 # So many rows are worth the lanes of seecr.compiled.lanes, and tables made for these.
 _MANY = 64
 _singly: set[str] = set()
@@ -147,12 +157,10 @@ class Alike(Tables):
     def __getattr__(self, name: str) -> Array:
         if name not in ("cables", "load") or "paid" not in vars(self):
             raise AttributeError(name)
-        n = len(self.paid)
+        one = self.cable if name == "cables" else self.one_load
+        out = np.broadcast_to(one, (len(self.paid), *one.shape[1:])).copy()
         if name == "cables":
-            out = np.repeat(self.cable, n, axis=0)
             out[..., REST : GAP + 1] = self.paid
-        else:
-            out = np.repeat(self.one_load, n // len(self.one_load), axis=0)
         vars(self)[name] = out
         return out
 
@@ -163,11 +171,16 @@ def told_apart(tables: Tables) -> tuple[Array, Array, Array]:
     Cables and loads have one row where all are alike. Full arrays count where they were made, since
     they may have been written to.
     """
-    own = vars(tables)
-    cables = own["cables"] if "cables" in own else own["cable"]
+    own, cables = vars(tables), shared_cables(tables)
     load = own["load"] if "load" in own else own["one_load"]
     paid = cables[..., REST : GAP + 1].copy() if "cables" in own else own["paid"]
     return cables, paid, load
+
+
+def shared_cables(tables: Tables) -> Array:
+    """Cables (n or 1, m, N_COLUMNS): one row where rows differ in lengths and gaps alone."""
+    own = vars(tables)
+    return np.asarray(own["cables"] if "cables" in own else own["cable"])
 
 
 def rest_lengths_of(tables: Tables) -> Array:
@@ -176,12 +189,17 @@ def rest_lengths_of(tables: Tables) -> Array:
     return np.asarray(own["cables"][..., REST] if "cables" in own else own["paid"][..., 0])
 
 
-@lru_cache(maxsize=8)
-def _screws_of(robot: Robot, poses_bytes: bytes, n: int) -> Array:
+def _screws_of(robot: Robot, poses: Array) -> Array:
     if not robot.joints:
-        return np.zeros((n, 0, 7))
-    poses = np.frombuffer(poses_bytes).reshape(n, 7)
-    return values_of_pose(robot, poses)[1]
+        return np.zeros((len(poses), 0, 7))
+    if len(poses) > PORTION:  # too many to be kept
+        return values_of_pose(robot, poses)[1]
+    return _known_screws(robot, poses.tobytes())
+
+
+@lru_cache(maxsize=8)
+def _known_screws(robot: Robot, poses: bytes) -> Array:
+    return values_of_pose(robot, np.frombuffer(poses).reshape(-1, 7))[1]
 
 
 def assemble(setup: Setup, strains: Array | None = None) -> Tables:
@@ -197,7 +215,7 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
     if setup.laws:
         _linearise(setup, np.zeros((n, m)) if strains is None else strains, cables)
     return Tables(
-        cables=cables, load=load, poses=poses, screws=_screws_of(robot, poses.tobytes(), n),
+        cables=cables, load=load, poses=poses, screws=_screws_of(robot, poses),
         length=robot.length, scale=_load_scale(setup), reach=_reach(cables), n_dof=robot.n_dof,
     )  # fmt: skip
 
@@ -227,7 +245,7 @@ def _alike(setup: Setup, poses: Array) -> Alike:
     spans = np.array(setup.geometric_lengths(setup.commands.pose))
     pair_lengths(np.ascontiguousarray(setup.rest_lengths()), spans, paid, reach)
     return Alike.of(
-        cable, paid, load, poses=poses, screws=_screws_of(robot, poses.tobytes(), n),
+        cable, paid, load, poses=poses, screws=_screws_of(robot, poses),
         length=robot.length, scale=_load_scale(setup), reach=reach, n_dof=robot.n_dof,
     )  # fmt: skip
 

@@ -19,7 +19,7 @@ from seecr.effects.setup import plain_setup
 from seecr.pose import quat_from_rotvec, quat_multiply
 from seecr.statics import batch
 from seecr.statics.abreast import are_for_lanes
-from seecr.statics.batch import Abreast
+from seecr.statics.batch import Brief
 from seecr.statics.tables import assemble, one_by_one, take
 
 N = 1500
@@ -75,7 +75,7 @@ def check_same(robot: seecr.Robot, poses: np.ndarray) -> None:
     many = seecr.solve(robot, poses)
     with one_by_one():
         single = seecr.solve(robot, poses)
-    assert isinstance(many.evaluation, Abreast) and not isinstance(single.evaluation, Abreast)
+    assert isinstance(many.evaluation, Brief) and not isinstance(single.evaluation, Brief)
     assert many.evaluation.alone.mean() < 0.5
     assert np.array_equal(many.status, single.status)
     rests = many.converged
@@ -99,7 +99,7 @@ def test_what_lanes_leave_is_solved_by_itself() -> None:
     robot = shipped("demobot_parallel")
     poses = poses_of(robot)
     found = seecr.solve(robot, poses)
-    assert isinstance(found.evaluation, Abreast)
+    assert isinstance(found.evaluation, Brief)
     alone = found.evaluation.alone
     assert 0 < alone.sum() < 0.1 * N
     assert not found.converged[alone].all() and found.converged[~alone].all()
@@ -111,7 +111,7 @@ def test_what_lanes_leave_is_solved_by_itself() -> None:
 
 def test_few_poses_do_not_descend_in_lanes() -> None:
     robot = shipped("demobot_cogiro")
-    assert not isinstance(seecr.solve(robot, poses_of(robot, 20)).evaluation, Abreast)
+    assert not isinstance(seecr.solve(robot, poses_of(robot, 20)).evaluation, Brief)
 
 
 @pytest.mark.parametrize("column", OUT_OF_SCOPE)
@@ -138,7 +138,7 @@ def test_cables_that_differ_from_row_to_row_descend_in_lanes() -> None:
     mixed = take(tables, np.arange(100))
     mixed.cables[::2] = soft.cables[::2]
     found = batch.descend(mixed)
-    assert isinstance(found, Abreast)
+    assert isinstance(found, Brief)
     expected = np.where(
         np.arange(100)[:, None] % 2 == 0,
         batch.descend(soft).deviation, batch.descend(tables).deviation,
@@ -155,7 +155,7 @@ def test_external_forces_and_starts_reach_the_lanes() -> None:
     many = seecr.solve(robot, poses, wrench=wrench, start=start)
     with one_by_one():
         single = seecr.solve(robot, poses, wrench=wrench, start=start)
-    assert isinstance(many.evaluation, Abreast)
+    assert isinstance(many.evaluation, Brief)
     assert np.array_equal(many.status, single.status)
     assert np.nanmax(np.abs(many.deviation - single.deviation)) < 1e-10
     assert np.nanmax(np.abs(many.deviation - seecr.solve(robot, poses).deviation)) > 1e-5
