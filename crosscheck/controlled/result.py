@@ -40,7 +40,7 @@ class Trace:
     pose: Array
     read: Array
     tensions: Array
-    ends: Array
+    ends: NDArray[np.int64]
     ticks: list[Array]
     speeds: Array
 
