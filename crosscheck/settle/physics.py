@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import contextmanager
-from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,140 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
-from seecr.description.mjcf import (
-    cable_names,
-    not_mjcf,
-    quiet_mujoco,
-    read_model,
-    unsupported_features,
-)
-from seecr.description.mjcf_text import MjcfText
-from seecr.description.passive import Kinds, kinds_of
+from crosscheck.settle.prepared import change_mass_unit, ignored_in, springs_alone, without_loose
+from seecr.description.mjcf import quiet_mujoco, read_file
+from seecr.description.robot import Robot
 from seecr.errors import InputFileError
 from seecr.pose import Array, pose_difference
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-
-# A user's MJCF prepared for settling: compiled, checked, and reduced to springs and gravity.
-#
-# What would hide or shift the equilibrium that statics predicts is switched off: contacts, joint
-# and tendon limits, dry friction (with it a platform rests anywhere in a band), and damping (which
-# shifts no equilibrium, but delays it).
-
-_DISABLE = (
-    mujoco.mjtDisableBit.mjDSBL_AUTORESET,  # else a diverging run restarts silently
-    mujoco.mjtDisableBit.mjDSBL_CONSTRAINT,  # contacts, limits, dry friction
-    mujoco.mjtDisableBit.mjDSBL_CONTACT,  # skips the search for contacts
-    mujoco.mjtDisableBit.mjDSBL_DAMPER,
-    mujoco.mjtDisableBit.mjDSBL_SENSOR,
-    mujoco.mjtDisableBit.mjDSBL_ACTUATION,
-)
-
-
-@quiet_mujoco()
-def compile_model(source: str | Path | mujoco.MjModel) -> mujoco.MjModel:
-    """Compile a file, or copy a model, so that the result may be changed."""
-    if isinstance(source, mujoco.MjModel):
-        return copy(source)
-    path = Path(source)
-    if not path.is_file():
-        raise InputFileError(f"{path}: no such file; expected an MJCF model of the robot")
-    other = not_mjcf(path)
-    if other:
-        raise InputFileError(f"{path}: {other}")
-    try:
-        model = mujoco.MjModel.from_xml_path(str(path))
-        return model if np.sum(model.body_jntnum > 0) < 2 else _without_loose(model, path)
-    except ValueError as error:
-        reason = " ".join(str(error).split())
-        raise InputFileError(f"{path}: MuJoCo cannot read this as MJCF: {reason}") from None
-
-
-def _without_loose(model: mujoco.MjModel, path: Path) -> mujoco.MjModel:
-    """The same without moving bodies that no cable touches, and what may be about them."""
-    loose = read_model(model, path).platform.loose
-    spec = mujoco.MjSpec.from_file(str(path))
-    beside = (spec.keys, spec.sensors, spec.equalities, spec.excludes, spec.pairs, spec.actuators)
-    gone = [spec.bodies[body] for body in loose]
-    for one in [each for some in beside for each in some] + gone:
-        spec.delete(one)
-    return spec.compile()
-
-
-def platform_of(model: mujoco.MjModel, name: str) -> int:
-    """Number of the only moving body."""
-    moving = np.flatnonzero(model.body_jntnum > 0)
-    if len(moving) != 1:
-        raise InputFileError(
-            f"{name}: {len(moving)} moving bodies; expected one platform with a free "
-            "joint or with slide and hinge joints"
-        )
-    return int(moving[0])
-
-
-def check_cables(model: mujoco.MjModel, body: int, where: str) -> None:
-    """Check that the tendons are straight cables from the world to the platform."""
-    if model.ntendon == 0:
-        raise InputFileError(f"{where}: no cables; expected one <spatial> tendon per cable")
-    for i in range(model.ntendon):
-        name = model.tendon(i).name or f"cable{i + 1}"
-        first = model.tendon_adr[i]
-        kinds = model.wrap_type[first : first + model.tendon_num[i]]
-        if list(kinds) != 2 * [int(mujoco.mjtWrap.mjWRAP_SITE)]:
-            raise InputFileError(
-                f"{where}: tendon {name}: expected exactly two sites; MuJoCo's side takes no block "
-                "and tackle: write one cable of n^2 times its stiffness and l0/n"
-            )
-        sites = model.wrap_objid[first : first + 2]
-        if np.sum(model.body_weldid[model.site_bodyid[sites]] == body) != 1:
-            raise InputFileError(
-                f"{where}: tendon {name}: expected one site on the platform and one on the world"
-            )
-        if np.any(model.tendon_stiffnesspoly[i] != 0.0):
-            raise InputFileError(
-                f"{where}: tendon {name}: expected one stiffness [N/m], got a polynomial"
-            )
-
-
-def ignored_in(model: mujoco.MjModel, platform: int) -> tuple[str, ...]:
-    """Names of features present that would hide, shift or delay the equilibrium."""
-    damped = model.dof_damping.any() or model.tendon_damping.any()
-    return (*unsupported_features(model, platform), *(("damping",) if damped else ()))
-
-
-def switch_off(model: mujoco.MjModel) -> None:
-    """Leave springs, gravity and inertia only."""
-    model.opt.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
-    model.opt.disableflags |= sum(int(flag) for flag in _DISABLE)
-    model.opt.tolerance = 1e-8  # relative, of the solve for the implicit step
-    model.opt.iterations = 100
-    model.opt.enableflags = int(mujoco.mjtEnableBit.mjENBL_ENERGY)
-
-
-def ignored_note(name: str | Path, ignored: Sequence[str]) -> str:
-    """A sentence about what is :func:`ignored_in` a file."""
-    return (
-        f"{name}: switched off here: {', '.join(ignored)}; only springs and gravity act on the "
-        "platform, as in the statics"
-    )
-
-
-def change_mass_unit(model: mujoco.MjModel, mass_unit: float) -> None:
-    """Change the unit of mass [kg] of everything with mass, and of what MuJoCo derives from it."""
-    for array in (
-        model.body_mass,
-        model.body_inertia,
-        model.dof_armature,
-        model.tendon_armature,
-        model.tendon_stiffness,
-        model.jnt_stiffness,
-    ):
-        array /= mass_unit
-    model.opt.density /= mass_unit
-    model.opt.viscosity /= mass_unit
-    mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
 # MuJoCo's implicit step treats generalised forces below about 1e-8 (in its own units) as zero, so
@@ -191,17 +64,18 @@ class Parts:
     passive: tuple[int, ...] = ()
 
     @classmethod
-    def of(cls, model: mujoco.MjModel, platform: int, kinds: Kinds) -> Parts:
+    def of(cls, model: mujoco.MjModel, robot: Robot) -> Parts:
         """Those of a robot whose tendons are its cables, as they are in its file."""
+        platform = int(np.flatnonzero(model.body_jntnum > 0)[0])
         sites = model.wrap_objid[: 2 * model.ntendon]
         on_platform = model.body_weldid[model.site_bodyid[sites]] == platform
         exits, anchors = sites[~on_platform], sites[on_platform]
-        force = kinds.constant_tension_N
+        force = robot.constant_tension_N
         pulled = tuple(
             (int(i), int(exits[i]), int(anchors[i]), float(force[i])) for i in np.flatnonzero(force)
         )
         pushes, passive = (
-            tuple(np.flatnonzero(one).tolist()) for one in (kinds.pushes, ~kinds.driven)
+            tuple(np.flatnonzero(one).tolist()) for one in (robot.pushes, ~robot.driven)
         )
         return cls(platform, exits, anchors, pushes, pulled, passive)
 
@@ -244,7 +118,7 @@ class Physics:
         self.model, self.parts, self.body = model, parts, parts.platform
         self.is_free = int(model.jnt_type[model.body_jntadr[parts.platform]]) == _FREE
         self.ignored = ignored_in(model, parts.platform)
-        switch_off(model)
+        springs_alone(model)
         self._set_lines()
         own = float(model.body_mass[parts.platform])
         self.mass = own or float(model.body_subtreemass[parts.platform])
@@ -274,25 +148,25 @@ class Physics:
             self.model.tendon_stiffness[tendon] = 0.0
 
     @classmethod
-    def of(cls, source: str | Path | mujoco.MjModel, passive: Sequence[str] = ()) -> Physics:
-        """Compile an MJCF file, or copy a compiled model.
+    def of(cls, path: str | Path, passive: Sequence[str] = ()) -> Physics:
+        """Compile an MJCF file.
 
         Args:
-            source: the file or the model.
+            path: the file, or the name of a shipped robot.
             passive: names of lines that no winch drives, besides those that the file names.
 
         Raises:
-            InputFileError: there is no such file, it is not MJCF, or not one platform on cables.
+            InputError, RobotError: there is no such file, it is not MJCF, or no cable robot.
+            InputFileError: a block and tackle, of which MuJoCo's side has none.
         """
-        name = "model" if isinstance(source, mujoco.MjModel) else str(source)
-        model = compile_model(source)
-        platform = platform_of(model, name)
-        check_cables(model, platform, name)
-        text = None if isinstance(source, mujoco.MjModel) else MjcfText(Path(source))
-        kinds, faults = kinds_of(model, cable_names(model), text, passive)
-        if faults:
-            raise InputFileError(f"{name}: {'; '.join(faults)}")
-        return cls(model, Parts.of(model, platform, kinds))
+        found = read_file(path, passive)
+        robot, model = found.robot(), without_loose(found)
+        for i in np.flatnonzero(model.tendon_num != 2):
+            raise InputFileError(
+                f"{path}: tendon {robot.cable_names[i]}: expected exactly two sites; MuJoCo's side "
+                "takes no block and tackle: write one cable of n^2 times its stiffness and l0/n"
+            )
+        return cls(model, Parts.of(model, robot))
 
     @property
     def n_cables(self) -> int:

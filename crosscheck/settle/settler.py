@@ -1,228 +1,37 @@
 """A cable robot brought to rest by MuJoCo: an answer that shares nothing with seecr's statics.
 
-In stage 1 (dynamic relaxation) the platform moves from the commanded pose by its own
-dynamics until it rests, which shows that the equilibrium is stable and reached from there. Stage 2
-(:mod:`crosscheck.settle.newton`) adds digits without leaving that equilibrium. Both are reported.
+In stage 1 (:mod:`crosscheck.settle.relaxation`) the platform moves from the commanded pose by its
+own dynamics until it rests, which shows that the equilibrium is stable and reached from there.
+Stage 2 (:mod:`crosscheck.settle.newton`) adds digits without leaving that equilibrium. Both are
+reported.
 """
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from enum import Enum
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.settle.newton import Polished, polish
 from crosscheck.settle.physics import Physics
+from crosscheck.settle.relaxation import Observer, Rest, SettleStatus, come_to_rest
 from seecr.description.mjcf import quiet_mujoco
-from seecr.pose import Array
+from seecr.pose import Array, pose_difference, quat_from_rotvec, quat_multiply, quat_rotate
 from seecr.result import Record
-
-# Stage 1 of a settling: MuJoCo's own dynamics with kinetic damping.
-#
-# The platform moves freely; whenever its kinetic energy has passed a peak it is stopped, and
-# starts again from there (dynamic relaxation with kinetic damping: Day 1965, Cundall 1976). Each
-# stop removes energy, so it ends in a minimum of it: a stable equilibrium. If there are several,
-# the time step also influences which one: between stops the integrator conserves energy only
-# approximately.
-#
-# The integrator is MuJoCo's `discrete`, implicit in the springs. So the time step need not resolve
-# the cables' vibrations, only the swinging under the load.
-
-Observer = Callable[[Physics], None]
-
-# Time step over the robot's characteristic time sqrt(length m/F). On the DemoBot (0.4 kg, 0.058 m)
-# these are 5 ms and 2 ms, the second for cables stiffer than 5e4 N/m, as measured there. In this
-# form the same numbers hold for robots of any size, mass and load.
-_TIME_STEP = 0.065
-_TIME_STEP_STIFF = 0.026
-_STIFF = 740.0
-# A platform with little inertia in rotation swings faster than it travels.
-_TIME_STEP_ROTATION = 0.3
-# MuJoCo's implicit step treats the smallest forces as zero. If nothing moves at all, this relative
-# residual counts as rest; above it the time step is halved, which makes MuJoCo notice smaller
-# forces.
-_AT_REST = 1e-7
-# Number of peaks of kinetic energy without the residual force halving, after which the time step is
-# halved: nearly rigid cables can alternate for ever between slack and taut at a long time step.
-_PATIENCE = 40
-_SHORTEST = 1e-4
-# Steps between checks that need not be made at each step.
-_STRIDE = 64
-# After a state that is not finite, the run is repeated with shorter time steps.
-_RETRIES = 3
-_SHORTER = 8.0
-# A platform that travels this many times the robot's size counts as fallen.
-_FALL = 10.0
-
-
-class SettleStatus(Enum):
-    """How a settling ended; the value is the sentence that people read."""
-
-    SETTLED = "MuJoCo came to rest in a stable equilibrium"
-    DIVERGED = "MuJoCo's state became infinite or not a number, even with shorter time steps"
-    TIME_LIMIT = "MuJoCo had not come to rest after the allowed number of steps"
-    FELL = "nothing holds the platform: in MuJoCo it moved away by over ten times the robot's size"
-    UNSTABLE = "MuJoCo repeatedly stopped at an unstable equilibrium, although pushed off it"
-    POLISH_MOVED = "the polish left the equilibrium in which MuJoCo had come to rest"
-    POLISH_STALLED = "the polish could not balance the forces down to rounding"
-
-
-@dataclass(frozen=True)
-class Rest:
-    """Result of stage 1; the physics is left in its last state.
-
-    Attributes:
-        status: SETTLED, DIVERGED, TIME_LIMIT or FELL.
-        residual: residual force relative to the load in that state, without velocity.
-        steps: of MuJoCo, retries included.
-        simulated_s: simulated time [s], retries included.
-        time_step: the last [s].
-        wall_s: time taken [s].
-    """
-
-    status: SettleStatus
-    residual: float
-    steps: int
-    simulated_s: float
-    time_step: float
-    wall_s: float
-
-    def after(self, first: Rest) -> Rest:
-        """This result, with the cost of an earlier one added."""
-        return replace(
-            self,
-            steps=self.steps + first.steps,
-            simulated_s=self.simulated_s + first.simulated_s,
-            wall_s=self.wall_s + first.wall_s,
-        )
-
-
-def time_step(physics: Physics) -> float:
-    """Time step [s] for the robot, its load and its cables as they are set and placed."""
-    load = max(physics.force_scale, float(np.sum(physics.tensions())))
-    # Inertia of each coordinate, as a mass at the robot's length.
-    mass = physics.inertia / physics.metre**2
-    swing = float(np.sqrt(physics.length * physics.mass / load))
-    turning = np.min(mass[physics.rotations], initial=np.inf)
-    spin = float(np.sqrt(physics.length * turning / load))
-    stiff = float(np.max(physics.stiffness)) * physics.length > _STIFF * load
-    return min((_TIME_STEP_STIFF if stiff else _TIME_STEP) * swing, _TIME_STEP_ROTATION * spin)
-
-
-@quiet_mujoco()
-def come_to_rest(
-    physics: Physics, tolerance: float, max_steps: int, observe: Observer | None = None
-) -> Rest:
-    """Let the platform move from where it is placed until it rests.
-
-    Args:
-        physics: robot, cables and load set, platform placed.
-        tolerance: residual force relative to the load at which it rests.
-        max_steps: after which to give up.
-        observe: called after each step.
-    """
-    began = time.perf_counter()
-    start = physics.data.qpos.copy()
-    rest = Rest(SettleStatus.DIVERGED, np.nan, 0, 0.0, time_step(physics), 0.0)
-    for retry in range(1 + _RETRIES):
-        physics.model.opt.timestep = rest.time_step / (_SHORTER if retry else 1.0)
-        physics.data.qpos[:] = start
-        physics.data.qvel[:] = 0.0
-        physics.data.time = 0.0
-        before = rest
-        status, residual, steps = _run(physics, tolerance, max_steps - before.steps, observe)
-        data, wall = physics.data, time.perf_counter() - began
-        simulated = before.simulated_s + float(data.time)
-        step = float(physics.model.opt.timestep)
-        rest = Rest(status, residual, before.steps + steps, simulated, step, wall)
-        if status is not SettleStatus.DIVERGED:
-            break
-    return rest
-
-
-def _run(
-    physics: Physics, tolerance: float, max_steps: int, observe: Observer | None
-) -> tuple[SettleStatus, float, int]:
-    data, velocity, force = physics.data, physics.data.qvel, physics.data.qfrc_smooth
-    unit, shortest = physics.mass_unit, _SHORTEST * physics.model.opt.timestep
-    energy, options = physics.data.energy, physics.model.opt
-    advance = _advance(physics)
-    far = _fall_distance(physics)
-    start = data.xpos[physics.body].copy()
-    last, best, stalled = 0.0, np.inf, 0
-    for step in range(1, max_steps + 1):
-        advance()
-        kinetic = energy[1]
-        if observe is not None:
-            observe(physics)
-        if kinetic < last:
-            velocity[:] = 0.0
-            last = 0.0
-            size = physics.relative(unit * force)
-            # The step has moved on from where this force was: only the state that it left counts.
-            if size < tolerance and (size := physics.relative(physics.residual())) < tolerance:
-                return SettleStatus.SETTLED, size, step
-            best, stalled = (size, 0) if size < 0.5 * best else (best, stalled + 1)
-            if stalled == _PATIENCE:
-                options.timestep = max(0.5 * options.timestep, shortest)
-                best, stalled = size, 0
-        elif kinetic > 0.0 or velocity.any():
-            last = kinetic
-        else:
-            size = physics.relative(physics.residual())
-            if size < max(tolerance, _AT_REST):
-                return SettleStatus.SETTLED, size, step
-            options.timestep = max(0.5 * options.timestep, shortest)
-        if step % _STRIDE == 0:
-            if not np.isfinite(data.qpos).all():
-                return SettleStatus.DIVERGED, np.nan, step
-            if np.linalg.norm(data.xpos[physics.body] - start) > far:
-                return SettleStatus.FELL, physics.relative(physics.residual()), step
-    if not np.isfinite(data.qpos).all():
-        return SettleStatus.DIVERGED, np.nan, max_steps
-    return SettleStatus.TIME_LIMIT, physics.relative(physics.residual()), max_steps
-
-
-def _advance(physics: Physics) -> Callable[[], None]:
-    """One MuJoCo step; forces such as a wrench are applied at the pose of that step."""
-    model, data = physics.model, physics.data
-    data.qfrc_applied[:] = 0.0
-    if not physics.steers:
-        step = mujoco.mj_step
-        return lambda: step(model, data)
-
-    def advance() -> None:
-        mujoco.mj_step1(model, data)
-        physics.push()
-        mujoco.mj_step2(model, data)
-
-    return advance
-
-
-def _fall_distance(physics: Physics) -> float:
-    """Distance [m] from the start beyond which the platform counts as fallen.
-
-    The distance to the farthest exit point is the robot's size, stretched as if the softest cable
-    carried the load alone.
-    """
-    ea = physics.stiffness * physics.rest_lengths
-    exits = physics.exit_points() - physics.data.xpos[physics.body]
-    size = float(np.max(np.linalg.norm(exits, axis=-1)))
-    return _FALL * size * (1.0 + physics.force_scale / float(np.min(ea[ea > 0.0], initial=np.inf)))
-
 
 # Largest relative residual after the polish, unless rounding alone leaves more.
 _POLISHED = 1e-9
 # A polish that moves the platform by more than this, in lengths, has gone to another equilibrium.
 _MOVED = 1e-2
+# Points checked between two poses that a free motion should join.
+_STATIONS = 9
+# A screw whose rotation [rad] is smaller is a translation to rounding, and its axis is undefined.
+_STRAIGHT = 1e-7
 # Push off an unstable equilibrium [robot's length], and how often it is repeated.
 _NUDGE = 1e-3
 _NUDGES = 3
@@ -239,10 +48,15 @@ class Settling:
         tensions: (m,) [N] after the polish.
         slack: (m,) whether each cable has no tension; all False on failure.
         energy: potential energy [J], see :meth:`crosscheck.settle.physics.Physics.energy`.
+        residual: residual force after the polish relative to the load (torques over length).
         settled_pose: (7,) after stage 1 alone.
+        settled_residual: as ``residual``, after stage 1 alone; also given on failure.
         rounding: the relative residual due to rounding alone.
-        rest: result of stage 1, also on failure.
-        polished: result of stage 2.
+        smallest_eigenvalue: of the stiffness [N/m]; at or below ``neutral``, which is rounding, the
+            platform may move freely.
+        moved_m: distance [m] by which the polish moved it.
+        steps, simulated_s: of MuJoCo in stage 1, and their time [s].
+        settle_s, polish_s: [s] that both stages took.
         nudges: how often the platform was pushed off an unstable equilibrium.
     """
 
@@ -252,41 +66,18 @@ class Settling:
     tensions: Array
     slack: NDArray[np.bool_]
     energy: float
+    residual: float
     settled_pose: Array
+    settled_residual: float
     rounding: float
-    rest: Rest
-    polished: Polished
+    smallest_eigenvalue: float
+    neutral: float
+    moved_m: float
+    steps: int
+    simulated_s: float
+    settle_s: float
+    polish_s: float
     nudges: int
-
-    @property
-    def residual(self) -> float:
-        """Residual force after the polish relative to the load (torques over length)."""
-        return self.polished.residual
-
-    @property
-    def settled_residual(self) -> float:
-        """As :attr:`residual`, after stage 1 alone; also given on failure."""
-        return self.rest.residual
-
-    @property
-    def smallest_eigenvalue(self) -> float:
-        """Of the stiffness [N/m]; at or below ``neutral`` the platform may move freely."""
-        return self.polished.smallest_eigenvalue
-
-    @property
-    def neutral(self) -> float:
-        """A smaller eigenvalue is rounding [N/m]."""
-        return self.polished.neutral
-
-    @property
-    def steps(self) -> int:
-        """Steps of MuJoCo in stage 1."""
-        return self.rest.steps
-
-    @property
-    def simulated_s(self) -> float:
-        """Simulated time of stage 1 [s]."""
-        return self.rest.simulated_s
 
     @property
     def settled(self) -> bool:
@@ -301,11 +92,6 @@ class Settling:
         anchor points if its centre of mass is on that line.
         """
         return self.settled and self.smallest_eigenvalue <= self.neutral
-
-    @property
-    def wall_s(self) -> float:
-        """Time of both stages [s]."""
-        return self.rest.wall_s + self.polished.wall_s
 
 
 class SettlingBatch(tuple[Settling, ...]):
@@ -348,28 +134,25 @@ _FIELDS = frozenset(Settling.__dataclass_fields__)
 
 
 class Settler:
-    """Settles one robot in MuJoCo, pose after pose; not thread-safe.
+    """A robot that settles in MuJoCo, pose after pose; not thread-safe.
 
     Attributes:
         physics: the robot in MuJoCo.
         ea: (m,) [N] k_c = E S of each cable.
         tolerance: residual force, relative to the load, at which stage 1 ends.
         max_steps: of MuJoCo in stage 1.
+        home, pretension: (m,) [m] rest lengths of the MJCF, and what they are longer than the
+            straight lengths at its reference.
     """
 
     def __init__(
-        self,
-        source: str | Path | mujoco.MjModel,
-        *,
-        ea: Array | float | None = None,
-        tolerance: float = 1e-8,
-        max_steps: int = 40_000,
-        passive: Sequence[str] = (),
-    ) -> None:
+        self, path: str | Path, *, ea: Array | float | None = None, tolerance: float = 1e-8,
+        max_steps: int = 40_000, passive: Sequence[str] = (),
+    ) -> None:  # fmt: skip
         """Compile the robot.
 
         Args:
-            source: MJCF file, or a model compiled from one (it is copied).
+            path: MJCF file.
             ea: (m,) or one number [N], of the driven cables; None takes stiffness times rest length
                 of the MJCF.
             tolerance: of stage 1; rounding of very stiff cables may raise it.
@@ -377,23 +160,33 @@ class Settler:
             passive: names of lines that no winch drives, besides those that the file names.
 
         Raises:
-            InputFileError: the file is not one platform on cables.
+            InputError, RobotError, InputFileError: the file is not one platform on cables.
         """
-        self.physics = Physics.of(source, passive)
-        own = self.physics.stiffness * self.physics.rest_lengths
+        physics = self.physics = Physics.of(path, passive)
+        own = physics.stiffness * physics.rest_lengths
         of_all = ea is not None and np.ndim(ea) > 0
         given = np.array(np.broadcast_to(own if ea is None else ea, own.shape), dtype=float)
-        self.ea = given if of_all else np.where(self.physics.driven, given, own)
-        self.tolerance = tolerance
-        self.max_steps = max_steps
+        self.ea = given if of_all else np.where(physics.driven, given, own)
+        self.tolerance, self.max_steps = tolerance, max_steps
+        # the compiled model stands at its reference pose, its springs still as in the file
+        self.home = physics.rest_lengths.copy()
+        self.pretension = self.home - physics.data.ten_length
+
+    def paid_out(self, poses: Array) -> Array:
+        """Lengths (n, m) [m] paid out for commanded poses (n, 7), from MuJoCo's kinematics.
+
+        Those of passive lines are as in the MJCF.
+        """
+        physics = self.physics
+        lengths = np.empty((len(poses), physics.n_cables))
+        for i, pose in enumerate(poses):
+            physics.place(pose)
+            lengths[i] = physics.data.ten_length
+        return np.where(physics.driven, lengths + self.pretension, self.home)
 
     @quiet_mujoco()
     def settle(
-        self,
-        pose: Array,
-        rest_lengths: Array,
-        *,
-        observe: Observer | None = None,
+        self, pose: Array, rest_lengths: Array, *, observe: Observer | None = None
     ) -> Settling:
         """Bring the platform to rest from a pose.
 
@@ -426,6 +219,17 @@ class Settler:
         self._prepare(pose, rest_lengths)
         return self.physics.energy()
 
+    def imbalance_between(self, pose_a: Array, pose_b: Array, rest_lengths: Array) -> float:
+        """Largest residual force, relative to the load, on the screw motion from pose a to pose b.
+
+        Zero up to rounding means that the platform is free to move from one to the other.
+        """
+        sizes = []
+        for pose in screw_motion(pose_a, pose_b, _STATIONS):
+            self._prepare(pose, rest_lengths)
+            sizes.append(self.physics.relative(self.physics.residual()))
+        return max(sizes)
+
     def _prepare(self, pose: Array, rest_lengths: Array) -> None:
         self.physics.set_cables(rest_lengths, self.ea)
         self.physics.set_load()
@@ -456,16 +260,13 @@ def settle_batch(settler: Settler, poses: Array, rest_lengths: Array) -> Settlin
 
 
 def _result(
-    physics: Physics,
-    rest: Rest,
-    nudges: int,
-    polished: Polished | None = None,
+    physics: Physics, rest: Rest, nudges: int, polished: Polished | None = None,
     settled_pose: Array | None = None,
-) -> Settling:
+) -> Settling:  # fmt: skip
     """The settling in the physics' present state; without numbers unless it is an answer."""
-    nan = np.nan
     status = rest.status if polished is None else _judge(physics, polished)
-    fine = status is SettleStatus.SETTLED
+    fine, nan = status is SettleStatus.SETTLED, np.nan
+    last = polished or Polished(nan, 0, nan, nan, nan, np.full(0, nan), nan, 0.0)
 
     def known(values: Array) -> Array:
         return values.copy() if fine else np.full_like(values, nan)
@@ -478,10 +279,17 @@ def _result(
         tensions=known(tensions),
         slack=(tensions == 0.0) & fine,
         energy=physics.energy() if fine else nan,
+        residual=last.residual,
         settled_pose=np.full(7, nan) if settled_pose is None else known(settled_pose),
+        settled_residual=rest.residual,
         rounding=physics.rounding(),
-        rest=rest,
-        polished=polished or Polished(nan, 0, nan, nan, nan, np.full(0, nan), nan, 0.0),
+        smallest_eigenvalue=last.smallest_eigenvalue,
+        neutral=last.neutral,
+        moved_m=last.moved_m,
+        steps=rest.steps,
+        simulated_s=rest.simulated_s,
+        settle_s=rest.wall_s,
+        polish_s=last.wall_s,
         nudges=nudges,
     )
 
@@ -495,3 +303,26 @@ def _judge(physics: Physics, polished: Polished) -> SettleStatus:
     if not polished.residual <= max(_POLISHED, 10.0 * physics.rounding()):
         return SettleStatus.POLISH_STALLED
     return SettleStatus.SETTLED
+
+
+def screw_motion(pose_a: Array, pose_b: Array, k: int) -> Array:
+    """Poses (k, 7) from pose a to pose b along the one screw that joins them (Chasles).
+
+    Unlike separate interpolation of position and orientation, it is a rotation about a fixed axis
+    if such a rotation leads from a to b.
+    """
+    change = pose_difference(pose_b, pose_a)
+    shift, turn = change[:3], change[3:]
+    angle = float(np.linalg.norm(turn))
+    part = np.linspace(0.0, 1.0, k)[:, None]
+    quats = quat_from_rotvec(part * turn)
+    along, arm = shift, np.zeros(3)
+    if angle > _STRAIGHT:
+        axis = turn / angle
+        along = (shift @ axis) * axis
+        across = shift - along
+        # From the axis to the platform: half the chord back, and sideways by the cotangent.
+        arm = -0.5 * (across + np.cross(axis, across) / np.tan(0.5 * angle))
+    positions = pose_a[:3] + part * along + quat_rotate(quats, arm) - arm
+    turned = quat_multiply(quats, pose_a[3:])
+    return np.concatenate([positions, turned], axis=1)

@@ -178,7 +178,7 @@ def _gathered(result: CaseResult) -> _Drawn:
     index, watched = sweep_index(result.case.poses), _worth_watching(result)
     if watched is None:
         return _Drawn(result, index, seecr, mujoco, 0, None, mujoco)
-    settler = result.mujoco_robot().settler
+    settler = result.case.settler()
     motion = record_motion(settler, result.case.begins[watched], lengths[watched])
     same = np.tile(lengths[watched], (len(motion.t_s), 1))
     moving = States(motion.pose, motion.tensions, same, motion.tensions == 0.0)

@@ -7,20 +7,18 @@ import fnmatch
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.given import GivenRobot, file_of, robot_of
+from crosscheck.settle.settler import Settler
 from crosscheck.twin.lab import onto_joints
 from seecr.arguments import whole
-from seecr.description.mjcf import CABLES, model_path, robot_file
+from seecr.description.mjcf import CABLES, load_robot, model_path, robot_file
+from seecr.description.robot import Robot
 from seecr.pose import Array, pose_add, quat_from_rotvec
-
-if TYPE_CHECKING:
-    from seecr.description.robot import Robot
-
 
 # Commanded poses of the suite: along lines, rotated on the way, and at random.
 
@@ -121,15 +119,7 @@ def _level(robot: Robot, vectors: Array) -> Array:
     return np.asarray(vectors - np.outer(vectors @ robot.up, robot.up))
 
 
-class Named(Protocol):
-    """Objects that ``--case`` can select."""
-
-    @property
-    def name(self) -> str:
-        """The name on the terminal."""
-
-
-N = TypeVar("N", bound=Named)
+N = TypeVar("N")  # cases, and whatever else has a name
 
 N_RANDOM = 200
 # Cogiro withstands moments: its random poses are rotated by up to this about a random axis.
@@ -188,10 +178,10 @@ class Case:
         """k_c = E S [N] of every cable; None if the MJCF states it."""
         return None if self.cable is None else CABLES[self.cable]
 
-    @property
-    def mujoco_ea(self) -> float | None:
-        """The same for MuJoCo's side; None if its own MJCF states it."""
-        return self.ea if self.mujoco_model == self.model else None
+    def settler(self) -> Settler:
+        """The robot in MuJoCo, with the case's cable unless it has an MJCF of its own."""
+        ea = self.ea if self.mujoco_model == self.model else None
+        return Settler(self.mujoco_model, ea=ea, passive=self.passive)
 
 
 def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
@@ -211,27 +201,44 @@ def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
         ``[case.name for case in crosscheck.shipped_cases()]``
     """
     seed, n_random = whole(seed, "seed"), whole(n_random, "n_random")
-    cases = []
+    cases, named = [], {"has_names": seed == 0}
     for robot, turn in (("cogiro", _COGIRO_TURN), ("parallel", 0.0)):
-        path = model_path(f"demobot_{robot}")
+        model = f"demobot_{robot}"
         for cable in CABLES:
+            name = f"{robot}-{cable}"
+            random = demobot_random(_generator(seed, f"{name}-random"), n_random, turn)
             for z in SWEEP_Z:
-                name = f"{robot}-{cable}-z{z:.2f}"
-                cases.append(Case(name, path, path, cable, "sweep", demobot_sweep(z)))
-            name = f"{robot}-{cable}-turned"
-            cases.append(Case(name, path, path, cable, "sweep", demobot_turned_sweep()))
-            name = f"{robot}-{cable}-random"
-            poses = demobot_random(_generator(seed, name), n_random, turn)
-            cases.append(Case(name, path, path, cable, "random", poses, has_names=seed == 0))
+                cases.append(_case(f"{name}-z{z:.2f}", model, "sweep", demobot_sweep(z), cable))
+            cases.append(_case(f"{name}-turned", model, "sweep", demobot_turned_sweep(), cable))
+            cases.append(_case(f"{name}-random", model, "random", random, cable, **named))
     cases += [_tilted_case(cable) for cable in CABLES]
     cases.append(_inverted_case())
     for robot in ("two_cable", "vertical", "horizontal"):
         cases += _planar_cases(robot)
     for robot, turn in (("uneven", 0.0), ("off_centre", _COGIRO_TURN)):
-        cases += _own_cable_cases(robot, turn, seed, n_random)
-    for robot in _OTHERS:
-        cases += _other_cases(robot, seed, n_random)
-    return cases + [_passive_case(kind) for kind in _PASSIVE]
+        model, stem = f"demobot_{robot}", robot.replace("_", "-")
+        random = demobot_random(_generator(seed, f"{stem}-random"), n_random // 2, turn)
+        cases.append(_case(f"{stem}-turned", model, "sweep", demobot_turned_sweep()))
+        cases.append(_case(f"{stem}-random", model, "random", random, **named))
+    for model in _OTHERS:
+        one, stem = load_robot(model_path(model)), model.replace("_", "-")
+        few = max(n_random // _FEWER, 1)
+        random = robot_random(one, _generator(seed, f"{stem}-random"), few)
+        cases.append(_case(f"{stem}-sweep", model, "sweep", robot_sweep(one, N_SWEEP // 2)))
+        cases.append(_case(f"{stem}-random", model, "random", random, **named))
+    for kind in _PASSIVE:
+        path = model_path("camera").parents[1] / "passive_lines" / f"{kind}.xml"
+        sweep = robot_sweep(load_robot(path), N_SWEEP // 2)
+        cases.append(_case(f"passive-{kind}", path, "sweep", sweep))
+    return cases
+
+
+def _case(
+    name: str, model: str | Path, kind: str, poses: Array, cable: str | None = None, **more: Any
+) -> Case:
+    """A case in which both physics read the same file, or that of a shipped robot."""
+    path = model if isinstance(model, Path) else model_path(model)
+    return Case(name, path, path, cable, kind, poses, **more)
 
 
 def user_cases(
@@ -301,76 +308,35 @@ def _tilted_case(cable: str) -> Case:
     Each start leads to one of the two, and each physics has to find the one that its start leads
     to.
     """
-    from seecr.description.mjcf import load_robot
-
-    path = model_path("demobot_parallel")
-    command = demobot_tilted(cable)
-    starts = np.stack([command, load_robot(path).reference_pose])
+    model, command = "demobot_parallel", demobot_tilted(cable)
+    starts = np.stack([command, load_robot(model_path(model)).reference_pose])
     commands = np.stack([command, command])
-    return Case(f"parallel-{cable}-tilted", path, path, cable, "starts", commands, starts=starts)
+    return _case(f"parallel-{cable}-tilted", model, "starts", commands, cable, starts=starts)
 
 
 def _inverted_case() -> Case:
     """A start in balance that is unstable: each physics has to leave it."""
-    from seecr.description.mjcf import load_robot
-
-    path = model_path("planar_two_cable")
-    command, start = load_robot(path).reference_pose[None], np.array([_ON_ITS_HEAD])
-    return Case("planar-two-cable-inverted", path, path, None, "starts", command, starts=start)
+    model, start = "planar_two_cable", np.array([_ON_ITS_HEAD])
+    command = load_robot(model_path(model)).reference_pose[None]
+    return _case("planar-two-cable-inverted", model, "starts", command, starts=start)
 
 
 def _planar_cases(robot: str) -> list[Case]:
     """A planar robot of the paper (Figs 2 to 9): a short sweep, other heights, and tilted poses."""
-    from seecr.description.mjcf import load_robot
-
-    path, stem = model_path(f"planar_{robot}"), f"planar-{robot}".replace("_", "-")
-    home, exits = load_robot(path).reference_pose, load_robot(path).exit_points
-    level = np.tile(home, (N_SWEEP, 1))
+    model, stem = f"planar_{robot}", f"planar-{robot}".replace("_", "-")
+    one = load_robot(model_path(model))
+    level = np.tile(one.reference_pose, (N_SWEEP, 1))
     level[:, 0] += np.linspace(-_PLANAR_HALF_WIDTH, _PLANAR_HALF_WIDTH, N_SWEEP)
-    room = float(exits[:, 2].min() - home[2])
-    lines = [level[::2] + part * room * np.eye(7)[2] for part in _PLANAR_HEIGHTS]
+    room = float(one.exit_points[:, 2].min() - one.reference_pose[2])
+    heights = np.concatenate([level[::2] + part * room * np.eye(7)[2] for part in _PLANAR_HEIGHTS])
     turned = level.copy()
     tilt = _PLANAR_TURN * np.sin(np.linspace(0.0, 2.0 * np.pi, N_SWEEP))
     turned[:, 3:] = quat_from_rotvec(tilt[:, None] * np.array([0.0, 1.0, 0.0]))
-    cases = [Case(stem, path, path, "vectran", "sweep", level)]
+    cases = [_case(stem, model, "sweep", level, "vectran")]
     for cable in CABLES:
-        heights = np.concatenate(lines)
-        cases.append(Case(f"{stem}-{cable}-heights", path, path, cable, "random", heights))
-        cases.append(Case(f"{stem}-{cable}-turned", path, path, cable, "sweep", turned))
+        cases.append(_case(f"{stem}-{cable}-heights", model, "random", heights, cable))
+        cases.append(_case(f"{stem}-{cable}-turned", model, "sweep", turned, cable))
     return cases
-
-
-def _own_cable_cases(robot: str, turn: float, seed: int, n_random: int) -> list[Case]:
-    """A DemoBot with the cables of its file, along a rotated sweep and at random."""
-    path, stem = model_path(f"demobot_{robot}"), robot.replace("_", "-")
-    random = demobot_random(_generator(seed, f"{stem}-random"), n_random // 2, turn)
-    return [
-        Case(f"{stem}-turned", path, path, None, "sweep", demobot_turned_sweep()),
-        Case(f"{stem}-random", path, path, None, "random", random, has_names=seed == 0),
-    ]
-
-
-def _other_cases(robot: str, seed: int, n_random: int) -> list[Case]:
-    """A robot of another size and kind, treated like a user's robot."""
-    from seecr.description.mjcf import load_robot
-
-    path, stem = model_path(robot), robot.replace("_", "-")
-    one = load_robot(path)
-    random = robot_random(one, _generator(seed, f"{stem}-random"), max(n_random // _FEWER, 1))
-    sweep = robot_sweep(one, N_SWEEP // 2)
-    return [
-        Case(f"{stem}-sweep", path, path, None, "sweep", sweep),
-        Case(f"{stem}-random", path, path, None, "random", random, has_names=seed == 0),
-    ]
-
-
-def _passive_case(kind: str) -> Case:
-    """A small robot with a line that no winch drives: a band, a spring that pushes, a weight."""
-    from seecr.description.mjcf import load_robot
-
-    path = model_path("camera").parents[1] / "passive_lines" / f"{kind}.xml"
-    poses = robot_sweep(load_robot(path), N_SWEEP // 2)
-    return Case(f"passive-{kind}", path, path, None, "sweep", poses)
 
 
 def _generator(seed: int, name: str) -> np.random.Generator:

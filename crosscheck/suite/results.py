@@ -7,23 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from crosscheck.settle.settler import SettlingBatch
 from crosscheck.suite.agreement import QUANTITIES, Allowance, Differences, ratios
 from crosscheck.suite.cases import Case
-from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.verdicts import UNSOLVED, Outcome, PoseFinding, Verdict
 from seecr.counted import counted
 from seecr.description.robot import Robot
 from seecr.pose import Array
 from seecr.result import COORDINATES, Record, Result, named, rows_of
 from seecr.statics.solution import Solution
-
-if TYPE_CHECKING:
-    from crosscheck.settle.settler import SettlingBatch
 
 QUANTITY_HEADS = {
     "settled_position_m": "settled [m]",
@@ -157,7 +154,7 @@ class CaseResult(Result):
     @property
     def mujoco_ms(self) -> float:
         """Milliseconds that MuJoCo takes per pose, both stages, on one processor."""
-        return 1e3 * float(np.sum(self.settling.wall_s)) / len(self)
+        return 1e3 * float(np.mean(self.settling.settle_s + self.settling.polish_s))
 
     def lines(self) -> list[str]:
         """The outcome, the worst difference, and each pose that does not simply agree."""
@@ -202,10 +199,6 @@ class CaseResult(Result):
             "allowed": self.allowance,
         }
 
-    def mujoco_robot(self) -> MujocoRobot:
-        """A new MuJoCo robot for the case, to settle one of its poses again."""
-        return MujocoRobot(self.case.mujoco_model, self.case.mujoco_ea, self.case.passive)
-
 
 def worst_of(results: Sequence[CaseResult]) -> tuple[CaseResult, Worst] | None:
     """The case and difference nearest to its allowance, or farthest beyond it."""
@@ -219,12 +212,11 @@ def counts(count: Callable[[Verdict], int]) -> dict[str, int]:
 
 
 def _timing(result: CaseResult) -> dict[str, float]:
-    settle_s = np.mean([one.rest.wall_s for one in result.settling])
-    polish_s = np.mean([one.polished.wall_s for one in result.settling])
+    settling = result.settling
     return {
         "seecr_us_per_pose": result.seecr_us,
-        "mujoco_settle_ms_per_pose": 1e3 * float(settle_s),
-        "mujoco_polish_ms_per_pose": 1e3 * float(polish_s),
+        "mujoco_settle_ms_per_pose": 1e3 * float(np.mean(settling.settle_s)),
+        "mujoco_polish_ms_per_pose": 1e3 * float(np.mean(settling.polish_s)),
         "case_s": result.wall_s,
     }
 

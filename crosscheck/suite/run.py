@@ -16,7 +16,8 @@ import numpy as np
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.given import GivenRobot
-from crosscheck.settle.physics import ignored_note
+from crosscheck.settle.prepared import ignored_note
+from crosscheck.settle.settler import Settler, settle_batch
 from crosscheck.suite.agreement import (
     Thresholds,
     allowances,
@@ -35,7 +36,6 @@ from crosscheck.suite.effects import (
     run_effects,
     shipped_effect_cases,
 )
-from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.results import (
     CaseResult,
     Worst,
@@ -270,19 +270,22 @@ def run_case(case: Case, thresholds: Thresholds, record: Recorder | None = None)
     if case.ea is not None:
         robot = replace(robot, ea=np.where(robot.driven, case.ea, robot.ea))
     solution, seecr_s = _solve(robot, case)
-    mujoco = MujocoRobot(case.mujoco_model, case.mujoco_ea, case.passive)
+    mujoco = case.settler()
     _check_same_cables(case, robot, mujoco)
-    settling = mujoco.settle(case.poses, case.begins)
+    told = mujoco.paid_out(case.poses)
+    settling = settle_batch(mujoco, case.begins, told)
     allowance = allowances(thresholds, solution, settling)
     difference = differences_of(solution, settling, allowance.tension_N)
-    verdict, findings = judge_poses(Answers(mujoco, solution, settling, difference, allowance))
+    verdict, findings = judge_poses(
+        Answers(mujoco, told, solution, settling, difference, allowance)
+    )
     result = CaseResult(
         case=case,
         robot=robot,
         solution=solution,
         settling=settling,
-        mujoco_rest_lengths=mujoco.rest_lengths(case.poses),
-        ignored=mujoco.ignored,
+        mujoco_rest_lengths=told,
+        ignored=mujoco.physics.ignored,
         difference=difference,
         allowance=allowance,
         verdict=verdict,
@@ -387,8 +390,8 @@ def _solve(robot: Robot, case: Case) -> tuple[Solution, float]:
     return solution, best
 
 
-def _check_same_cables(case: Case, robot: Robot, mujoco: MujocoRobot) -> None:
-    m = mujoco.settler.physics.n_cables
+def _check_same_cables(case: Case, robot: Robot, mujoco: Settler) -> None:
+    m = mujoco.physics.n_cables
     if m != robot.n_cables:
         raise InputFileError(
             f"{case.mujoco_model}: {counted(m, 'cable')}; expected {robot.n_cables} as in "

@@ -10,17 +10,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.settle.settler import SettleStatus
+from crosscheck.settle.relaxation import SettleStatus
 from crosscheck.suite.agreement import Allowance, Differences, gap, within
 from seecr.equilibrium.solving import solve as seecr_solve
 from seecr.pose import Array
 from seecr.statics.solution import Status
 
 if TYPE_CHECKING:
-    from crosscheck.settle.settler import SettlingBatch
+    from crosscheck.settle.settler import Settler, SettlingBatch
     from crosscheck.suite.agreement import FindingLimits
     from crosscheck.suite.cases import Case
-    from crosscheck.suite.mujoco_robot import MujocoRobot
     from seecr.statics.solution import Solution
 
 
@@ -85,9 +84,10 @@ class PoseFinding:
 
 
 class Answers(NamedTuple):
-    """Everything that a verdict is based on."""
+    """Everything that a verdict is based on; lengths (n, m) [m] are those that MuJoCo was told."""
 
-    mujoco: MujocoRobot
+    mujoco: Settler
+    told: Array
     solution: Solution
     settling: SettlingBatch
     difference: Differences
@@ -143,9 +143,9 @@ class _Pair:
 
     @classmethod
     def of(cls, answers: Answers, i: int) -> _Pair:
-        mujoco, solution = answers.mujoco, answers.solution
-        command, ours, theirs = solution.command[i], solution.pose[i], answers.settling[i].pose
-        again = mujoco.settle_from(ours, command)
+        mujoco, told = answers.mujoco, answers.told[i]
+        ours, theirs = answers.solution.pose[i], answers.settling[i].pose
+        again = mujoco.settle(ours, told)
         free = answers.settling[i].free_to_move or again.free_to_move
         return cls(
             answers,
@@ -153,8 +153,8 @@ class _Pair:
             mujoco_stays=again.settled and _near(answers, i, again.pose, ours),
             seecr_stays=(_seecr_balances if free else _seecr_stays)(answers, i, theirs),
             free=free,
-            energy_seecr=mujoco.energy(ours, command),
-            energy_mujoco=mujoco.energy(theirs, command),
+            energy_seecr=mujoco.energy(ours, told),
+            energy_mujoco=mujoco.energy(theirs, told),
         )
 
     @property
@@ -171,7 +171,7 @@ class _Pair:
         work = float(solution.tables.scale[i]) * solution.robot.length
         if not apart <= _BALANCED * work:
             return False
-        left = answers.mujoco.imbalance_between(theirs, solution.pose[i], solution.command[i])
+        left = answers.mujoco.imbalance_between(theirs, solution.pose[i], answers.told[i])
         return left <= max(_BALANCED, 10.0 * answers.settling[i].rounding)
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -57,24 +57,16 @@ def junit_xml(run: Run) -> str:
 
     Poses and effects are separate test suites, if there are any.
     """
-    both: list[CaseResult | EffectResult] = [*run.results, *run.effects]
-    root = ET.Element("testsuites", {"name": "crosscheck run", **_counts(both, run.wall_s)})
-    if run.results:
-        counts = _counts(run.results, run.wall_s)
-        suite = ET.SubElement(root, "testsuite", {"name": "crosscheck run", **counts})
-        for result in run.results:
-            lines, found = failure_lines(result), _report(result)
-            _add(
-                suite, "crosscheck", result, remarks(result), "\n".join(lines),
-                "\n".join(found),
-            )  # fmt: skip
-    if run.effects:
-        counts = _counts(run.effects, sum(effect.wall_s for effect in run.effects))
-        suite = ET.SubElement(root, "testsuite", {"name": GROUP, **counts})
-        for effect in run.effects:
-            said = effect_text(effect)
-            wrong = f"{effect.case.name}: {said}"
-            _add(suite, f"crosscheck.{GROUP}", effect, said, wrong, said)
+    name, of_effects = "crosscheck run", sum(effect.wall_s for effect in run.effects)
+    root = ET.Element("testsuites", {"name": name, **_counts(run.every, run.wall_s)})
+    for kind, group, results, seconds in (
+        (name, "crosscheck", run.results, run.wall_s),
+        (GROUP, f"crosscheck.{GROUP}", run.effects, of_effects),
+    ):
+        if results:
+            suite = ET.SubElement(root, "testsuite", {"name": kind, **_counts(results, seconds)})
+            for result in results:
+                _add(suite, group, result)
     ET.indent(root)
     text: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
     return text.decode() + "\n"
@@ -90,23 +82,20 @@ def _counts(results: Sequence[CaseResult | EffectResult], seconds: float) -> dic
     }
 
 
-def _add(
-    suite: ET.Element, group: str, result: CaseResult | EffectResult, message: str, wrong: str,
-    found: str,
-) -> None:  # fmt: skip
+def _add(suite: ET.Element, group: str, result: CaseResult | EffectResult) -> None:
     """A test case: what was found, and, unless both sides agree, what is wrong."""
-    case = ET.SubElement(
-        suite,
-        "testcase",
-        classname=group,
-        name=_clean(result.case.name),
-        time=f"{result.wall_s:.3f}",
-    )
+    name, seconds = result.case.name, f"{result.wall_s:.3f}"
+    case = ET.SubElement(suite, "testcase", classname=group, name=_clean(name), time=seconds)
+    if isinstance(result, CaseResult):
+        message, wrong, found = remarks(result), failure_lines(result), _report(result)
+    else:
+        message = effect_text(result)
+        wrong, found = [f"{name}: {message}"], [message]
     tag = _TAGS.get(result.outcome)
     if tag is not None:
-        said = _clean(f"{result.case.name}: {message}")
-        ET.SubElement(case, tag, message=said, type=tag).text = _clean(wrong)
-    ET.SubElement(case, "system-out").text = _clean(found)
+        said = _clean(f"{name}: {message}")
+        ET.SubElement(case, tag, message=said, type=tag).text = _clean("\n".join(wrong))
+    ET.SubElement(case, "system-out").text = _clean("\n".join(found))
 
 
 def _report(result: CaseResult) -> list[str]:
@@ -145,7 +134,7 @@ def summary_md(run: Run, worst_pose: str) -> str:
 
 def _cases(run: Run, worst_pose: str) -> list[str]:
     parts = [
-        _table(run),
+        _table(TABLE_HEADS, [*map(case_cells, run.results), threshold_cells(run)], words=1),
         "Largest differences between SEECR and MuJoCo over each case's poses. `settled`: MuJoCo "
         "brought to rest by its own dynamics; `polished` and tensions: after Newton's method on "
         f"its inverse dynamics. Times are per pose, on one processor. {worst_pose}",
@@ -158,9 +147,7 @@ def _cases(run: Run, worst_pose: str) -> list[str]:
 
 def _effects(run: Run) -> list[str]:
     """How the effects ended, which failed, and a folded table of all."""
-    heads = EFFECT_HEADS
-    rule = ["---", "---", *["---:"] * (len(heads) - 4), "---", "---"]
-    table = "\n".join(_row(row) for row in [heads, rule, *map(effect_cells, run.effects)])
+    table = _table(EFFECT_HEADS, map(effect_cells, run.effects), words=2)
     failed = [f"- {line}" for line in effect_failures(run.effects)]
     return [
         "## Effects",
@@ -171,11 +158,10 @@ def _effects(run: Run) -> list[str]:
     ]
 
 
-def _table(run: Run) -> str:
-    heads = TABLE_HEADS
-    rule = ["---", *["---:"] * (len(heads) - 3), "---", "---"]
-    rows = [heads, rule, *(case_cells(r) for r in run.results), threshold_cells(run)]
-    return "\n".join(_row(row) for row in rows)
+def _table(heads: Sequence[str], rows: Iterable[Sequence[str]], words: int) -> str:
+    """A table whose columns are numbers, but for so many at the left and two at the right."""
+    rule = [*["---"] * words, *["---:"] * (len(heads) - words - 2), "---", "---"]
+    return "\n".join(_row(row) for row in (heads, rule, *rows))
 
 
 def _row(cells: Sequence[str]) -> str:
@@ -218,21 +204,14 @@ def worst_pose(results: Sequence[CaseResult]) -> tuple[CaseResult, int]:
 def write_worst_pose(results: Sequence[CaseResult], folder: Path) -> str:
     """Write its MJCF into a folder; returns a sentence about what it shows."""
     result, i = worst_pose(results)
-    mujoco, settling = result.mujoco_robot(), result.settling[i]
-    if settling.settled:
-        qpos, state = settling.qpos, "as MuJoCo found it at rest"
-    else:
-        qpos, state = mujoco.qpos(result.case.poses[i]), "as commanded, since MuJoCo did not settle"
-    lengths = result.mujoco_rest_lengths[i]
+    mujoco, settling = result.case.settler(), result.settling[i]
+    qpos, state = settling.qpos, "as MuJoCo found it at rest"
+    if not settling.settled:
+        mujoco.physics.place(result.case.poses[i])
+        qpos, state = mujoco.physics.data.qpos, "as commanded, since MuJoCo did not settle"
+    lengths, source = result.mujoco_rest_lengths[i], result.case.mujoco_model
     try:
-        write_worst_pose_mjcf(
-            result.case.mujoco_model,
-            qpos,
-            lengths,
-            mujoco.settler.ea,
-            folder / FILE_NAME,
-            result.robot,
-        )
+        write_worst_pose_mjcf(source, qpos, lengths, mujoco.ea, folder / FILE_NAME, result.robot)
     except InputFileError as error:  # a robot in several files can be run, but not rewritten
         return f"There is no `{FILE_NAME}`: {error}."
     return f"`{FILE_NAME}` opens in MuJoCo's viewer at pose {i} of {result.case.name}, {state}."

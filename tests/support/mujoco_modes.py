@@ -6,18 +6,18 @@ import mujoco
 import numpy as np
 
 from crosscheck.settle.newton import stiffness
-from crosscheck.suite.mujoco_robot import MujocoRobot
+from crosscheck.settle.settler import Settler
 from seecr.pose import Array
 
 
-def mujocos_modes(side: MujocoRobot, pose: Array, command: Array) -> tuple[Array, Array]:
+def mujocos_modes(side: Settler, pose: Array, command: Array) -> tuple[Array, Array]:
     """Eigenvalues of the stiffness (d,) [N/m] and frequencies (d,) [Hz] at a pose, ascending.
 
     The stiffness is a finite difference of MuJoCo's forces, by translations and by rotations times
     the robot's length, or by joints; the mass matrix is MuJoCo's.
     """
-    physics = side.settler.physics
-    physics.set_cables(side.rest_lengths(command[None])[0], side.settler.ea)
+    physics = side.physics
+    physics.set_cables(side.paid_out(command[None])[0], side.ea)
     physics.set_load()
     physics.place(pose)
     mujoco.mj_forward(physics.model, physics.data)

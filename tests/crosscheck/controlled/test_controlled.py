@@ -17,8 +17,14 @@ import crosscheck
 import seecr
 from crosscheck.controlled.control import Timing
 from crosscheck.controlled.machine import Machine, Winches
-from crosscheck.suite import EffectCase
-from crosscheck.suite.effects import CONTROL, EffectResult, effect_text, effects_line, run_effect
+from crosscheck.suite.effects import (
+    CONTROL,
+    EffectCase,
+    EffectResult,
+    effect_text,
+    effects_line,
+    run_effect,
+)
 from seecr.pose import Array, moved_by, pose_add, pose_difference
 
 COGIRO = seecr.load_robot(seecr.model_path("demobot_cogiro"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import mujoco
 import numpy as np
@@ -12,15 +13,16 @@ from random_robots import write_mjcf
 from rejointed import WAYS, rejointed
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.settle import newton
+from crosscheck.settle import newton, relaxation
 from crosscheck.settle import settler as settle
 from crosscheck.settle.physics import Physics
-from crosscheck.settle.settler import Settler, SettleStatus, settle_batch
+from crosscheck.settle.relaxation import SettleStatus
+from crosscheck.settle.settler import Settler, settle_batch
 from crosscheck.show.case_recording import record_motion
 from crosscheck.suite.write import write_worst_pose_mjcf
 from seecr.description.mjcf import load_robot
 from seecr.equilibrium.solving import solve
-from seecr.errors import InputFileError
+from seecr.errors import InputFileError, SeecrError
 from seecr.pose import pose_difference, quat_from_rotvec, quat_rotate, transform_points
 
 G = 9.81
@@ -71,7 +73,15 @@ def mjcf(
 def settler(points, **options):
     keys = ("tolerance", "max_steps")
     own = {k: options.pop(k) for k in keys if k in options}
-    return Settler(mujoco.MjModel.from_xml_string(mjcf(*points, **options)), **own)
+    return of_text(mjcf(*points, **options), **own)
+
+
+def of_text(xml, make=Settler, **own):
+    """What is made of a file with this text."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "robot.xml"
+        path.write_text(xml, encoding="utf-8")
+        return make(path, **own)
 
 
 def loaded(one, wrench):
@@ -248,9 +258,7 @@ def test_the_smallest_stiffness_is_the_platforms_whatever_its_joints(way, tmp_pa
 
 
 def test_joints_are_placed_at_the_commanded_pose():
-    physics = Physics.of(
-        mujoco.MjModel.from_xml_string(mjcf(*PLANAR, home=(0, 0, 0), joints=XZ_TILT))
-    )
+    physics = of_text(mjcf(*PLANAR, home=(0, 0, 0), joints=XZ_TILT), Physics.of)
     pose = np.concatenate([[0.3, 0, 0.2], quat_from_rotvec(np.array([0, 0.4, 0]))])
     physics.place(pose)
     assert physics.pose() == pytest.approx(pose, abs=1e-14)
@@ -302,7 +310,7 @@ def test_status_fell():
 
 def test_status_diverged_leaves_no_log_behind(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(settle, "time_step", lambda physics: 1e9)
+    monkeypatch.setattr(relaxation, "time_step", lambda physics: 1e9)
     pose = poses_at(HOME)
     result = settler(COGIRO).settle(pose[0], nominal(COGIRO, pose)[0])
     assert result.status is SettleStatus.DIVERGED
@@ -316,8 +324,8 @@ def test_a_time_step_that_diverges_is_shortened(tmp_path, monkeypatch):
     pose = poses_at([0.3, 0.2, 0.12])
     one, rest = settler(COGIRO), nominal(COGIRO, pose)[0]
     plain = one.settle(pose[0], rest)
-    monkeypatch.setattr(settle, "time_step", lambda physics: 1e9)
-    monkeypatch.setattr(settle, "_SHORTER", 1e12)
+    monkeypatch.setattr(relaxation, "time_step", lambda physics: 1e9)
+    monkeypatch.setattr(relaxation, "_SHORTER", 1e12)
     again = one.settle(pose[0], rest)
     assert again.settled
     assert again.pose == pytest.approx(plain.pose, abs=1e-11)
@@ -328,7 +336,7 @@ def test_status_polish_moved():
     pose = poses_at([0.17, 0.25, 0.1])
     result = settler(PARALLEL, tolerance=0.6).settle(pose[0], nominal(PARALLEL, pose)[0])
     assert result.status is SettleStatus.POLISH_MOVED
-    assert result.polished.moved_m > 1e-4
+    assert result.moved_m > 1e-4
     assert nothing_but_nan(result)
 
 
@@ -354,7 +362,7 @@ def test_damping_friction_limits_and_contacts_do_not_shift_the_rest_state():
     )
     xml = mjcf(*PLANAR, home=(0, 0, 0), joints=rough, ea=500.0).replace(*floor)
     xml = xml.replace("<inertial", '<geom size="0.1"/><inertial')
-    other = Settler(mujoco.MjModel.from_xml_string(xml))
+    other = of_text(xml)
     assert other.physics.ignored == (
         "joint limits",
         "dry friction",
@@ -364,16 +372,6 @@ def test_damping_friction_limits_and_contacts_do_not_shift_the_rest_state():
     rested = other.settle(pose[0], rest)
     assert rested.pose == pytest.approx(plain.pose, abs=1e-10)
     assert rested.steps == plain.steps  # damping would only take longer
-
-
-def test_the_callers_model_is_left_alone():
-    model = mujoco.MjModel.from_xml_string(mjcf(*COGIRO))
-    before = model.tendon_stiffness.copy(), model.body_mass.copy(), model.opt.integrator
-    pose = poses_at(HOME)
-    Settler(model, ea=5.0).settle(pose[0], nominal(COGIRO, pose)[0])
-    assert model.tendon_stiffness.tolist() == before[0].tolist()
-    assert model.body_mass.tolist() == before[1].tolist()
-    assert model.opt.integrator == before[2]
 
 
 def test_the_order_does_not_matter():
@@ -484,29 +482,30 @@ TWO = (
 @pytest.mark.parametrize(
     ("xml", "message"),
     [
-        ("<mujoco", "MuJoCo cannot read this as MJCF"),
-        ("<mujoco/>", "0 moving bodies; expected one platform"),
-        (broken("</body></worldbody>", TWO), "2 moving bodies; expected one platform"),
+        ("<mujoco", "cannot read this as MJCF"),
+        ("<mujoco/>", "no moving body"),
+        (broken("</body></worldbody>", TWO), "2 moving bodies hang together"),
         (
             '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>',
             "no cables",
         ),
-        (broken('<site site="A2"/>', '<site site="A2"/><site site="A1"/>'), "cable3: .* two sites"),
-        (broken('<site site="A2"/>', '<site site="B1"/>'), "cable3: .* one on the world"),
-        (broken('stiffness="', 'stiffness="1 2 '), "one stiffness|MuJoCo cannot read"),
+        (broken('<site site="A2"/>', '<site site="A2"/><site site="A1"/>'), "guide sites"),
+        (broken('<site site="A2"/>', '<site site="A2"/><site site="B2"/><site site="A2"/>'),
+         "cable3: expected exactly two sites; MuJoCo's side takes no block and tackle"),
+        (broken('<site site="A2"/>', '<site site="B1"/>'), "cable3 has all its sites on"),
+        (broken('stiffness="', 'stiffness="1 2 '), "one number|cannot read"),
     ],
-)
+)  # fmt: skip
 def test_what_is_no_cable_robot_is_refused(tmp_path, xml, message):
     path = tmp_path / "robot.xml"
     path.write_text(xml)
-    with pytest.raises(InputFileError, match=message) as caught:
+    with pytest.raises(SeecrError, match=message) as caught:
         Settler(path)
     assert str(path) in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(InputFileError, match="no such file; expected an MJCF"):
+    with pytest.raises(SeecrError, match="no such file"):
         Settler(Path(tmp_path / "none.xml"))
 
 

@@ -12,7 +12,8 @@ import pytest
 from recordings import Readback, headless_viewer
 from rerun.chunk import RrdReader
 
-from crosscheck.settle.settler import SettleStatus, SettlingBatch
+from crosscheck.settle.relaxation import SettleStatus
+from crosscheck.settle.settler import SettlingBatch
 from crosscheck.show.case_recording import NOW, READ_ME, write_case_recording
 from crosscheck.suite.agreement import load_thresholds
 from crosscheck.suite.cases import Case, demobot_sweep, user_cases

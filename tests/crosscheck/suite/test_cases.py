@@ -22,7 +22,6 @@ from crosscheck.suite.cases import (
     shipped_cases,
     user_cases,
 )
-from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.results import failure_lines, remarks
 from crosscheck.suite.run import chosen_cases, run_case
 from crosscheck.suite.verdicts import Outcome, Verdict
@@ -125,8 +124,8 @@ def test_the_other_rest_of_a_tilted_command_does_not_pass(shipped, cable, side, 
 
         monkeypatch.setattr(suite, "seecr_solve", solve)
     else:
-        settle = MujocoRobot.settle
-        monkeypatch.setattr(MujocoRobot, "settle", lambda s, p, starts: settle(s, p, starts[::-1]))
+        settle = suite.settle_batch
+        monkeypatch.setattr(suite, "settle_batch", lambda s, at, rest: settle(s, at[::-1], rest))
     result = run_case(case, load_thresholds())
     assert list(result.verdict) == [Verdict.BRANCH] * 2
     assert result.outcome is Outcome.DIFFER

@@ -33,10 +33,10 @@ from crosscheck.inference.noise import (
     mixture,
     whitened,
 )
+from crosscheck.settle.settler import Settler
 from crosscheck.suite.agreement import load_thresholds
 from crosscheck.suite.cases import Case, shipped_cases
 from crosscheck.suite.effects import EffectCase
-from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.run import run_suite
 from crosscheck.suite.verdicts import Outcome
 from crosscheck.twin.measure import measure
@@ -78,7 +78,7 @@ def modes() -> None:
     for case in few_cases()[:4]:
         robot, command = seecr.load_robot(case.model), case.poses[0]
         found = seecr.solve(robot, command)
-        side = MujocoRobot(case.model)
+        side = Settler(case.model)
         stiffness, frequencies = mujocos_modes(side, found.pose[0], command)
         scale = np.where(robot.hinges, robot.length, 1.0)
         own = np.linalg.eigvalsh(found.stiffness[0] / np.outer(scale, scale))

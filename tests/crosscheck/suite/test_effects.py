@@ -44,9 +44,9 @@ def test_every_effect_is_a_case_of_each_robot():
 def test_sag_is_run_where_it_is_large_and_tensions_go_with_the_weight(good):
     *_, last = shipped_effect_cases(seed=2)
     assert last.name == "effect-cogiro_large-cable_weight" and last.seed == 2
-    assert good.tension_limit == pytest.approx(1e-6)
+    assert good.limits[2] == pytest.approx(1e-6)
     heavy = replace(good, case=last)
-    assert heavy.tension_limit == pytest.approx(1e-6 * 91.058 / 0.4)
+    assert heavy.limits[2] == pytest.approx(1e-6 * 91.058 / 0.4)
     line = effects_line([good, good, heavy])
     assert "on 1 robot, cable_weight on cogiro_large against" in line
     bad = replace(good, position_m=np.array([1.0, 1.0]))

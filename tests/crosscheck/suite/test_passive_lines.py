@@ -134,8 +134,8 @@ FAULTS: list[tuple[str, str, str, Check, str]] = [
      "np.where(self.pushes, 0.0, 0.0)", agrees, "spring"),
     ("crosscheck.settle.physics", "pull = tension / self.mass_unit",
      "pull = 0.9 * tension / self.mass_unit", agrees, "counterweight"),
-    ("crosscheck.suite.mujoco_robot", "physics.driven, lengths + self.pretension, self._at_home",
-     "True, lengths + self.pretension, self._at_home", agrees, "band"),
+    ("crosscheck.settle.settler", "physics.driven, lengths + self.pretension, self.home",
+     "True, lengths + self.pretension, self.home", agrees, "band"),
     ("crosscheck.twin.robot", "float(robot.rest_lengths[i])", "1.01 * float(robot.rest_lengths[i])",
      told, "spring"),
 ]  # fmt: skip

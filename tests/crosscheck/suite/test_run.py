@@ -11,7 +11,7 @@ import pytest
 
 import seecr
 from crosscheck.errors import CrosscheckError
-from crosscheck.settle.settler import Settling, SettlingBatch
+from crosscheck.settle.settler import Settler, Settling, SettlingBatch, screw_motion
 from crosscheck.suite import agreement, verdicts
 from crosscheck.suite import run as suite
 from crosscheck.suite.agreement import FindingLimits, gap, load_thresholds
@@ -22,7 +22,6 @@ from crosscheck.suite.cases import (
     select,
     shipped_cases,
 )
-from crosscheck.suite.mujoco_robot import MujocoRobot, screw_motion
 from crosscheck.suite.results import CaseResult, failure_lines, finding_lines, remarks, worst_of
 from crosscheck.suite.run import run_case, run_suite
 from crosscheck.suite.verdicts import Outcome, Verdict
@@ -53,8 +52,8 @@ def with_stiffer_cable(model: Path, folder: Path, factor: float, cable: int = 0)
 
 def with_eigenvalue(settling: Settling, eigenvalue: float, residual: float = 1e-9) -> Settling:
     """A settling as if the robot were that soft [N/m], and so much were left unbalanced."""
-    polished = replace(settling.polished, smallest_eigenvalue=eigenvalue, residual=residual)
-    return replace(settling, polished=polished, rest=replace(settling.rest, residual=residual))
+    same = {"residual": residual, "settled_residual": residual}
+    return replace(settling, smallest_eigenvalue=eigenvalue, **same)
 
 
 @pytest.fixture(scope="module")
@@ -101,18 +100,17 @@ def test_another_mjcf_for_mujoco_keeps_its_own_stiffness(tmp_path):
     changed = with_stiffer_cable(COGIRO, tmp_path, 1.001)
     poses = demobot_sweep(0.1, 1)
     case = case_of(COGIRO, poses, mujoco_model=changed, cable="vectran")
-    np.testing.assert_allclose(MujocoRobot(changed, case.mujoco_ea).settler.ea[0], 3003.0)
+    np.testing.assert_allclose(case.settler().ea[0], 3003.0)
     assert run_case(case, load_thresholds()).outcome is Outcome.DIFFER
 
 
 def test_mujoco_measures_the_lengths_it_pays_out_itself(tmp_path):
-    side = MujocoRobot(PARALLEL)
-    robot = seecr.load_robot(PARALLEL)
+    side, robot = Settler(PARALLEL), seecr.load_robot(PARALLEL)
     poses = demobot_random(np.random.default_rng(5), 10, 0.2)
     expected = robot.commanded_lengths(poses)
-    np.testing.assert_allclose(side.rest_lengths(poses), expected, rtol=0, atol=1e-15)
-    side.settle(poses[:1])  # changes the springs; the reference must not follow
-    np.testing.assert_allclose(side.rest_lengths(poses), expected, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(side.paid_out(poses), expected, rtol=0, atol=1e-15)
+    side.settle(poses[0], expected[0])  # changes the springs; the reference must not follow
+    np.testing.assert_allclose(side.paid_out(poses), expected, rtol=0, atol=1e-15)
 
 
 def test_cable_counts_must_match():
@@ -159,7 +157,8 @@ def test_a_platform_free_to_turn_does_not_hide_a_difference(tmp_path):
 def test_a_cable_on_the_border_of_slack_is_polished_and_holds_nothing(position):
     # On its free turn the platform stops where a third cable is about to pull: the polish must
     # balance the forces there, and not take that cable's rounding for stiffness.
-    (settling,) = MujocoRobot(PARALLEL, 1000.0).settle(np.array([[*position, 1.0, 0, 0, 0]]))
+    one, pose = Settler(PARALLEL, ea=1000.0), np.array([*position, 1.0, 0, 0, 0])
+    settling = one.settle(pose, one.paid_out(pose[None])[0])
     assert settling.settled, settling.status.value
     assert settling.residual < 1e-11
     third = np.sort(settling.tensions)[-3]
@@ -196,12 +195,13 @@ def seesaw_answers(path: Path) -> verdicts.Answers:
     """SEECR to the one side, MuJoCo to the other, of the same command."""
     command = np.array([[0.0, 0, 0, 1, 0, 0, 0]])
     left, right = (np.r_[0.0, 0, 0, quat_from_rotvec(np.array([0, a, 0]))] for a in (-0.4, 0.4))
-    robot, side = seecr.load_robot(path), MujocoRobot(path)
+    robot, side = seecr.load_robot(path), Settler(path)
     solution = seecr.solve(robot, command, start=left[None])
-    settling = SettlingBatch([side.settle_from(right, command[0])])
+    told = side.paid_out(command)
+    settling = SettlingBatch([side.settle(right, told[0])])
     allowance = agreement.allowances(load_thresholds(), solution, settling)
     difference = agreement.differences_of(solution, settling, allowance.tension_N)
-    return verdicts.Answers(side, solution, settling, difference, allowance)
+    return verdicts.Answers(side, told, solution, settling, difference, allowance)
 
 
 def test_two_stable_equilibria_are_a_finding_with_both_energies(seesaw):
@@ -240,13 +240,14 @@ def test_unsolved_poses_are_neither_passes_nor_differences(monkeypatch):
 
 
 def test_mujoco_that_does_not_settle_is_unsolved(monkeypatch):
-    original = MujocoRobot.__init__
+    settler = Case.settler
 
-    def impatient(self, *arguments, **options):
-        original(self, *arguments, **options)
-        self.settler.max_steps = 5
+    def impatient(case):
+        one = settler(case)
+        one.max_steps = 5
+        return one
 
-    monkeypatch.setattr(MujocoRobot, "__init__", impatient)
+    monkeypatch.setattr(Case, "settler", impatient)
     result = run_case(case_of(COGIRO, demobot_sweep(0.1, 2)), load_thresholds())
     assert list(result.verdict) == [Verdict.MUJOCO_UNSOLVED] * 2
     assert np.isnan(result.difference.position_m).all()

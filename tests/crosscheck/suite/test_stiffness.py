@@ -25,7 +25,7 @@ def shipped():
 @pytest.mark.parametrize("name", NAMES)
 def test_stiffness_and_frequencies_at_rest_are_mujocos(name, shipped):
     result = run_case(shipped[name], load_thresholds())
-    solution, mujoco = result.solution, result.mujoco_robot()
+    solution, mujoco = result.solution, result.case.settler()
     np.testing.assert_allclose(
         solution.smallest_eigenvalue, result.settling.smallest_eigenvalue, rtol=1e-5
     )

@@ -16,14 +16,13 @@ import numpy as np
 import pytest
 
 from crosscheck.settle.physics import Physics
-from crosscheck.settle.settler import Settling
+from crosscheck.settle.settler import Settler, Settling
 from crosscheck.suite import effects as effects_suite
 from crosscheck.suite import run as suite
 from crosscheck.suite import verdicts
 from crosscheck.suite.agreement import load_thresholds
 from crosscheck.suite.cases import Case, shipped_cases
 from crosscheck.suite.effects import EffectCase, run_effect
-from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.run import Run, run_suite, verdict_line
 from crosscheck.suite.verdicts import Outcome
 from crosscheck.suite.write import junit_xml
@@ -246,13 +245,12 @@ def wrong_branch(patch: Patch) -> None:
 
 
 def wrong_branch_of_mujoco(patch: Patch) -> None:
-    def settle(self: MujocoRobot, poses: np.ndarray, starts: np.ndarray) -> Any:
-        from crosscheck.settle.settler import settle_batch
+    honest = suite.settle_batch
 
-        begins = rolled(starts) if self.settler.physics.is_free else starts
-        return settle_batch(self.settler, begins, self.rest_lengths(poses))
+    def settle(side: Settler, starts: np.ndarray, rest: np.ndarray) -> Any:
+        return honest(side, rolled(starts) if side.physics.is_free else starts, rest)
 
-    patch.setattr(MujocoRobot, "settle", settle)
+    patch.setattr(suite, "settle_batch", settle)
 
 
 def everything_counts_as_free(patch: Patch) -> None:
@@ -261,10 +259,8 @@ def everything_counts_as_free(patch: Patch) -> None:
 
 
 def rest_lengths_of_the_command_before(patch: Patch) -> None:
-    honest = MujocoRobot.rest_lengths
-    patch.setattr(
-        MujocoRobot, "rest_lengths", lambda self, poses: np.roll(honest(self, poses), 1, axis=0)
-    )
+    honest = Settler.paid_out
+    patch.setattr(Settler, "paid_out", lambda self, poses: np.roll(honest(self, poses), 1, axis=0))
 
 
 def gravity(factor: float) -> Callable[[Patch], None]:

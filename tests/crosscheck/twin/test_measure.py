@@ -12,7 +12,7 @@ import pytest
 from effect_cases import experiment_of
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.settle.settler import SettleStatus, come_to_rest
+from crosscheck.settle.relaxation import SettleStatus, come_to_rest
 from crosscheck.suite.effects import effect_cases, run_effect
 from crosscheck.twin.build import Cable, Springs, hang
 from crosscheck.twin.measure import measure, paid_out, waypoints_of
