@@ -17,7 +17,7 @@ import browser
 
 from crosscheck.comparison import compare
 from crosscheck.diagnosis.diagnose import diagnose
-from crosscheck.planning import make_plan
+from crosscheck.planning.design import make_plan
 from crosscheck.show.pictures import write_page
 from crosscheck.twin.make import Twin, make_twin
 from seecr.description.mjcf import model_path

@@ -254,11 +254,10 @@ class Physics:
             raise CrosscheckError(f"pose: expected a quaternion of norm 1, got norm {norm:g}")
         self.data.qvel[:] = 0.0
         self.data.time = 0.0
+        self.data.qpos[:] = self.reference_qpos
         if self.is_free:
-            self.data.qpos[:3] = pose[:3]
-            self.data.qpos[3:] = pose[3:] / norm
+            self.data.qpos[:3], self.data.qpos[3:7] = pose[:3], pose[3:] / norm
         else:
-            self.data.qpos[:] = self.reference_qpos
             self._joints_towards(pose)
         self.update()
         self.force_scale = self._load or self._own_forces()
@@ -443,10 +442,11 @@ class Physics:
                 break
 
     def _which_rotate(self) -> Array:
-        if self.is_free:
-            return np.array([False] * 3 + [True] * 3)
         kind = self.model.jnt_type[self.model.dof_jntid]
-        return np.asarray((kind == _HINGE) | (kind == _BALL))
+        rotate = np.asarray((kind == _HINGE) | (kind == _BALL))
+        if self.is_free:
+            rotate[3:6] = True  # the platform's own come first
+        return rotate
 
     def _characteristic_length(self) -> float:
         anchors = self.data.site_xpos[self.parts.anchors]

@@ -56,17 +56,27 @@ def trajectory(robot: Robot, points: int = 18, extent: float = 1.0) -> Trajector
         extent: 1 for the usual size.
     """
     frame, reach = _frame(robot)
+    along, across = (
+        np.linspace(part * side[0], part * side[1], points)
+        for part, side in ((_ALONG, reach[0]), (_ACROSS, reach[1]))
+    )
+    lines: dict[str, tuple[Any, Any, Any]] = {
+        "along_low": (along, 0.0, -_HEIGHT), "along_high": (along, 0.0, _HEIGHT),
+        "across": (0.0, across, _HEIGHT),
+    }  # fmt: skip
+    if np.ptp(across) < 0.05 * np.ptp(reach[0]):  # without a width, up and down
+        lines["across"] = 0.0, 0.0, np.linspace(-_HEIGHT, 1.5 * _HEIGHT, points)
     runs: dict[str, Array] = {}
-    for name, height in (("low", -_HEIGHT), ("high", _HEIGHT)):
-        line = _line(points, reach[0], _ALONG)
-        _to_and_fro(runs, f"along_{name}", np.stack([line, 0 * line, height + 0 * line], 1))
-    _to_and_fro(runs, "across", _across(points, reach))
-    changes = {name: _base_change(frame, reach, part) for name, part in runs.items()}
-    changes["loop"] = _loop(frame, reach, 2 * points)
-    change = extent * np.concatenate([*changes.values()])
+    for name, (x, y, height) in lines.items():
+        change = np.zeros((points, 6))
+        change[:, :3] = np.stack(np.broadcast_arrays(x, y, height * reach[2, 1], along)[:3], 1)
+        change[:, :3] = change[:, :3] @ frame
+        runs[f"{name}_fwd"], runs[f"{name}_back"] = change, change[::-1]
+    runs["loop"] = _loop(frame, reach, 2 * points)
+    change = extent * np.concatenate([*runs.values()])
     poses = onto_joints(robot, pose_add(np.tile(robot.reference_pose, (len(change), 1)), change))
-    counts = [len(change) for change in changes.values()]
-    return Trajectory(poses, np.repeat(np.array(list(changes)), counts), _clock(counts))
+    counts = [len(change) for change in runs.values()]
+    return Trajectory(poses, np.repeat(np.array(list(runs)), counts), _clock(counts))
 
 
 def _frame(robot: Robot) -> tuple[Array, Array]:
@@ -82,30 +92,6 @@ def _frame(robot: Robot) -> tuple[Array, Array]:
     reach = np.stack([np.minimum(room.min(axis=0), 0.0), np.maximum(room.max(axis=0), 0.0)], 1)
     reach[2] = max(abs(reach[2, 0]), reach[2, 1])
     return frame, reach
-
-
-def _line(points: int, reach: Array, part: float) -> Array:
-    """Numbers (points,) [m] from one side to the other."""
-    return np.linspace(part * reach[0], part * reach[1], points)
-
-
-def _across(points: int, reach: Array) -> Array:
-    """A sweep (points, 3) across the robot; up and down if it has no width."""
-    line = _line(points, reach[1], _ACROSS)
-    height = np.full(points, _HEIGHT)
-    if np.ptp(line) < 0.05 * np.ptp(reach[0]):
-        line, height = np.zeros(points), np.linspace(-_HEIGHT, 1.5 * _HEIGHT, points)
-    return np.stack([0 * line, line, height], axis=1)
-
-
-def _to_and_fro(runs: dict[str, Array], name: str, part: Array) -> None:
-    runs[f"{name}_fwd"], runs[f"{name}_back"] = part, part[::-1]
-
-
-def _base_change(frame: Array, reach: Array, part: Array) -> Array:
-    """Change (n, 6) of the reference pose; heights are fractions of the reach upwards."""
-    local = part * np.array([1.0, 1.0, reach[2, 1]])
-    return np.concatenate([local @ frame, np.zeros_like(local)], axis=1)
 
 
 def _loop(frame: Array, reach: Array, points: int) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.settle.relaxation import SettleStatus, come_to_rest
-from crosscheck.twin.build import Cable, Springs
+from crosscheck.twin.cable import Cable, Springs
 from crosscheck.twin.robot import TrueRobot, true_robot
 from crosscheck.twin.world import Descent, World, descend
 from seecr.commands import Commands, Loads

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,7 +12,8 @@ from numpy.typing import NDArray
 
 from crosscheck.settle.newton import minimise, neutral_stiffness, stiffness
 from crosscheck.settle.physics import Index, Parts, Physics, Together
-from crosscheck.twin.build import Places, Springs, build, hang
+from crosscheck.twin.build import Places, build
+from crosscheck.twin.cable import Springs, hang
 from crosscheck.twin.robot import TrueRobot
 from seecr.pose import Array, quat_multiply
 
@@ -125,14 +125,7 @@ class World(Physics):
 
     def place(self, pose: Array) -> None:
         """Put the platform at a pose (7,), with cables straight, or hanging if they have weight."""
-        self.data.qpos[:] = self.reference_qpos
-        self.data.qvel[:] = 0.0
-        self.data.time = 0.0
-        if self.is_free:
-            self.data.qpos[:7] = pose
-        else:
-            self._joints_towards(pose)
-        self.update()
+        super().place(pose)
         if self.segments > 1:
             self._string()
             self.update()
@@ -271,15 +264,6 @@ class World(Physics):
         ends = self.data.site_xpos[self.places.top_next]
         arc = top - np.linalg.norm(ends - self._leaves(), axis=1)
         return np.asarray(1.0 - arc / self.cable_lengths())
-
-    def _which_rotate(self) -> Array:
-        rotate: Any = np.zeros(self.n_dof, dtype=bool)
-        if self.is_free:
-            rotate[3:6] = True
-        else:
-            hinges = self.true.robot.hinges
-            rotate[: len(hinges)] = hinges
-        return np.asarray(rotate)
 
 
 def _coupling(places: Places, n_dof: int, segments: int) -> list[Together]:

@@ -12,7 +12,7 @@ import pytest
 from crosscheck.settle.newton import minimise, stiffness
 from crosscheck.settle.physics import Physics
 from crosscheck.settle.prepared import ignored_note
-from crosscheck.twin.build import Springs
+from crosscheck.twin.cable import Springs
 from crosscheck.twin.robot import true_robot
 from crosscheck.twin.world import World
 from seecr.description.mjcf import load_robot, model_names, model_path, quiet_mujoco

@@ -14,7 +14,7 @@ from effect_cases import experiment_of
 from crosscheck.errors import CrosscheckError
 from crosscheck.settle.relaxation import SettleStatus, come_to_rest
 from crosscheck.suite.effects import effect_cases, run_effect
-from crosscheck.twin.build import Cable, Springs, hang
+from crosscheck.twin.cable import Cable, Springs, hang
 from crosscheck.twin.measure import measure, paid_out, waypoints_of
 from crosscheck.twin.robot import TRUE_EFFECTS, TrueRobot, true_robot
 from crosscheck.twin.world import World, descend
