@@ -7,7 +7,7 @@ import fnmatch
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -119,8 +119,6 @@ def _level(robot: Robot, vectors: Array) -> Array:
     return np.asarray(vectors - np.outer(vectors @ robot.up, robot.up))
 
 
-N = TypeVar("N")  # cases, and whatever else has a name
-
 N_RANDOM = 200
 # Cogiro withstands moments: its random poses are rotated by up to this about a random axis.
 _COGIRO_TURN = np.deg2rad(12.0)
@@ -201,7 +199,8 @@ def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
         ``[case.name for case in crosscheck.shipped_cases()]``
     """
     seed, n_random = whole(seed, "seed"), whole(n_random, "n_random")
-    cases, named = [], {"has_names": seed == 0}
+    cases: list[Case] = []
+    named: dict[str, Any] = {"has_names": seed == 0}
     for robot, turn in (("cogiro", _COGIRO_TURN), ("parallel", 0.0)):
         model = f"demobot_{robot}"
         for cable in CABLES:
@@ -277,11 +276,11 @@ def user_cases(
     ]
 
 
-def select(cases: Sequence[N], patterns: Sequence[str], option: str = "") -> list[N]:
+def select(cases: Sequence[Any], patterns: Sequence[str], option: str = "") -> list[Any]:
     """Cases that match any of the shell patterns; all without patterns.
 
     Args:
-        cases: to choose from.
+        cases: to choose from, of any kind with a name.
         patterns: such as "cogiro-*".
         option: the option of the command line that gave them, for the error.
 
