@@ -25,7 +25,7 @@ from crosscheck.given import (
 )
 from crosscheck.inference.catalogue import Catalogue
 from crosscheck.inference.fit import Data, Fit
-from crosscheck.inference.held_out import hold_out
+from crosscheck.inference.held_out import blocks_note, hold_out
 from crosscheck.inference.search import Search
 from crosscheck.measurements.data import GivenSigma
 from crosscheck.measurements.read import GivenData, measurements_of
@@ -246,7 +246,13 @@ def calibrate(
         before = rms_by_kind(whole.data.problem, search.plain.raw)
         errors = JointErrors.of(before, whole)
         others = thin.note_on_others(whole.terms, ready.problem.sigma)
-    notes = (*said, *contradictions(whole.terms), *ready.all_notes, *others)
+    notes = (
+        *said,
+        *contradictions(whole.terms),
+        *ready.notes,
+        *blocks_note(ready.problem),
+        *others,
+    )
     fitted = _fitted(whole, basis.terms)
     kept = {one.term.name for one in fitted}
     own = np.flatnonzero([name in kept for name, _key in whole.terms.labels])

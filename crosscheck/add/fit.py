@@ -13,6 +13,7 @@ from crosscheck.fit.state import State
 from crosscheck.given import GivenModel, GivenRobot, basis_of, model_of, robot_of
 from crosscheck.inference.catalogue import Catalogue, candidates
 from crosscheck.inference.fit import TRACKER, Data, Fit, fit, unfitted
+from crosscheck.inference.held_out import blocks_note
 from crosscheck.inference.noise import Noise
 from crosscheck.inference.search import Search
 from crosscheck.measurements.data import GivenSigma
@@ -175,7 +176,7 @@ def _added(
     # effects that are free in the data were fitted in advance: they are not in the model before
     before = ready.terms.only(n for n in ready.terms.names if n in had or n not in names)
     base = adding.without(best, names, before)
-    notes = [*said, *ready.all_notes]
+    notes = [*said, *ready.notes, *blocks_note(ready.problem)]
     return weigh(best, base, before, names, notes, basis_of(model, robot))
 
 

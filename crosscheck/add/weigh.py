@@ -13,10 +13,10 @@ from crosscheck.comparison.noise import coloured_noise
 from crosscheck.fit.problem import Rms, rms_by_kind
 from crosscheck.fit.residual_noise import whiteness
 from crosscheck.fit.state import contradictions
-from crosscheck.inference.catalogue import About, Catalogue
+from crosscheck.inference.catalogue import About, Catalogue, name_of
 from crosscheck.inference.fit import Fit, unfitted
 from crosscheck.inference.held_out import hold_out, improves, pays
-from crosscheck.inference.priors import FALSE_ALARM
+from crosscheck.inference.priors import FALSE_ALARM, SURE
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import provenance_of, renewed, with_fit
 from seecr.counted import some
@@ -30,12 +30,8 @@ _MOST_NAMED = 4
 _IMPLAUSIBLE = 5.0
 # Parameters with a larger correlation than this can hardly be determined separately.
 _CORRELATED = 0.95
-_WIDENED = (
-    "the residuals are not noise: the standard errors include by how much another missing "
-    "effect may shift these values; crosscheck diagnose searches for it"
-)
-# Another effect counts if it gains this part of what the best one does.
-_PART_OF_BEST = 0.5
+# What is less probable is outside an interval of 95 % whatever it does to a value.
+MATTERS = 1.0 - SURE
 
 
 def weigh(
@@ -56,8 +52,8 @@ def weigh(
     factor = best.data.factor
     coloured = None if white.is_noise else coloured_noise(problem, best.state, factor)
     noise = white.is_noise or (coloured is not None and not coloured.open)
-    # standard errors are too small if another effect is still missing
-    moved = np.zeros_like(best.covariance) if noise else _moved_together(best)
+    about = About(Catalogue.of(best.data, best.terms), best)
+    moved = spread_by_others(about, chances := chances_beside(about))
     covariance = _no_wider(best.terms, best.covariance + moved)
     stderr, parts = np.sqrt(np.diag(covariance)), [(t, best.terms.part(t.name)) for t in best.terms]
     fitted = tuple(Fitted(t, stderr[part], best.at_bound[part]) for t, part in parts)
@@ -84,29 +80,37 @@ def weigh(
         warnings=(
             *(text for f in fitted for text in _warnings_of(problem.robot, f)),
             *_together(best, own),
-            *([_WIDENED] if np.any(own & (np.sqrt(np.diag(moved)) > best.stderr)) else []),
+            *_widened(noise, chances, bool(np.any(own & (np.sqrt(np.diag(moved)) > best.stderr)))),
         ),
         notes=tuple(dict.fromkeys(notes)),
         model=_model(best, basis, fitted, names, errors, covariance),
     )
 
 
-def _moved_together(best: Fit) -> Array:
-    """Covariance (p, p) of how far values would move if another effect were in the model.
+def spread_by_others(about: About, chances: Mapping[str, float]) -> Array:
+    """Covariance (p, p) of how far a fit's values are from those of models with one effect more.
 
-    What a fit leaves, the fitted values have partly absorbed (omitted variables). These are the
-    moves by effects that explain most of the remainder, at most as large as the largest.
+    The errors of a fit hold if just its effects are missing. A heavier platform beside a wrong
+    length takes a part of what the length explains: if the data leave it a chance of 30 %, the
+    length is known no better than the two models agree on it (Hoeting et al. 1999).
+
+    Args:
+        about: what further members do about the fit. chances: the probability of each.
     """
-    about = About(Catalogue.of(best.data, best.terms), best)
-    every = [about.moves(k) for k in about.columns if k in about.promises]
-    most = max((gain for gain, _move in every), default=0.0)
-    some = [move for gain, move in every if gain > _PART_OF_BEST * most > 0.0]
-    if not some:
-        return np.zeros((len(best.terms), len(best.terms)))
-    moves = np.array(some)
-    largest, power = np.abs(moves).max(axis=0), np.sqrt((moves**2).sum(axis=0))
-    alike = moves * np.divide(largest, power, out=np.zeros_like(power), where=power > 0.0)
-    return np.asarray(alike.T @ alike)
+    moves = np.zeros((1, len(about.fit.terms)))
+    for key, p in chances.items():
+        if p > MATTERS and key in about.columns:
+            moves = np.vstack([moves, np.sqrt(p) * about.moves(key)[1]])
+    return np.asarray(moves.T @ moves)
+
+
+def chances_beside(about: About) -> dict[str, float]:
+    """The probability of each further effect beside a fit, at most one, by the linear model."""
+    every, nothing = about.every, about.every.log_prior(frozenset())
+    keys = [key for key in about.columns if key in about.promises]
+    odds = [about.promises[k] + every.log_prior(frozenset({k})) - nothing for k in keys]
+    total = np.logaddexp.reduce([0.0, *odds])
+    return {key: float(np.exp(one - total)) for key, one in zip(keys, odds, strict=True)}
 
 
 def _model(
@@ -150,6 +154,18 @@ def _warnings_of(robot: Robot, f: Fitted) -> Iterator[str]:
         verb = "is" if large.sum() == 1 else "are up to"
         most = f"{size[large].max():.3g} times {whose} on the robot"
         yield f"{name}: {some(names[large].tolist())} {verb} {most}"
+
+
+def _widened(noise: bool, chances: Mapping[str, float], wider: bool) -> Iterator[str]:
+    """That standard errors are wider because another effect may be missing as well."""
+    if not wider:
+        return
+    likely = max(chances, key=lambda key: chances[key])
+    why = f"{name_of(likely)} may be missing as well" if noise else "the residuals are not noise"
+    yield (
+        f"{why}: the standard errors include by how much another missing effect may shift these "
+        "values; crosscheck diagnose searches for it"
+    )
 
 
 def _together(best: Fit, own: NDArray[np.bool_]) -> list[str]:

@@ -60,7 +60,6 @@ def compare(
     problem, outliers = ready.problem, ready.far_off
     if outliers is None:  # of data without readings nobody looks for any
         outliers = np.zeros(data.n_rows, dtype=bool)
-    # nothing is cross-validated here, so that the note about its blocks is left out
     notes = [*said, *contradictions(terms), *ready.notes]
     terms = ready.terms
     plain = problem.experiment.predict(terms.effects)

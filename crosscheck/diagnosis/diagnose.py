@@ -19,6 +19,7 @@ from crosscheck.fit.words import rms_words
 from crosscheck.given import GivenModel, GivenNames, GivenRobot, considered
 from crosscheck.inference.catalogue import Catalogue, candidates
 from crosscheck.inference.fit import Data
+from crosscheck.inference.held_out import blocks_note
 from crosscheck.inference.priors import LIMITED, MOST_OF_IT, WIDTHS
 from crosscheck.inference.search import Search
 from crosscheck.inference.verdict import judged
@@ -81,7 +82,7 @@ def diagnose(
     with threadpool_limits(limits=1, user_api="blas"):
         names = considered(only, exclude)
         thin, ready, basis, said = made_ready(robot, data, model, names, sigma)
-        notes = (*said, *ready.all_notes)
+        notes = (*said, *ready.notes, *blocks_note(ready.problem))
         found = _diagnosed(ready, notes, progress, tolerance, basis)
         if found.path is None:
             return found

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from crosscheck.add.weigh import MATTERS, spread_by_others
 from crosscheck.calibration import JointErrors
 from crosscheck.comparison.associations import Association, associations
 from crosscheck.diagnosis.advice import check_of, measure_next
@@ -24,18 +24,19 @@ from crosscheck.diagnosis.words import noise_notes, sentence_of, size_notes
 from crosscheck.fit.problem import KINDS, Problem, Rms, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.residual_noise import overestimated, whiteness
-from crosscheck.fit.state import contradictions
+from crosscheck.fit.state import contradictions, largest_size
 from crosscheck.inference.catalogue import name_of
 from crosscheck.inference.fields import detectable_size
 from crosscheck.inference.fit import Fit
 from crosscheck.inference.hypothesis import Hypothesis
-from crosscheck.inference.priors import SURE
+from crosscheck.inference.priors import WIDTHS
 from crosscheck.inference.search import Search
 from crosscheck.inference.verdict import Judgement
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import provenance_of, renewed, with_fit
 from crosscheck.planning.result import Sight
 from crosscheck.preparation.prepare import noise_floor
+from seecr.description.robot import Robot
 from seecr.effects import Term, effect_named
 from seecr.pose import Array
 from seecr.prediction.model import Model
@@ -43,8 +44,6 @@ from seecr.units import parameter_name, shown
 
 # Most quantities that the unexplained part is said to be associated with, and fields named.
 _MOST_WHERE, _MOST_FIELDS = 5, 3
-# What is less probable is outside an interval of 95 % whatever it does to a value.
-_MATTERS = 1.0 - SURE
 
 
 def diagnosis_of(
@@ -55,9 +54,9 @@ def diagnosis_of(
     problem = search.data.problem
     far = search.best.fit.outlying
     alone = said.verdict is DiagnosisVerdict.EFFECTS_FOUND
-    path = _without_outliers(path_to(search, said.sure, alone), far)
+    path = path_to(search, said.sure, alone)
     chances, floor = _chances(search, said), _floor(search, said)
-    missing = _missing(search, said, path)
+    missing = _missing(search, said, path, sight)
     unknown = said.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     last = path.last
     white = whiteness(problem, last.state.white, int(last.fit.seen.sum()))
@@ -129,22 +128,10 @@ def _contradicted(
     return out
 
 
-def _without_outliers(path: ModelPath, far: NDArray[np.bool_]) -> ModelPath:
-    """The path, with rows that are far off marked, so that rms errors leave them out."""
-    if not far.any():
-        return path
-    stages = []
-    for stage in path.stages:
-        fit = stage.fit.with_far_off(far)
-        rms = rms_by_kind(fit.data.problem, stage.held_out.raw)
-        stages.append(replace(stage, fit=fit, held_out=replace(stage.held_out, rms=rms)))
-    return replace(path, problem=path.problem.with_far_off(far), stages=tuple(stages))
-
-
 # --- what is listed -------------------------------------------------------------------------------
 
 
-def _missing(search: Search, said: Judgement, path: ModelPath) -> list[MissingEffect]:
+def _missing(search: Search, said: Judgement, path: ModelPath, sight: Sight) -> list[MissingEffect]:
     """The listed effects in the order of adding.
 
     Their values are those of the listed effects alone where these are all that is missing, else
@@ -161,7 +148,8 @@ def _missing(search: Search, said: Judgement, path: ModelPath) -> list[MissingEf
             continue
         term, part = fit.terms[name], fit.terms.part(name)
         stderr = np.hypot(fit.stderr[part], spread[part])
-        alike = dict.fromkeys(map(name_of, said.classes.alike(keys[name])))
+        likely = map(name_of, said.classes.alike(keys[name]))
+        alike = dict.fromkeys([*likely, *_twins(sight, term, search.data.problem.robot)])
         rivals = [
             search.every.members[other].layout for other in alike
             if other != name and other not in fit.terms and other in search.every.members
@@ -182,25 +170,33 @@ def _missing(search: Search, said: Judgement, path: ModelPath) -> list[MissingEf
     return out
 
 
-def _spread_by_others(search: Search, said: Judgement, fit: Fit) -> Array:
-    """How far values (p,) are, rms, from those of models with a further effect, by its probability.
+def _twins(sight: Sight, term: Term, robot: Robot) -> Iterator[str]:
+    """Effects that do exactly the same to all readings as one that is larger than the widest prior.
 
-    The errors of a fit hold if just its effects are missing. A heavier platform beside a wrong
-    length takes a part of what the length explains: if the data leave it a chance of 30 %, the
-    length is known no better than the two models agree on it (Hoeting et al. 1999).
+    They take more numbers, which have to go together. That makes them improbable where errors are
+    those of tolerances. What is larger no tolerance did, and then only the data could tell: masts
+    that were all raised alike are a tracker that stands lower.
     """
+    seen = {one.name: one for one in sight.effects}
+    if term.name not in seen or largest_size(term) <= WIDTHS[-1]:
+        return
+    own = seen[term.name].signal.columns
+    parts = term.sizes.reshape(-1, own.shape[1])  # of each file or run, or of all
+    for other in seen[term.name].twins:
+        signal = seen[other].signal
+        alike = np.linalg.lstsq(signal.columns, own @ parts.T)[0].T * signal.layout.scale
+        terms = [Term(signal.layout, signal.layout.null + values) for values in alike]
+        if all(one.is_possible(robot) for one in terms):
+            yield other
+
+
+def _spread_by_others(search: Search, said: Judgement, fit: Fit) -> Array:
+    """How far values (p,) are, rms, from those of models with a further effect."""
     had = set(search.every.keys_of(fit.terms).values())
-    likely = {
-        members[0]: p for members, p in said.classes.classes
-        if p > _MATTERS and not had & set(members)
-    }  # fmt: skip
-    square = np.zeros(len(fit.terms))
-    if likely:
-        about = search.every.about(fit)
-        for key, p in likely.items():
-            if key in about.columns:
-                square += p * about.moves(key)[1] ** 2
-    return np.sqrt(square)
+    likely = {members[0]: p for members, p in said.classes.classes if not had & set(members)}
+    if max(likely.values(), default=0.0) <= MATTERS:
+        return np.zeros(len(fit.terms))
+    return np.sqrt(np.diag(spread_by_others(search.every.about(fit), likely)))
 
 
 # --- what is not listed ---------------------------------------------------------------------------
@@ -264,7 +260,7 @@ def _chances(search: Search, said: Judgement) -> Chances:
             classes.append((names, p))
     posterior = said.posterior
     unknown = said.verdict in (DiagnosisVerdict.UNKNOWN_EFFECT, DiagnosisVerdict.MANY_EFFECTS)
-    kinds = [search.every.kinds[k] for k, p in posterior.fields.items() if p > _MATTERS / 2.0]
+    kinds = [search.every.kinds[k] for k, p in posterior.fields.items() if p > MATTERS / 2.0]
     is_seen = unknown and posterior.unknown > PROBABLE
     seen_in = tuple(dict.fromkeys(kinds))[:_MOST_FIELDS] if is_seen else ()
     together = None

@@ -13,12 +13,11 @@ import numpy as np
 
 from crosscheck.fit.problem import KINDS, Problem, Rms, rms_by_kind
 from crosscheck.fit.state import State
-from crosscheck.inference.catalogue import Key, name_of, part_of
+from crosscheck.inference.catalogue import name_of, part_of
 from crosscheck.inference.fit import Fit
 from crosscheck.inference.held_out import HeldOut, by_part, hold_out
 from crosscheck.inference.search import Search
 from seecr.effects import ApartLayout, Term
-from seecr.pose import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,14 +26,11 @@ class Stage:
 
     Attributes:
         label: what was added, in words. added: the effect, "" for the model as it stood.
-        key: the hypothesis, see
-            :mod:`crosscheck.inference.catalogue`. fit: its fit. held_out: its errors on held-out
-            runs.
+        fit: its fit. held_out: its errors on test runs.
     """
 
     label: str
     added: str
-    key: Key
     fit: Fit
     held_out: HeldOut
 
@@ -54,14 +50,16 @@ class ModelPath:
     """The models from the one that stood to the last one.
 
     Attributes:
-        problem: the data. search: the search that met them. stages: the models.
-        noise: by kind of reading, the noise of the best hypothesis over the stated one.
+        search: the search that met them. stages: the models, outliers marked in their data.
     """
 
-    problem: Problem
     search: Search
     stages: tuple[Stage, ...]
-    noise: Array
+
+    @property
+    def problem(self) -> Problem:
+        """The data."""
+        return self.first.fit.data.problem
 
     @property
     def base(self) -> tuple[str, ...]:
@@ -111,7 +109,7 @@ class ModelPath:
         """The part, 0 to 1, of the chi2 beyond noise on test runs that a stage removes."""
         before, after = self.stages[index - 1].held_out, self.stages[index].held_out
         kinds = [self.problem.counted[:, kind.columns].sum() for kind in KINDS]
-        noise = float(np.sum(np.array(kinds) * self.noise**2))
+        noise = float(np.sum(np.array(kinds) * self.search.best.fit.noise.scale**2))
         excess = float(before.chi2.sum()) - noise
         fall = float(before.chi2.sum() - after.chi2.sum())
         return float(np.clip(fall / excess, 0.0, 1.0)) if excess > 0.0 else 0.0
@@ -119,15 +117,18 @@ class ModelPath:
 
 def path_to(search: Search, listed: Sequence[str], whole: bool) -> ModelPath:
     """The path to the listed members; if these are the ``whole``, its end has expected sizes."""
-    problem, stood = search.data.problem, search.stood
+    key, left = search.stood, list(listed)
+    far = search.best.fit.outlying
+
+    def stage(label: str, added: str, fit: Fit) -> Stage:
+        fit = fit.with_far_off(far) if far.any() else fit
+        return Stage(label, added, fit, hold_out(_by_part(fit) if added else fit))
+
     named = bool(search.every.stood)
     start = "the given model" if named else "plain SEECR"
-    fit = search.unfitted if named else search.none.fit
-    stages = [Stage(start, "", stood, fit, hold_out(fit))]
+    stages = [stage(start, "", search.unfitted if named else search.none.fit)]
     if named and search.wants_refit:
-        fit = search.none.fit
-        stages.append(Stage(f"{start}, fitted", "", stood, fit, hold_out(fit)))
-    key, left = stood, list(listed)
+        stages.append(stage(f"{start}, fitted", "", search.none.fit))
     while left:
         tried = {k: search.reached(key, key | {k}) for k in left}
         fitted = {k: found for k, found in tried.items() if found is not None}
@@ -138,11 +139,10 @@ def path_to(search: Search, listed: Sequence[str], whole: bool) -> ModelPath:
         if whole and len(left) == 1:
             found = search.at_plausible_sizes(found)
         label = f"+ {name_of(best)}" + (f" (each {part_of(best)})" if part_of(best) else "")
-        stage = Stage(label, name_of(best), found.key, found.fit, hold_out(_by_part(found.fit)))
-        stages.append(stage)
-        key = key | {best}
+        key = found.key
+        stages.append(stage(label, name_of(best), found.fit))
         left.remove(best)
-    return ModelPath(problem, search, tuple(stages), search.best.fit.noise.scale)
+    return ModelPath(search, tuple(stages))
 
 
 def _by_part(fit: Fit) -> Fit:

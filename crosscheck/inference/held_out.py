@@ -101,19 +101,19 @@ def blocks_of(problem: Problem) -> list[NDArray[np.bool_]]:
     return [np.isin(index, part) for part in np.array_split(rows, _count(problem))]
 
 
-def blocks_note(problem: Problem) -> str:
-    """A note that the blocks held out are not whole runs; "" if they are."""
+def blocks_note(problem: Problem) -> list[str]:
+    """A note that the blocks held out are not whole runs, if they are not."""
     if problem.groups is not None:
-        return (
+        return [
             "cross-validation leaves out a part of each file or run, because each has values of "
             "its own"
-        )
+        ]
     runs = len(_runs(problem))
     if runs >= _LEAST_RUNS:
-        return ""
+        return []
     word = "a single run" if runs == 1 else f"only {counted(runs, 'run')}"
     blocks = counted(_count(problem), "block")
-    return f"{word}: cross-validation leaves out {blocks} of time instead of runs"
+    return [f"{word}: cross-validation leaves out {blocks} of time instead of runs"]
 
 
 def _runs(problem: Problem) -> NDArray[np.int64]:

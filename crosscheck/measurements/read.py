@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.given import GivenRobot, robot_of
+from crosscheck.measurements.copied import repetitions
 from crosscheck.measurements.data import (
     EXAMPLE,
     LEAST_NOISE,
@@ -28,7 +29,6 @@ from crosscheck.measurements.data import (
 )
 from crosscheck.measurements.dwells import averaged_dwells
 from crosscheck.measurements.plausible import check_readings
-from crosscheck.measurements.repeated import repetitions
 from seecr.columns.commands import (
     CHOICES,
     began,

@@ -12,7 +12,6 @@ from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.fit.residual_noise import estimate_sigma, oversized
 from crosscheck.fit.state import State
-from crosscheck.inference.held_out import blocks_note
 from crosscheck.measurements.data import Measurements
 from crosscheck.preparation.fitness import refusal_of
 from crosscheck.preparation.freed import freed, groups_of, laid_out
@@ -38,7 +37,6 @@ class Prepared:
         problem: the data without the rows that have no equilibrium, and with all noise filled in.
         terms: effects of the model, with those that the data leave free.
         notes: what was assumed, estimated or left out.
-        blocks_note: which blocks cross-validation leaves out, if they are not whole runs; else "".
         refusal: why nothing can be said about these data; None if something can.
         fitted: how many values were fitted in advance because the data leave them free.
         far_off: (n,) outliers, which count in none of the estimates; None if nobody looked for any.
@@ -47,15 +45,9 @@ class Prepared:
     problem: Problem
     terms: Terms
     notes: tuple[str, ...]
-    blocks_note: str
     refusal: Refusal | None
     fitted: int = 0
     far_off: NDArray[np.bool_] | None = None
-
-    @property
-    def all_notes(self) -> tuple[str, ...]:
-        """The notes with that about cross-validation, for commands that use it."""
-        return (*self.notes, self.blocks_note) if self.blocks_note else self.notes
 
 
 def prepare(
@@ -78,7 +70,7 @@ def prepare(
     problem = Problem(robot, data, data.sigma, every, considered=considered)
     if not problem.measured.any():
         none = Refusal(Unfit.NO_READINGS, data.n_rows)
-        return Prepared(problem, terms, (*robot.notes, *data.notes), "", none)
+        return Prepared(problem, terms, (*robot.notes, *data.notes), none)
     laid = laid_out(data, terms)
     plain = problem.experiment.predict(laid.terms.effects)
     problem, unread = without_unread(_solved_rows(problem, plain), plain)
@@ -100,9 +92,7 @@ def prepare(
     )  # fmt: skip
     problem = problem.with_groups(groups_of(data, terms))
     refusal = refusal_of(problem, plain.pose[:, :3], data.sigma) or odd
-    return Prepared(
-        problem, terms, notes, blocks_note(problem), refusal, int(found.free.sum()), far_off
-    )
+    return Prepared(problem, terms, notes, refusal, int(found.free.sum()), far_off)
 
 
 def _solved_rows(problem: Problem, plain: Prediction) -> Problem:

@@ -81,3 +81,13 @@ def test_other_parts_than_files_and_runs_are_refused(tmp_path: Path) -> None:
     path.write_text(json.dumps(document), encoding="utf-8")
     with pytest.raises(InputFileError, match='per must be "file" or "run", got \'week\''):
         load_diagnosed(path, robot())
+
+
+def test_exit_points_that_were_all_moved_are_named_beside_the_tracker(shared_data: Path) -> None:
+    """Masts were raised by 300 mm: only their coincidence spoke against them, beyond tolerances."""
+    folder = shared_data / "public" / "25-moving-anchors"
+    found = diagnose(folder / "robot.xml", folder / "lengths.csv")
+    tracker, mass = found.missing
+    assert tracker.effect == "tracker_frame" and "exit_point_error" in tracker.indistinguishable
+    # of a usual size: one pull, sideways nothing, is no platform that is too heavy
+    assert mass.effect == "platform_mass" and "external_wrench" not in mass.indistinguishable

@@ -10,9 +10,9 @@ import pytest
 from made_data import measured
 
 import crosscheck
+from crosscheck.measurements.copied import repetitions
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.read import load_measurements
-from crosscheck.measurements.repeated import repetitions
 from seecr import load_robot
 
 ROBOT = load_robot("demobot_parallel")
