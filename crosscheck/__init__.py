@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from crosscheck.controlled.machine import Winches
     from crosscheck.controlled.result import TimedControl
     from crosscheck.diagnosis.diagnose import diagnose
-    from crosscheck.diagnosis.result import Diagnosis, MissingEffect
-    from crosscheck.diagnosis.tolerance import Tolerance
+    from crosscheck.diagnosis.result import Diagnosis, MissingEffect, Tolerance
     from crosscheck.errors import CrosscheckError, UnsolvedError
     from crosscheck.fit.reasons import DiagnosisVerdict
     from crosscheck.importing.case import Imported, import_case
@@ -61,10 +60,9 @@ _MODULES = {
     "controlled.control": ("Timing", "control_in_time"),
     "controlled.machine": ("Winches",),
     "controlled.result": ("TimedControl",),
-    "diagnosis.result": ("Diagnosis", "MissingEffect"),
+    "diagnosis.result": ("Diagnosis", "MissingEffect", "Tolerance"),
     "diagnosis.diagnose": ("diagnose",),
     "errors": ("CrosscheckError", "UnsolvedError"),
-    "diagnosis.tolerance": ("Tolerance",),
     "fit.reasons": ("DiagnosisVerdict",),
     "importing.case": ("Imported", "import_case"),
     "importing.choices": ("ImportChoices",),

@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 from crosscheck.fit.problem import Rms, rms_by_kind
 from crosscheck.fit.reasons import Reason, Why, by_reason
 from crosscheck.fit.state import contradictions
-from crosscheck.fit.words import fitted_records, rms_words
+from crosscheck.fit.words import rms_words
 from crosscheck.given import (
     GivenModel,
     GivenNames,
@@ -152,7 +152,7 @@ class Calibrated(Result, JointErrors):
 
     def records(self) -> Sequence[Record]:
         """A record for each parameter: value and standard error, SI."""
-        return fitted_records(self.fitted)
+        return [record for one in self.fitted for record in one.value_records()]
 
     def as_json(self) -> dict[str, Any]:
         """The content of ``calibration.json``, in SI."""
@@ -162,7 +162,7 @@ class Calibrated(Result, JointErrors):
             "outlier_places": list(self.outlier_places),
             "settled": self.settled,
             "improves_held_out": self.pays,
-            "effects": {one.term.name: one.as_json() for one in self.fitted},
+            "effects": {one.term.name: one.parameters() for one in self.fitted},
             "parameters": self.labels,
             "covariance": self.covariance.tolist(),
             "notes": list(self.notes),
@@ -246,13 +246,7 @@ def calibrate(
         before = rms_by_kind(whole.data.problem, search.plain.raw)
         errors = JointErrors.of(before, whole)
         others = thin.note_on_others(whole.terms, ready.problem.sigma)
-    notes = (
-        *said,
-        *contradictions(whole.terms),
-        *ready.notes,
-        *blocks_note(ready.problem),
-        *others,
-    )
+    notes = (*said, *contradictions(whole.terms), *ready.notes, *blocks_note(ready.problem))
     fitted = _fitted(whole, basis.terms)
     kept = {one.term.name for one in fitted}
     own = np.flatnonzero([name in kept for name, _key in whole.terms.labels])
@@ -268,7 +262,7 @@ def calibrate(
         outliers=tuple(int(thin.data.line[row]) for row in rows),
         outlier_places=tuple(thin.data.place(row) for row in rows),
         settled=whole.settled,
-        notes=notes,
+        notes=(*notes, *others),
         absent=_absent(search.every, kept),
         model=renewed(new, thin.robot, thin.data),
     )

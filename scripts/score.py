@@ -128,9 +128,7 @@ def read(case: Measurements, truth: Truth, sigma: Sigma, noise: Array) -> Measur
     turn = quat_from_rotvec(sigma.orientation_rad * noise[:, 3:])
     quat = quat_multiply(turn, truth.quat_wxyz)
     quat *= np.where(quat[:, :1] < 0.0, -1.0, 1.0)
-    anew: dict[str, Any] = dict.fromkeys(
-        ("angles_rad", "position_mask", "angle_mask", "tension_mask", "line")
-    )
+    anew: dict[str, Any] = dict.fromkeys(("angles_rad", "line"))
     position = truth.position + sigma.position_m * noise[:, :3]
     data = replace(case, position=position, quat_wxyz=quat, sigma=sigma, **anew)
     return data.rows(truth.at_rest)

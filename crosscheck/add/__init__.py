@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from crosscheck.add.fit import add_effect, add_effects
-from crosscheck.add.result import Addition
+from crosscheck.add.weigh import Addition
 
 __all__ = ["Addition", "add_effect", "add_effects"]

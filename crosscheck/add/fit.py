@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Protocol, TypeAlias, runtime_checkable
 
-from crosscheck.add.result import Addition
-from crosscheck.add.weigh import weigh
+from crosscheck.add.weigh import Addition, weigh
 from crosscheck.errors import CrosscheckError, UnsolvedError
 from crosscheck.fit.state import State
 from crosscheck.given import GivenModel, GivenRobot, basis_of, model_of, robot_of

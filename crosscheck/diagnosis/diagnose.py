@@ -10,8 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from crosscheck.calibration import made_ready
 from crosscheck.diagnosis.found import diagnosis_of
-from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.tolerance import HALF_THE_NOISE, Tolerance
+from crosscheck.diagnosis.result import HALF_THE_NOISE, Diagnosis, Tolerance
 from crosscheck.fit.problem import Problem, Rms, kinds_stated, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Refusal, Unfit
 from crosscheck.fit.state import State

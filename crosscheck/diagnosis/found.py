@@ -16,10 +16,13 @@ from crosscheck.diagnosis.result import (
     PROBABLE,
     Chances,
     Diagnosis,
+    LeftOver,
     MissingEffect,
     NotListed,
+    Tolerance,
+    doubt_of,
+    remainder_of,
 )
-from crosscheck.diagnosis.tolerance import LeftOver, Tolerance, doubt_of, remainder_of
 from crosscheck.diagnosis.words import noise_notes, sentence_of, size_notes
 from crosscheck.fit.problem import KINDS, Problem, Rms, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from crosscheck.calibration import JointErrors
 from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.path import ModelPath
-from crosscheck.diagnosis.tolerance import LeftOver
-from crosscheck.fit.problem import Rms
+from crosscheck.errors import CrosscheckError
+from crosscheck.fit.problem import KINDS, Problem, Rms
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Refusal
 from crosscheck.fit.residual_noise import Whiteness
-from crosscheck.fit.words import rms_words, value_lines, value_records
+from crosscheck.fit.words import rms_words
+from crosscheck.given import check_above_zero
 from crosscheck.inference.fields import Varying
+from crosscheck.measurements.data import SI, Sigma, parse_kind
+from crosscheck.model.fitted import Fitted
 from crosscheck.planning.result import Sight
-from seecr.effects import ApartLayout, Layout, Term, Terms
+from seecr.effects import ApartLayout, Layout, Terms
 from seecr.files import plain
 from seecr.pose import Array
 from seecr.prediction.model import Model
@@ -29,13 +32,11 @@ PROBABLE = 0.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MissingEffect(Result):
+class MissingEffect(Result, Fitted):
     """An effect that the data justify adding to the model.
 
     Attributes:
-        term: the effect with its values.
-        stderr: (p,) standard errors in the units of the values; inf if unidentifiable.
-        at_bound: (p,) bool, values that are on a bound.
+        term, stderr, at_bound: the effect as fitted, see :class:`crosscheck.model.fitted.Fitted`.
         rivals: effects that these data cannot tell from it.
         check: how to check it without the robot's poses, with what to expect.
         rms: errors by kind, with it and those listed before it in the model.
@@ -44,9 +45,6 @@ class MissingEffect(Result):
         probability: posterior probability that it, or an equivalent, is missing.
     """
 
-    term: Term
-    stderr: Array
-    at_bound: NDArray[np.bool_]
     rivals: tuple[Layout, ...]
     check: str
     rms: Rms
@@ -94,8 +92,7 @@ class MissingEffect(Result):
         """Errors with it, values, what it cannot be told from, and how to check it."""
         left_out = rms_words(self.held_out_rms)
         out = [f"+ {self.effect}: {rms_words(self.rms)} (on test runs {left_out})"]
-        values = value_lines(self.layout, self.values, self.stderr, self.at_bound)
-        out += [f"    {line}" for line in values]
+        out += [f"    {line}" for line in self.value_lines()]
         if self.rivals:
             out.append(f"    indistinguishable from: {', '.join(self.indistinguishable)}")
         return [*out, f"    check: {self.check}"]
@@ -103,19 +100,14 @@ class MissingEffect(Result):
     def records(self) -> list[Record]:
         """A record for each of its parameters: value and standard error, SI."""
         rivals = ", ".join(self.indistinguishable)
-        values = value_records(self.layout, self.values, self.stderr, self.at_bound)
-        return [{**record, "indistinguishable": rivals} for record in values]
+        return [{**record, "indistinguishable": rivals} for record in self.value_records()]
 
     def as_json(self) -> dict[str, Any]:
         """An item of ``missing``: SI, null where a number does not exist."""
-        rows = zip(self.layout.names, self.values, self.stderr, self.at_bound, strict=True)
         return {
             "effect": self.effect,
             "indistinguishable": list(self.indistinguishable),
-            "parameters": {
-                name: {"value": value, "stderr": error, "at_bound": bool(bound)}
-                for name, value, error, bound in rows
-            },
+            "parameters": self.parameters(),
             "probability": self.probability,
             "check": self.check,
             **self.rms,
@@ -322,3 +314,129 @@ class Diagnosis(Result):
             }
         )
         return document
+
+
+# Importance beside significance: how large is the remainder beyond noise, and does it matter?
+#
+# With many rows, structure of a few hundredths of the noise is significant. It only counts as
+# missing if it matters: above a tolerance that the user states, or else above half the noise.
+
+# Without a stated tolerance, what is smaller than this part of the noise does not matter.
+_PART = 0.5
+# Chance may add so many standard errors to the mean square of the noise.
+_DOUBT = 2.0
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How large an error beyond noise must be to matter, as rms by kind of reading.
+
+    Attributes:
+        position_m, orientation_rad, tension_N: None for half the noise.
+
+    Raises:
+        InputError: something else than a number above zero.
+    """
+
+    position_m: float | None = None
+    orientation_rad: float | None = None
+    tension_N: float | None = None
+
+    def __post_init__(self) -> None:
+        check_above_zero(self)
+
+    @classmethod
+    def parsed(cls, texts: Iterable[str]) -> Tolerance:
+        """Parse quantities such as ``0.1mm``, ``0.05deg`` and ``1N``; the unit tells the kind.
+
+        Raises:
+            CrosscheckError: a text is no quantity, has another unit, or repeats a kind.
+        """
+        values: dict[str, float] = {}
+        for text in texts:
+            kind, value = parse_kind("--tolerance", ("position", "orientation", "tension"), text)
+            key = f"{kind}_{SI[kind]}"
+            if key in values:
+                raise CrosscheckError(
+                    f"--tolerance {text}: expected one for the {kind}, got two; leave one out"
+                )
+            values[key] = value
+        return cls(**values)
+
+
+HALF_THE_NOISE = Tolerance()
+"""The tolerance if the user states none."""
+
+
+@dataclass(frozen=True)
+class LeftOver:
+    """What a model leaves that noise does not explain.
+
+    Attributes:
+        size: rms by kind, with the keys of :class:`crosscheck.fit.problem.Kind`; 0 if
+            noise explains all, None where nothing was read.
+        limit: from where on it matters; None if neither tolerance nor noise was stated.
+        important: whether the size exceeds the limit for some kind, by more than chance.
+    """
+
+    size: Rms
+    limit: Rms
+    important: bool
+
+    @property
+    def undecided(self) -> bool:
+        """Whether some kind that was read has no limit."""
+        return any(self.limit[key] is None for key, size in self.size.items() if size is not None)
+
+    @property
+    def words(self) -> str:
+        """The size and the limit, in a few words."""
+        matters = rms_words(self.limit) or "not stated, use --tolerance"
+        return f"{rms_words(self.size)} (tolerance: {matters})"
+
+    def as_json(self) -> dict[str, Any]:
+        """``left_over`` of ``diagnosis.json``, SI; ``important`` is null where nothing says so."""
+        important = None if self.undecided and not self.important else self.important
+        return {"size": self.size, "tolerance": self.limit, "important": important}
+
+
+def remainder_of(
+    rms: Rms,
+    noise: Rms,
+    tolerance: Tolerance,
+    stated: Sigma,
+    doubt: Mapping[str, float] | None = None,
+) -> LeftOver:
+    """How far errors exceed the noise, and whether that matters.
+
+    Noise that was not stated sets no limit, because it may contain some of the remainder. What
+    chance may add to the noise, see :func:`doubt_of`, is not important.
+    """
+    size: Rms = {}
+    limit: Rms = {}
+    important = False
+    for kind in KINDS:
+        error, floor = rms.get(kind.key), noise.get(kind.key)
+        if error is None or floor is None:
+            size[kind.key] = limit[kind.key] = None
+            continue
+        said = getattr(tolerance, kind.sigma)
+        known = getattr(stated, kind.sigma) is not None
+        most = said if said is not None else (_PART * floor if known else None)
+        beyond = error**2 - floor**2
+        chance = _DOUBT * (doubt or {}).get(kind.key, 0.0) * floor**2
+        size[kind.key], limit[kind.key] = float(np.sqrt(max(beyond, 0.0))), most
+        important = important or (most is not None and beyond - chance > most**2)
+    return LeftOver(size, limit, important)
+
+
+def doubt_of(problem: Problem, correlation: float = 0.0) -> dict[str, float]:
+    """By kind, the relative standard error of the mean square of its noise.
+
+    It is sqrt(2/n) for n readings. With a correlation rho between successive rows, they count for
+    n (1 - rho^2)/(1 + rho^2) (Bartlett 1946).
+    """
+    rho2 = float(np.clip(correlation, 0.0, 0.98)) ** 2
+    counts = {kind.key: int(problem.counted[:, kind.columns].sum()) for kind in KINDS}
+    part = (1.0 - rho2) / (1.0 + rho2)
+    return {key: float(np.sqrt(2.0 / (part * n))) for key, n in counts.items() if n}

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.diagnosis.path import ModelPath
-from crosscheck.diagnosis.result import PROBABLE, Chances, Diagnosis, MissingEffect
-from crosscheck.diagnosis.tolerance import LeftOver
+from crosscheck.diagnosis.result import PROBABLE, Chances, Diagnosis, LeftOver, MissingEffect
 from crosscheck.fit.reasons import DiagnosisVerdict, probability_words
 from crosscheck.fit.state import largest_size
 from crosscheck.fit.words import rms_words

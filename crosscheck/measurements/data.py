@@ -13,6 +13,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import datetime
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
@@ -229,9 +230,6 @@ class Measurements(Result):
         quat_wxyz: (n, 4) unit quaternions, NaN rows if not read, or None.
         angles_rad: (n, 3) [rad] rx ry rz with R = Rx(rx) Ry(ry) Rz(rz), NaN if not read.
         tensions: (n, m) [N], NaN if not read.
-        position_mask: (3,) coordinates that were read in some row.
-        angle_mask: (3,) angles that were read in some row; all false with ``quat_wxyz``.
-        tension_mask: (m,) cables whose tension was read in some row.
         temperature_C: (n,) [deg C] or None.
         loads: known loads, or None.
         stands: (n,) bool, rows whose run starts at its first row instead of the reference pose.
@@ -266,9 +264,6 @@ class Measurements(Result):
     quat_wxyz: Array | None = None
     angles_rad: Array = _FILLED_IN
     tensions: Array = _FILLED_IN
-    position_mask: Mask = _FILLED_IN
-    angle_mask: Mask = _FILLED_IN
-    tension_mask: Mask = _FILLED_IN
     temperature_C: Array | None = None
     told: bool = False
     loads: Loads | None = None
@@ -292,17 +287,10 @@ class Measurements(Result):
         if (self.command_pose is None) == (self.command_lengths is None):
             raise ValueError("expected exactly one of command_pose and command_lengths")
         self._set("run", np.array(self.run, dtype=np.str_))
-        for name, width in (("position", 3), ("angles_rad", 3), ("tensions", m)):
-            if getattr(self, name) is None:
-                self._set(name, np.full((n, width), np.nan))
-        for name, values in (
-            ("position_mask", self.position),
-            ("angle_mask", self.angles_rad),
-            ("tension_mask", self.tensions),
-        ):
-            if getattr(self, name) is None:
-                self._set(name, np.any(np.isfinite(values), axis=0))
         filled: dict[str, NDArray[Any]] = {
+            "position": np.full((n, 3), np.nan),
+            "angles_rad": np.full((n, 3), np.nan),
+            "tensions": np.full((n, m), np.nan),
             "line": np.arange(2, n + 2),
             "driven": np.ones(m, dtype=bool),
             "stands": np.zeros(n, dtype=bool),
@@ -377,9 +365,7 @@ class Measurements(Result):
 
     def without_readings(self) -> Measurements:
         """The commands and loads alone."""
-        names = ("position", "angles_rad", "tensions")
-        masks = ("position_mask", "angle_mask", "tension_mask")
-        nothing: dict[str, Any] = dict.fromkeys((*names, *masks, "quat_wxyz"))
+        nothing: dict[str, Any] = dict.fromkeys(("position", "quat_wxyz", "angles_rad", "tensions"))
         return dataclasses.replace(self, **nothing)
 
     def with_notes(self, notes: Iterable[str]) -> Measurements:
@@ -430,20 +416,35 @@ class Measurements(Result):
             line=None if self.files else self.line,
         )
 
+    @cached_property
+    def position_mask(self) -> Mask:
+        """(3,) coordinates that were read in some row."""
+        return np.asarray(np.isfinite(self.position).any(axis=0))
+
+    @cached_property
+    def angle_mask(self) -> Mask:
+        """(3,) angles that were read in some row; all false with ``quat_wxyz``."""
+        return np.asarray(np.isfinite(self.angles_rad).any(axis=0))
+
+    @cached_property
+    def tension_mask(self) -> Mask:
+        """(m,) cables whose tension was read in some row."""
+        return np.asarray(np.isfinite(self.tensions).any(axis=0))
+
     @property
     def has_position(self) -> bool:
         """Whether any coordinate was read."""
-        return bool(np.any(self.position_mask))
+        return bool(self.position_mask.any())
 
     @property
     def has_orientation(self) -> bool:
         """Whether any part of the orientation was read."""
-        return self.quat_wxyz is not None or bool(np.any(self.angle_mask))
+        return self.quat_wxyz is not None or bool(self.angle_mask.any())
 
     @property
     def has_tension(self) -> bool:
         """Whether any tension was read."""
-        return bool(np.any(self.tension_mask))
+        return bool(self.tension_mask.any())
 
     def lines(self) -> list[str]:
         """What was measured, and what was assumed, filled in or left out."""
@@ -477,7 +478,7 @@ class Measurements(Result):
             yield from _load_columns(self.loads)
 
     def rows(self, index: ArrayLike | slice) -> Measurements:
-        """Some rows, by index, mask (n,) or slice. The masks of what was read are kept."""
+        """Some rows, by index, mask (n,) or slice."""
         chosen = np.arange(self.n_rows)[index if isinstance(index, slice) else np.asarray(index)]
         there = {k: value for k in _PER_ROW if (value := getattr(self, k)) is not None}
         values: dict[str, Any] = {name: value[chosen] for name, value in there.items()}

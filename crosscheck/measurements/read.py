@@ -164,6 +164,8 @@ def _sigma(toml: Toml, key: str, value: object) -> float:
 
 # Several files of one robot as one: days, payloads, trackers set up anew.
 
+# Columns that every file has, be it without a reading.
+_IN_ALL = ("position", "tensions", "stands", "line", "copied")
 # Relative noise of lengths in files that state none, if others do: practically zero.
 _EXACT = 1e-6
 
@@ -201,13 +203,10 @@ def together(parts: Sequence[Measurements]) -> Measurements:
         command_lengths=_stack([part.command_lengths for part in parts]),
         told=first.told,
         wanted=_filled(parts, "wanted", 7),
-        position=np.concatenate([part.position for part in parts]),
         quat_wxyz=quat,
         angles_rad=angles,
-        tensions=np.concatenate([part.tensions for part in parts]),
         temperature_C=warmth,
         loads=_loads(parts),
-        stands=np.concatenate([part.stands for part in parts]),
         free=tuple(free),
         free_in=free,
         sigma=sigma,
@@ -216,10 +215,9 @@ def together(parts: Sequence[Measurements]) -> Measurements:
         files=tuple(names),
         origins=tuple(_short_names([part.path.resolve() for part in parts], 2)),
         file=np.repeat(np.arange(len(parts)), [part.n_rows for part in parts]),
-        line=np.concatenate([part.line for part in parts]),
-        copied=np.concatenate([part.copied for part in parts]),
         unused_columns=tuple(dict.fromkeys(name for part in parts for name in part.unused_columns)),
         notes=(*notes, *said, *lost_times, *lost_warmth),
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in _IN_ALL},
     )
     said, copied = repetitions(whole, across=True)
     return replace(whole, copied=whole.copied | copied, notes=(*said, *whole.notes))

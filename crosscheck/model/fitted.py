@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,8 @@ from seecr.errors import InputError, InputFileError
 from seecr.files import digits_of, path_of, read_text
 from seecr.pose import Array
 from seecr.prediction.effect_tables import number_of
-from seecr.units import measured, parameter_name
+from seecr.result import Record
+from seecr.units import measured, parameter_name, shown
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -28,7 +29,9 @@ class Fitted:
     """An effect as fitted.
 
     Attributes:
-        term: with its values. stderr: (p,), inf if unseen. at_bound: (p,) bool.
+        term: the effect with its values.
+        stderr: (p,) standard errors in the units of the values; inf if unidentifiable.
+        at_bound: (p,) bool, values that are on a bound.
     """
 
     term: Term
@@ -37,22 +40,40 @@ class Fitted:
 
     def __repr__(self) -> str:
         """The effect with its first few values and their errors, in the units people read."""
-        layout = self.term.layout
-        rows = zip(layout.names, layout.units, self.term.vector, self.stderr, strict=True)
-        values = [f"{parameter_name(k, unit)} = {measured(v, e, unit)}" for k, unit, v, e in rows]
-        return f"{self.term.name}: {some(values)}"
+        return f"{self.term.name}: {some(self.value_lines())}"
 
-    def as_json(self) -> dict[str, Any]:
-        """Its parameters by name, in SI units."""
-        layout = self.term.layout
-        return {
-            key: {
-                "value": float(self.term.vector[i]),
-                "stderr": float(self.stderr[i]),
-                "unit": layout.units[i],
-                "at_bound": bool(self.at_bound[i]),
+    def _rows(self) -> Iterator[tuple[str, str, float, float, bool]]:
+        """Name, unit, value, standard error of each parameter, and whether it is on a bound."""
+        layout, columns = self.term.layout, (self.term.vector, self.stderr, self.at_bound)
+        values = (np.asarray(column).tolist() for column in columns)
+        yield from zip(layout.names, layout.units, *values, strict=True)
+
+    def value_lines(self) -> list[str]:
+        """A line for each parameter: its name, value and standard error."""
+        out = list[str]()
+        for name, unit, value, error, bound in self._rows():
+            stop = " (at its bound)" if bound else ""
+            # what is at its bound is known to be there, without an error
+            at = bound and np.isinf(error)
+            known = shown(value, unit) if at else measured(value, error, unit)
+            out.append(f"{parameter_name(name, unit)} = {known}{stop}")
+        return out
+
+    def value_records(self) -> list[Record]:
+        """A record for each parameter, SI; ``stderr`` None if unidentifiable."""
+        return [
+            {
+                "effect": self.term.name, "parameter": name, "value": value,
+                "stderr": error if np.isfinite(error) else None, "unit": unit, "at_bound": bound,
             }
-            for i, key in enumerate(layout.names)
+            for name, unit, value, error, bound in self._rows()
+        ]  # fmt: skip
+
+    def parameters(self) -> dict[str, Any]:
+        """The parameters by name, in SI units, as JSON has them."""
+        return {
+            name: {"value": value, "stderr": error, "unit": unit, "at_bound": bound}
+            for name, unit, value, error, bound in self._rows()
         }
 
 

@@ -187,9 +187,6 @@ def _as_read(commands: Measurements, readings: Readings, reads: Reads) -> Measur
         quat_wxyz=np.where(stops, readings.quat_wxyz, np.nan) if reads.orientation else None,
         angles_rad=np.where(stops & reads.angles, angles, np.nan),
         tensions=np.where(stops & reads.tensions, readings.tensions, np.nan),
-        position_mask=reads.position,
-        angle_mask=reads.angles,
-        tension_mask=reads.tensions,
     )
 
 

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from crosscheck.fit.problem import ORIENTATION, POSITION, TENSION, Problem
 from crosscheck.measurements.data import Mask, Measurements
@@ -52,8 +50,9 @@ def without_unread(problem: Problem, at: Prediction) -> tuple[Problem, list[str]
         cells = _filled_in(read, expected, mine & ~columns, least)
         odd |= (problem.counted & rows[:, None] & columns) | cells
         if cells.any():
+            which = f"{name}{_names(np.asarray(cells.any(axis=0)))}"
             notes.append(
-                f"{name}{_names(cells.any(axis=0))}: {data.lines_of(cells.any(axis=1))} not "
+                f"{which}: {data.lines_of(cells.any(axis=1))} not "
                 "counted as readings, because the same number stands there again and again where "
                 f"the model expects changes; {_REMEDY}"
             )
@@ -166,14 +165,13 @@ def _without(data: Measurements, left: Array) -> Measurements:
         quat = None  # single angles can only be left out of angles
     else:
         quat, angles = np.where(lost[:, :1], np.nan, quat), data.angles_rad
-    masks: dict[str, Any] = dict.fromkeys(("position_mask", "angle_mask", "tension_mask"))
     return replace(
         data, position=left[:, POSITION], quat_wxyz=quat, angles_rad=angles,
-        tensions=left[:, TENSION], **masks,
+        tensions=left[:, TENSION],
     )  # fmt: skip
 
 
-def _names(columns: NDArray[np.bool_]) -> str:
+def _names(columns: Mask) -> str:
     pose = [*"xyz", *(f"rotation about {axis}" for axis in "xyz")]
     names = [pose[k] if k < 6 else f"tension_{k - 5}" for k in np.flatnonzero(columns).tolist()]
     return some(names, _MOST_NAMED)

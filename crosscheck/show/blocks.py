@@ -12,12 +12,8 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from crosscheck.fit.problem import KINDS, Kind, Rms
-from crosscheck.fit.words import value_lines
-from seecr.effects.base import Layout
-from seecr.pose import Array
 from seecr.units import in_unit, without_rounding
 
 # --- words ----------------------------------------------------------------------------------------
@@ -271,13 +267,6 @@ def rms_table(rows: Sequence[tuple[str, Rms, str]]) -> TextTable:
         [[name, *rms_cells(kinds, rms)] for name, rms, _style in rows],
         [style for _name, _rms, style in rows],
     )
-
-
-def value_items(
-    layout: Layout, values: Array, stderr: Array, at_bound: NDArray[np.bool_], most: int, file: str
-) -> Items:
-    """A line for each of an effect's parameters, ``most`` of them; the rest are in ``file``."""
-    return Items(cut(list(value_lines(layout, values, stderr, at_bound)), most, file), "  ")
 
 
 def cut(lines: Sequence[str], most: int, file: str) -> list[str]:

@@ -21,7 +21,7 @@ from crosscheck.diagnosis.words import (
 from crosscheck.fit.problem import Kind, Problem
 from crosscheck.fit.reasons import DiagnosisVerdict, probability_words
 from crosscheck.fit.residual_noise import STRUCTURED
-from crosscheck.fit.words import rms_words, value_lines
+from crosscheck.fit.words import rms_words
 from crosscheck.inference.priors import SURE
 from crosscheck.show.blocks import (
     Block,
@@ -108,8 +108,7 @@ def _way(found: Diagnosis) -> TextTable:
 
 def _finding(finding: MissingEffect) -> Items:
     """Its values, what it cannot be told from, and how to check it."""
-    values = value_lines(finding.layout, finding.values, finding.stderr, finding.at_bound)
-    lines = cut(list(values), _MOST_PARAMETERS, _FILE)
+    lines = cut(finding.value_lines(), _MOST_PARAMETERS, _FILE)
     if finding.rivals:
         lines.append(f"indistinguishable from: {', '.join(finding.indistinguishable)}")
     return Items([*lines, f"check: {finding.check}"], "  ")

@@ -12,7 +12,7 @@ from crosscheck.add import Addition
 from crosscheck.calibration import Calibrated
 from crosscheck.comparison.models import ModelComparison
 from crosscheck.model.fitted import Fitted
-from crosscheck.show.blocks import Block, Items, Line, TextTable, rms_table, value_items
+from crosscheck.show.blocks import Block, Items, Line, TextTable, cut, rms_table
 from crosscheck.show.texts import show
 from seecr.counted import counted
 
@@ -33,7 +33,7 @@ def _addition(found: Addition, model: Path, written: bool) -> Iterator[Block]:
     for one in found.fitted:
         term = one.term
         yield Line(f"{term.layout.name}: {term.layout.effect.title}", "bold")
-        yield value_items(term.layout, term.vector, one.stderr, one.at_bound, _MOST, "the model")
+        yield Items(cut(one.value_lines(), _MOST, "the model"), "  ")
     yield rms_table([
         ("before", found.before, ""),
         (f"with {found.name}", found.after, "bold"),

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from crosscheck.diagnosis.tolerance import Tolerance
+from crosscheck.diagnosis.result import Tolerance
 from crosscheck.studies.cases import GivenCases, StudyCase, read_cases
 from crosscheck.studies.parts import parts_in
 from crosscheck.studies.tasks import FAILED, run_study_case

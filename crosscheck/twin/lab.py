@@ -377,9 +377,7 @@ def read_of(made: Measured, random: np.random.Generator) -> Measurements:
     quat = quat_multiply(turn, truth.quat_wxyz)
     quat *= np.where(quat[:, :1] < 0.0, -1.0, 1.0)
     stops = ((case.read | ~case.read.any()) & made.at_rest)[:, None]
-    anew: dict[str, Any] = dict.fromkeys(
-        ("angles_rad", "tensions", "position_mask", "angle_mask", "tension_mask", "line")
-    )
+    anew: dict[str, Any] = dict.fromkeys(("angles_rad", "tensions", "line"))
     if not made.turns.all():
         anew["angles_rad"] = np.where(stops & made.turns, rxyz_from_quat(quat), np.nan)
     if sigma.tension_N is not None:

@@ -73,7 +73,7 @@ def position_only() -> Diagnosis:
     data = readings(radius_m=0.01)
     blank = np.full_like(data.tensions, np.nan)
     return diagnose(robot(), replace(
-        data, quat_wxyz=None, tensions=blank, tension_mask=np.zeros(4, dtype=bool)))  # fmt: skip
+        data, quat_wxyz=None, tensions=blank))  # fmt: skip
 
 
 @cache
@@ -82,7 +82,7 @@ def tensions_only() -> Diagnosis:
     data = readings(radius_m=0.01)
     blank = np.full_like(data.position, np.nan)
     return diagnose(robot(), replace(
-        data, quat_wxyz=None, position=blank, position_mask=np.zeros(3, dtype=bool)))  # fmt: skip
+        data, quat_wxyz=None, position=blank))  # fmt: skip
 
 
 @cache
@@ -100,6 +100,4 @@ def one_angle() -> Diagnosis:
     angles[:, 1] += rxyz_from_quat(exact.quat_wxyz)[:, 1]
     return diagnose(robot(), replace(
         data, quat_wxyz=None, position=np.full_like(data.position, np.nan),
-        position_mask=np.zeros(3, dtype=bool), angles_rad=angles,
-        angle_mask=np.array([False, True, False]), tensions=np.full_like(data.tensions, np.nan),
-        tension_mask=np.zeros(4, dtype=bool)))  # fmt: skip
+        angles_rad=angles, tensions=np.full_like(data.tensions, np.nan)))  # fmt: skip

@@ -10,7 +10,7 @@ import pytest
 from made_data import SIGMA, measured, term
 
 from crosscheck.add import add_effect, add_effects, weigh
-from crosscheck.add.result import Addition
+from crosscheck.add.weigh import Addition
 from crosscheck.errors import UnsolvedError
 from crosscheck.fit.residual_noise import Whiteness
 from crosscheck.model.fitted import Fitted

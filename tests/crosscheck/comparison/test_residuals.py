@@ -155,7 +155,7 @@ def test_a_longer_cable_shows_as_that_cable(robot):
 
 def test_half_of_the_readings_will_do(robot, data):
     blank = np.full_like(data.position, np.nan)
-    angles = replace(data, position=blank, position_mask=np.zeros(3, dtype=bool))
+    angles = replace(data, position=blank)
     found = compare(robot, angles)
     assert found.rms["position_rms_m"] is None
     assert found.rms["orientation_rms_rad"] > 0

@@ -31,7 +31,7 @@ def drifting(rows: int, seed: int = 1) -> Measurements:
         noise[k] = 0.8 * noise[k - 1] + np.sqrt(1.0 - 0.8**2) * noise[k]
     read = Experiment(ROBOT, data.as_commands(ROBOT)).predict().readings
     position = read.position + NOISE_M * (noise - noise.mean(axis=0)) * [1.0, 0.0, 1.0]
-    return replace(data, position=position, position_mask=np.ones(3, dtype=bool))
+    return replace(data, position=position)
 
 
 SOME = ["drum_eccentricity"]

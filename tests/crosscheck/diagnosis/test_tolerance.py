@@ -10,7 +10,7 @@ from made_diagnoses import SIGMA, readings, robot
 from scipy.signal import lfilter
 
 from crosscheck.diagnosis.diagnose import diagnose
-from crosscheck.diagnosis.tolerance import HALF_THE_NOISE, Tolerance, doubt_of, remainder_of
+from crosscheck.diagnosis.result import HALF_THE_NOISE, Tolerance, doubt_of, remainder_of
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.measurements.data import Sigma

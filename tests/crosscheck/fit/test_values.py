@@ -12,7 +12,7 @@ from made_diagnoses import POINTS, SIGMA, robot
 from crosscheck.calibration import calibrate
 from crosscheck.comparison.residuals import compare
 from crosscheck.fit.state import can_be, contradictions
-from crosscheck.fit.words import value_lines
+from crosscheck.model.fitted import Fitted
 from seecr.description.mjcf import load_robot
 from seecr.effects import Term, Terms, layout_of
 
@@ -78,12 +78,11 @@ def test_nothing_and_shapes_may_be_at_a_bound() -> None:
 
 def test_what_is_not_determined_has_no_value_unless_it_is_at_its_bound() -> None:
     """In a plane, shift_y was 1.227e-09 mm."""
-    layout = term(soft_cogiro(), "pulley_radius").layout
+    radius = term(soft_cogiro(), "pulley_radius", radius_m=0.01)
     for error, bound, line in [
         (np.inf, False, "radius = not determined by these data"),
         (np.inf, True, "radius = 10 mm (at its bound)"),
         (1e-4, False, "radius = 10.00 ± 0.10 mm"),
         (1e-4, True, "radius = 10.00 ± 0.10 mm (at its bound)"),
     ]:
-        lines = value_lines(layout, np.array([0.01]), np.array([error]), np.array([bound]))
-        assert list(lines) == [line]
+        assert Fitted(radius, np.array([error]), np.array([bound])).value_lines() == [line]

@@ -96,7 +96,7 @@ def test_angles_about_a_half_turn_are_averaged_as_angles(white):
     angles = np.tile([0.0, np.nan, np.pi], (data.n_rows, 1))
     angles += 1e-3 * white.reshape(-1, 6)[:, :3]
     angles[:, 2] = np.arctan2(np.sin(angles[:, 2]), np.cos(angles[:, 2]))
-    means = averaged_dwells(replace(data, quat_wxyz=None, angles_rad=angles, angle_mask=None))
+    means = averaged_dwells(replace(data, quat_wxyz=None, angles_rad=angles))
     assert np.abs(means.angles_rad[:, 2]) == pytest.approx(np.full(DWELLS, np.pi), abs=1e-3)
     assert means.sigma_ratio[0, 1] == pytest.approx(10 / 3 / np.sqrt(READINGS), rel=0.15)
 

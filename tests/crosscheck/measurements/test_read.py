@@ -223,14 +223,13 @@ def test_other_peoples_columns_pass_without_a_suggestion(csv_file, robot):
     assert not any("did you mean" in note for note in data.notes)
 
 
-def test_rows_are_a_subset_with_the_same_masks(csv_file, robot):
+def test_rows_are_a_subset(csv_file, robot):
     lines = ["a,0,0,0,0,1,", "a,1,0,0,0,2,7", "b,0,0,0,0,3,"]
     data = load_measurements(csv_file(f"run,t_s,{CMD},meas_x_m,tension_1_N", *lines), robot)
     for index in ([0, 2], np.array([True, False, True]), slice(0, 3, 2)):
         part = data.rows(index)
         assert part.position[:, 0].tolist() == [1, 3]
         assert part.run.tolist() == ["a", "b"] and part.line.tolist() == [2, 4]
-        assert part.tension_mask.tolist() == data.tension_mask.tolist()
         assert part.command_pose.shape == (2, 7) and part.n_rows == 2
     assert data.rows([2]).runs == ("b",)
     assert data.rows([2]).run_index.tolist() == [0]

@@ -137,7 +137,7 @@ def test_a_cable_that_was_not_read_hides_what_is_held() -> None:
     data = pulled(read_of(), order(2, 5))
     some = data.tensions.copy()
     some[:, 0] = np.nan
-    assert told(replace(data, tensions=some, tension_mask=np.isfinite(some).any(axis=0))) == []
+    assert told(replace(data, tensions=some)) == []
 
 
 def test_what_is_less_than_the_noise_names_nothing() -> None:
@@ -160,7 +160,7 @@ def test_where_all_cables_are_exchanged_positions_must_say_that_no_axis_is() -> 
     (said,) = told(data, robot)
     assert "tension_1 and tension_2 seem exchanged" in said
     nowhere = np.full_like(data.position, np.nan)
-    blind = replace(data, position=nowhere, position_mask=np.zeros(3, dtype=bool))
+    blind = replace(data, position=nowhere)
     assert told(blind, robot) == []
 
 
@@ -196,7 +196,7 @@ def test_lengths_are_told_from_positions_alone() -> None:
     (said,) = told(data)
     assert "length_2 and length_5 seem exchanged" in said
     nowhere = np.full_like(data.position, np.nan)
-    assert told(replace(data, position=nowhere, position_mask=np.zeros(3, dtype=bool))) == []
+    assert told(replace(data, position=nowhere)) == []
 
 
 def test_a_frame_that_is_turned_round_is_no_exchange() -> None:
@@ -352,7 +352,7 @@ def test_where_a_cable_was_not_read_nothing_is_known_of_the_load() -> None:
     data = read_of()
     some = data.tensions.copy()
     some[:, 3] = np.nan
-    partly = replace(data, tensions=some, tension_mask=np.isfinite(some).any(axis=0))
+    partly = replace(data, tensions=some)
     assert not any(SAID in one for one in said_of(in_unit(partly, 9.80665)))
 
 
@@ -361,7 +361,7 @@ def test_without_pretension_any_cable_tells() -> None:
     data = measured(robot, points=3, sigma=SIGMA, tensions=True)
     some = data.tensions.copy()
     some[:, 1] = np.nan
-    partly = replace(data, tensions=some, tension_mask=np.isfinite(some).any(axis=0))
+    partly = replace(data, tensions=some)
     assert not any(SAID in one for one in said_of(partly, robot))
     (said,) = said_of(in_unit(partly, 4.44822), robot)
     assert "are they in lbf" in said

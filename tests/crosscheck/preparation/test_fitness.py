@@ -70,7 +70,7 @@ def test_rows_that_are_all_alike_carry_no_verdict(data: Measurements) -> None:
 def test_effects_of_which_none_can_be_tried_carry_no_verdict(data: Measurements) -> None:
     """Nothing was tried, so nothing is unknown either."""
     none = np.full_like(data.tensions, np.nan)
-    untold = replace(data, tensions=none, tension_mask=~data.tension_mask)
+    untold = replace(data, tensions=none)
     found = diagnose(robot(), untold, only="tension_scale")
     assert found.verdict is DiagnosisVerdict.NO_VERDICT and found.converged
     assert (

@@ -48,7 +48,7 @@ def test_what_is_left_does_not_depend_on_where_the_tracker_stands():
 def test_free_values_are_told_with_errors_that_what_is_missing_widens():
     errors = []
     for effects in ((), (term(ROBOT, "platform_mass", added_kg=0.6),)):
-        notes = " ".join(prepare(ROBOT, far_away(*effects), Terms()).all_notes)
+        notes = " ".join(prepare(ROBOT, far_away(*effects), Terms()).notes)
         value, error = re.search(r"shift_x (\S+) ± (\S+) mm", notes).groups()
         assert float(value) == pytest.approx(400.0, abs=4.0 * float(error))
         errors.append(float(error))

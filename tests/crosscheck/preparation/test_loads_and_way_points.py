@@ -44,7 +44,7 @@ def carried(loads: bool = True, told: bool = False) -> Measurements:
     noisy = seen.position + SIGMA.position_m * rng.standard_normal((n, 3))
     quat = np.where(stops, seen.quat_wxyz, np.nan)
     position = np.where(stops, noisy, np.nan)
-    return replace(data, position=position, quat_wxyz=quat, position_mask=np.ones(3, dtype=bool))
+    return replace(data, position=position, quat_wxyz=quat)
 
 
 @pytest.mark.parametrize("told", [False, True])

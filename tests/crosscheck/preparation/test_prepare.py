@@ -29,7 +29,7 @@ def loose(robot: Robot) -> Robot:
 
 def test_fit_data_are_not_refused(robot: Robot, data: Measurements) -> None:
     ready = prepare(robot, data, Terms())
-    assert ready.refusal is None and ready.all_notes == ()
+    assert ready.refusal is None and ready.notes == ()
     assert ready.problem.use.all()
 
 

@@ -37,7 +37,7 @@ def stream(terms: Terms = PLAIN) -> Measurements:
     read = Experiment(ROBOT, data.as_commands(ROBOT)).predict(terms.effects).readings
     random = np.random.default_rng(1)
     off = NOISE.position_m * random.standard_normal((ROWS, 3))
-    return replace(data, position=read.position + off, position_mask=np.ones(3, dtype=bool))
+    return replace(data, position=read.position + off)
 
 
 def test_few_rows_are_all_taken() -> None:
