@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from seecr.description.points import Joint
-from seecr.errors import InputFileError
-from seecr.importing.draft import Draft, DraftFaults, pulley_notes
+from seecr.errors import Faults
+from seecr.importing.draft import Draft, pulley_notes
 from seecr.importing.xml_tree import Node, numbers_in, numbers_of, read_xml
 from seecr.pose import Array, quat_from_rotvec, quat_multiply, quat_rotate
 
@@ -50,21 +50,21 @@ def read_caspr(bodies: Path, cables: Path, wanted: str | None) -> Draft:
     """
     body = read_xml(bodies, "bodies_system", "expected CASPR's *_bodies.xml, with <bodies_system>")
     sets = read_xml(cables, "cables", "expected CASPR's *_cables.xml, with <cables>")
-    faults = DraftFaults(bodies)
-    link = _link(body, faults)
+    faults = Faults()
+    link = _link(body)
     pose, joints = _joint(link, faults)
     physical = link.child("physical")
     if physical is None:
-        faults.add(f"<{link.tag}>: expected <physical> in it, got none", link.line)
-        physical = Node("physical", {}, link.line)
+        faults.add(link.error(f"<{link.tag}>: expected <physical> in it, got none"))
+        physical = link.empty("physical")
     mass = float(numbers_in(physical, "mass", 1, faults)[0])
     if mass < 0.0:
-        faults.add(f"<mass>: expected 0 or more, got {mass:g}", physical.line)
+        faults.add(physical.error(f"<mass>: expected 0 or more, got {mass:g}"))
     centre = numbers_in(physical, "com_location", 3, faults)
     inertia = _inertia(physical, mass, centre, faults)
     faults.check()
-    faults = DraftFaults(cables)
-    some, which = _chosen(sets, wanted, cables)
+    faults = Faults()
+    some, which = _chosen(sets, wanted)
     found = list(_cables(some, centre, faults))
     faults.check()
     names, exits, anchors, ea, lowest, highest, radii = map(list, zip(*found, strict=True))
@@ -77,28 +77,27 @@ def read_caspr(bodies: Path, cables: Path, wanted: str | None) -> Draft:
     )  # fmt: skip
 
 
-def _link(body: Node, faults: DraftFaults) -> Node:
+def _link(body: Node) -> Node:
     links = [one for part in body.children if part.tag == "links" for one in part.children]
     links = [one for one in links if one.tag.startswith("link_")]
     if len(links) != 1:
         why = "a chain of bodies, which is not solved for here" if links else "no platform"
-        faults.add(f"has {len(links)} links: {why}; expected one <link_rigid>", body.line)
-        faults.check()
+        raise body.error(f"has {len(links)} links: {why}; expected one <link_rigid>")
     return links[0]
 
 
-def _joint(link: Node, faults: DraftFaults) -> tuple[Array, tuple[Joint, ...]]:
+def _joint(link: Node, faults: Faults) -> tuple[Array, tuple[Joint, ...]]:
     """The pose (7,) at the joint's initial values, and the joints there."""
-    joint = link.child("joint") or Node("joint", {}, link.line)
+    joint = link.child("joint") or link.empty("joint")
     kind = joint.values.get("type", "")
     motions = _MOTIONS.get(kind, "").split()
     pose = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     if not motions:
-        faults.add(f"joint type {kind!r}: expected one of {', '.join(_MOTIONS)}", joint.line)
+        faults.add(joint.error(f"joint type {kind!r}: expected one of {', '.join(_MOTIONS)}"))
         return pose, ()
     start = joint.values.get("q_initial", "")
-    values = numbers_of(start, "q_initial", len(motions), faults, joint.line)
-    parent = link.child("parent") or Node("parent", {}, link.line)
+    values = numbers_of(joint, start, "q_initial", len(motions), faults)
+    parent = link.child("parent") or link.empty("parent")
     pose[:3] = numbers_in(parent, "location", 3, faults)
     axes = []
     for motion, value in zip(motions, values, strict=True):
@@ -115,7 +114,7 @@ def _joint(link: Node, faults: DraftFaults) -> tuple[Array, tuple[Joint, ...]]:
     return pose, tuple(Joint(*one, point=pose[:3].copy()) for one in held)
 
 
-def _inertia(physical: Node, mass: float, centre: Array, faults: DraftFaults) -> Array | None:
+def _inertia(physical: Node, mass: float, centre: Array, faults: Faults) -> Array | None:
     """About the centre of mass, (3, 3); None where the file has none."""
     node = physical.child("inertia")
     if node is None:
@@ -127,14 +126,14 @@ def _inertia(physical: Node, mass: float, centre: Array, faults: DraftFaults) ->
     if about == "joint":  # Steiner
         inertia = inertia - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     elif about != "com":
-        faults.add(f'<inertia>: expected ref="com" or ref="joint", got {about!r}', node.line)
+        faults.add(node.error(f'<inertia>: expected ref="com" or ref="joint", got {about!r}'))
     return inertia
 
 
 _PARTS = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 
 
-def _chosen(sets: Node, wanted: str | None, path: Path) -> tuple[list[Node], list[str]]:
+def _chosen(sets: Node, wanted: str | None) -> tuple[list[Node], list[str]]:
     """The cables of one set, and which it is, if there are several.
 
     Raises:
@@ -157,21 +156,20 @@ def _chosen(sets: Node, wanted: str | None, path: Path) -> tuple[list[Node], lis
         has = "does not exist, or has no cables"
         if odd:
             has = f"has {' and '.join(f'<{tag}>' for tag in odd)}, with a force that is no winch's"
-        line = some[0].line if some else sets.line
         text = f"set {name!r} {has}; expected {' or '.join(f'<{tag}>' for tag in _CABLES)}{tip}"
-        raise InputFileError.at(path, text, line=line)
+        raise (some[0] if some else sets).error(text)
     if not others:
         return some, []
     return some, [f"cables of set {name!r}; others with --set: {', '.join(others)}"]
 
 
-def _cables(some: list[Node], centre: Array, faults: DraftFaults) -> Iterator[tuple[Any, ...]]:
+def _cables(some: list[Node], centre: Array, faults: Faults) -> Iterator[tuple[Any, ...]]:
     """Name, exit point, anchor point, E S, limits of tension and pulley radius of each cable."""
     for cable in some:
         name, about = cable.values.get("name", ""), cable.values.get("attachment_reference")
         if about not in ("com", "joint"):
             text = f"cable {name!r}: expected attachment_reference com or joint, got {about!r}"
-            faults.add(text, cable.line)
+            faults.add(cable.error(text))
         ends = [
             # pulleys are on the base
             (_optional(node, "link", 0.0, faults) if node.tag == "attachment" else 0.0, node)
@@ -181,13 +179,11 @@ def _cables(some: list[Node], centre: Array, faults: DraftFaults) -> Iterator[tu
         ends.sort(key=lambda end: end[0])
         if [link for link, _node in ends] != [0, 1]:
             where = ", ".join(f"{link:g}" for link, _node in ends) or "none"
-            faults.add(
-                f"cable {name!r} is attached to links {where}; expected 0 (the base) and 1 (the "
-                "platform), one point on each", cable.line,
-            )  # fmt: skip
+            text = f"cable {name!r} is attached to links {where}; expected 0 (the base) and 1 (the "
+            faults.add(cable.error(f"{text}platform), one point on each"))
             continue
         exit_point, anchor = (numbers_in(node, _ENDS[node.tag], 3, faults) for _, node in ends)
-        properties = cable.child("properties") or Node("properties", {}, cable.line)
+        properties = cable.child("properties") or cable.empty("properties")
         key = _CABLES[cable.tag]
         yield (
             name, exit_point, anchor + centre if about == "com" else anchor,
@@ -198,5 +194,5 @@ def _cables(some: list[Node], centre: Array, faults: DraftFaults) -> Iterator[tu
         )  # fmt: skip
 
 
-def _optional(node: Node, tag: str, default: float, faults: DraftFaults) -> float:
+def _optional(node: Node, tag: str, default: float, faults: Faults) -> float:
     return default if node.child(tag) is None else float(numbers_in(node, tag, 1, faults)[0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,36 +13,10 @@ from seecr.description.cables import EXAMPLE, ea_of
 from seecr.description.mjcf import load_robot
 from seecr.description.points import home_of, plane_of, robot_numbers
 from seecr.description.robot import Joint, Robot
-from seecr.errors import InputError, InputFileError, SeecrError
+from seecr.errors import InputError, SeecrError
 from seecr.files import written
 from seecr.pose import Array
 from seecr.units import in_si, millimetres
-
-_MOST_FAULTS = 12
-
-
-@dataclass
-class DraftFaults:
-    """All that is wrong with a file, so that it is said at once."""
-
-    path: Path
-    said: list[str] = field(default_factory=list)
-
-    def add(self, text: str, line: int | None = None, column: str | None = None) -> None:
-        """One more: what was expected, what came, what to do."""
-        places = (("line", line), ("column", column))
-        place = ", ".join(f"{word} {value}" for word, value in places if value is not None)
-        self.said.append(f"{place}: {text}" if place else text)
-
-    def check(self) -> None:
-        """Raise one error about all of them.
-
-        Raises:
-            InputFileError: there are some.
-        """
-        if self.said:
-            count = f"{len(self.said)} faults: " if len(self.said) > 1 else ""
-            raise InputFileError.at(self.path, count + some(self.said, _MOST_FAULTS, "; "))
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,13 @@ axis; ``elasticity`` is Young's modulus [Pa] on a circle of the cable's ``radius
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from seecr.importing.draft import Draft, DraftFaults, pulley_notes
+from seecr.errors import Faults
+from seecr.importing.draft import Draft, pulley_notes
 from seecr.importing.xml_tree import Node, numbers_of, read_xml
 from seecr.pose import Array
 
@@ -31,17 +33,17 @@ def read_wirex(path: Path) -> Draft:
         InputFileError: no such file, or one without a robot; all its faults are told at once.
     """
     root = read_xml(path, "models", _EXPECTED)
-    faults = DraftFaults(path)
+    faults = Faults()
     robot = _part(root, "robot", faults)
     chains = list(robot.every("chain"))
     if not chains:
-        faults.add("has no <chain>; expected one for each cable, in <geometry>", robot.line)
+        faults.add(robot.error("has no <chain>; expected one for each cable, in <geometry>"))
     bases, ends = ([_part(one, tag, faults) for one in chains] for tag in ("base", "platform"))
     exits, anchors = ([_point(node, faults) for node in some] for some in (bases, ends))
     platform = _part(robot, "platform", faults)
     mass = _value(platform, "mass", faults)
     if mass < 0.0:
-        faults.add(f"<platform>: expected a mass of 0 or more, got {mass:g}", platform.line)
+        faults.add(platform.error(f"<platform>: expected a mass of 0 or more, got {mass:g}"))
     centre, tensor = platform.child("centerofgravity"), platform.child("inertiatensor")
     at = np.zeros(3) if centre is None else _point(centre, faults)
     inertia = None
@@ -71,29 +73,28 @@ def read_wirex(path: Path) -> Draft:
     )  # fmt: skip
 
 
-def _part(node: Node, tag: str, faults: DraftFaults) -> Node:
+def _part(node: Node, tag: str, faults: Faults) -> Node:
     """The element of that name in a node; an empty one, and a fault, if there is none."""
     found = node.child(tag)
     if found is None:
-        faults.add(f"<{node.tag}>: expected <{tag}> in it, got none", node.line)
-        return Node(tag, dict.fromkeys(("x", "y", "z", "mass"), "0"), node.line)
+        faults.add(node.error(f"<{node.tag}>: expected <{tag}> in it, got none"))
+        return replace(node.empty(tag), values=dict.fromkeys(("x", "y", "z", "mass"), "0"))
     return found
 
 
-def _value(node: Node, key: str, faults: DraftFaults, default: float | None = None) -> float:
+def _value(node: Node, key: str, faults: Faults, default: float | None = None) -> float:
     """The number of an attribute; it may be missing if there is a default."""
     if key not in node.values and default is not None:
         return default
-    return float(
-        numbers_of(node.values.get(key, ""), f"<{node.tag}> {key}", 1, faults, node.line)[0]
-    )
+    text = node.values.get(key, "")
+    return float(numbers_of(node, text, f"<{node.tag}> {key}", 1, faults)[0])
 
 
-def _point(node: Node, faults: DraftFaults) -> Array:
+def _point(node: Node, faults: Faults) -> Array:
     return np.array([_value(node, axis, faults) for axis in "xyz"])
 
 
-def _elasticity(root: Node, faults: DraftFaults) -> tuple[float, list[str]]:
+def _elasticity(root: Node, faults: Faults) -> tuple[float, list[str]]:
     """E S [N] of the file's cables, NaN without one; and what to say of it."""
     cable = root.child("cable")
     if cable is None:

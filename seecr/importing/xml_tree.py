@@ -9,9 +9,8 @@ from xml.parsers import expat
 
 import numpy as np
 
-from seecr.errors import InputFileError
+from seecr.errors import Faults, InputFileError
 from seecr.files import no_text, read_bytes
-from seecr.importing.draft import DraftFaults
 from seecr.pose import Array, all_finite
 
 
@@ -20,12 +19,13 @@ class Node:
     """An element.
 
     Attributes:
-        tag: its name. values: its attributes. line: where it begins, from 1.
+        tag: its name. values: its attributes. path: of its file. line: where it begins, from 1.
         children: the elements in it. text: what else is in it.
     """
 
     tag: str
     values: dict[str, str]
+    path: Path
     line: int
     children: list[Node] = field(default_factory=list)
     text: str = ""
@@ -33,6 +33,14 @@ class Node:
     def child(self, tag: str) -> Node | None:
         """The first element in it of that name."""
         return next((one for one in self.children if one.tag == tag), None)
+
+    def empty(self, tag: str) -> Node:
+        """An element of that name without anything, in place of one that is not in it."""
+        return Node(tag, {}, self.path, self.line)
+
+    def error(self, text: str) -> InputFileError:
+        """An error at its line."""
+        return InputFileError.at(self.path, text, line=self.line)
 
     def every(self, tag: str) -> Iterator[Node]:
         """All elements of that name, however deep."""
@@ -55,12 +63,12 @@ def read_xml(path: Path, root: str, expected: str) -> Node:
     kind = no_text(data)
     if kind and not kind.startswith("UTF-16"):
         raise InputFileError.at(path, f"is {kind}; {expected}")
-    top = Node("", {}, 0)
+    top = Node("", {}, path, 0)
     open_ones = [top]
     parser = expat.ParserCreate()
 
     def start(tag: str, values: dict[str, str]) -> None:
-        node = Node(tag, values, parser.CurrentLineNumber)
+        node = Node(tag, values, path, parser.CurrentLineNumber)
         open_ones[-1].children.append(node)
         open_ones.append(node)
 
@@ -79,27 +87,28 @@ def read_xml(path: Path, root: str, expected: str) -> Node:
         raise InputFileError.at(path, f"is no XML: {why}; {expected}", line=error.lineno) from None
     found = top.children[0]
     if found.tag != root:
-        raise InputFileError.at(path, f"begins with <{found.tag}>; {expected}", line=found.line)
+        raise found.error(f"begins with <{found.tag}>; {expected}")
     return found
 
 
-def numbers_in(node: Node, tag: str, count: int, faults: DraftFaults) -> Array:
+def numbers_in(node: Node, tag: str, count: int, faults: Faults) -> Array:
     """The numbers (count,) in the element ``tag`` of a node; NaN, and a fault, if it has none."""
     place = node.child(tag)
     if place is None:
-        faults.add(f"<{node.tag}>: expected <{tag}> in it, got none", node.line)
+        faults.add(node.error(f"<{node.tag}>: expected <{tag}> in it, got none"))
         return np.full(count, np.nan)
-    return numbers_of(place.text, f"<{tag}>", count, faults, place.line)
+    return numbers_of(place, place.text, f"<{tag}>", count, faults)
 
 
-def numbers_of(text: str, what: str, count: int, faults: DraftFaults, line: int) -> Array:
-    """So many numbers in a text; NaN, and a fault, if it holds something else."""
+def numbers_of(node: Node, text: str, what: str, count: int, faults: Faults) -> Array:
+    """So many numbers in a text of a node; NaN, and a fault, if it holds something else."""
     try:
         values = np.array([float(word) for word in text.replace(",", " ").split()])
     except ValueError:
         values = np.array([])
     if len(values) != count or not all_finite(values):
         plural = "a number" if count == 1 else f"{count} numbers"
-        faults.add(f"{what}: expected {plural}, got {' '.join(text.split())[:40]!r}", line)
+        got = repr(" ".join(text.split())[:40])
+        faults.add(node.error(f"{what}: expected {plural}, got {got}"))
         return np.full(count, np.nan)
     return values
