@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import importlib.util
 import os
+import threading
 from pathlib import Path
 
 # BLAS on several threads, in several workers, takes longer; set before NumPy is imported
@@ -65,8 +66,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def no_lines_of_progress() -> None:
     """A busy machine adds none to what commands print: tests of other words read all of it."""
     from seecr.cli import options
+    from seecr.compiled.compile_notice import watch
 
-    options.SECONDS_BETWEEN_LINES = float("inf")
+    options.SECONDS_BETWEEN_LINES = watch.patience = threading.TIMEOUT_MAX
 
 
 @pytest.fixture

@@ -97,7 +97,6 @@ seecr.columns.csv: table_text
 seecr.columns.commands: CommandFile read_commands
 seecr.columns.headers: columns_said parse_columns renamed
 seecr.columns.plausible: ABSURD scalar_last
-seecr.compiled.compile_notice: tell_compiling
 seecr.counted: counted
 seecr.description.cables: ea_of
 seecr.description.fingerprint: fingerprint

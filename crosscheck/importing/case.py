@@ -33,7 +33,8 @@ from crosscheck.importing.take import READERS, Take, take_of
 from crosscheck.measurements.data import LEAST, Measurements, Sigma
 from crosscheck.measurements.read import load_commands, together
 from crosscheck.measurements.write import write_measurements
-from seecr.columns.csv import table_text
+from seecr.columns.csv import read_table, table_text
+from seecr.columns.headers import columns_said, renamed, said_of
 from seecr.counted import counted
 from seecr.description.robot import Robot
 from seecr.errors import InputError, InputFileError
@@ -226,13 +227,18 @@ def import_case(
             f"{len(commands)}; give --commands once for each file, in their order"
         )
     said: list[str] = []
-    logs = [load_commands(log, robot) for log in commands]
+    theirs = None
+    if form == "poses" and columns_said():  # a header may be in one kind of file alone
+        theirs = said_of(name for log in commands for name in read_table(Path(log)).names)
+    with renamed(theirs):
+        logs = [load_commands(log, robot) for log in commands]
     for log in logs:
         said += [f"{log.path.name}: {note}" for note in log.notes]
-    takes = [
-        take_of(form, Path(file), robot, log, choices, said)
-        for file, log in zip(files, logs, strict=True)
-    ]
+    with renamed(None, elsewhere=theirs or ()):
+        takes = [
+            take_of(form, Path(file), robot, log, choices, said)
+            for file, log in zip(files, logs, strict=True)
+        ]
     frames = _frames(robot, takes, choices)
     takes, strays = without_strays(robot, takes, frames)
     if strays:

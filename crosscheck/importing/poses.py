@@ -15,6 +15,7 @@ from crosscheck.importing.logs import Logged, Stream, unit_quaternions
 from crosscheck.measurements.plausible import is_nines
 from seecr.columns.commands import began, times_of_day
 from seecr.columns.csv import Table, read_table, show
+from seecr.columns.headers import foreign
 from seecr.counted import counted, some
 from seecr.errors import InputError, InputFileError
 from seecr.pose import Array, quat_from_rxyz
@@ -46,20 +47,23 @@ def read_poses(path: Path, unit: str | None = None) -> Logged:
     if unit is not None and unit not in lengths:
         raise InputError(f"--unit: expected one of {', '.join(lengths)}, got {unit!r}")
     table = read_table(path)
-    found = _columns(table)
-    t_s, first = _times(table)
+    names = foreign(table)
+    found = _columns(table, names)
+    t_s, first = _times(table, names)
     lacking = [axis for axis in "xyz" if axis not in found]
     if lacking:
         raise table.error(
             f"expected columns of a pose such as x_mm y_mm z_mm, got no {', '.join(lacking)} among "
-            f"{some(table.names, 8)}; rename them"
+            f"{some(table.names, 8)}; rename them, or say --columns THEIRS=meas_x_mm,..."
         )
     if unit is not None and all(found[axis][1] for axis in "xyz"):
         raise InputError(f"--unit {unit}: the columns of {path.name} state their own; leave it out")
     _refuse_nines(table, [found[axis][0] for axis in "xyz"])
     position = np.stack([_length(table, *found[axis], unit) for axis in "xyz"], axis=1)
     bodies = {path.stem: (position, _turns(table, found))}
-    return Logged(path, t_s, table.line, bodies, {}, notes=_unread(table, found), began=first)
+    return Logged(
+        path, t_s, table.line, bodies, {}, notes=_unread(table, names, found), began=first
+    )
 
 
 def _refuse_nines(table: Table, columns: Sequence[int]) -> None:
@@ -75,11 +79,16 @@ def _refuse_nines(table: Table, columns: Sequence[int]) -> None:
         raise table.error(text, row=rows[0], column=table.names[columns[0]])
 
 
-def _unread(table: Table, found: Mapping[str, tuple[int, str]]) -> tuple[str, ...]:
+def _unread(
+    table: Table, names: Sequence[str], found: Mapping[str, tuple[int, str]]
+) -> tuple[str, ...]:
     """A note on columns that are not read, if there are any."""
-    read = {table.names[column] for column, _unit in found.values()}
-    names = [name for name in table.names if name.strip()]
-    others = [name for name in names if name not in read and not _TIMES.fullmatch(name)]
+    read = {column for column, _unit in found.values()}
+    others = [
+        name
+        for c, name in enumerate(table.names)
+        if name and c not in read and not _TIMES.fullmatch(names[c])
+    ]
     if not others:
         return ()
     turned = any(name[0] in "qr" for name in found)
@@ -87,10 +96,10 @@ def _unread(table: Table, found: Mapping[str, tuple[int, str]]) -> tuple[str, ..
     return (f"columns not read: {some(others, 6)}{hint}",)
 
 
-def _columns(table: Table) -> dict[str, tuple[int, str]]:
-    """For each quantity, the column and the unit in its name."""
+def _columns(table: Table, names: Sequence[str]) -> dict[str, tuple[int, str]]:
+    """For each quantity, the column and the unit in its name, as the user calls it."""
     out: dict[str, tuple[int, str]] = {}
-    for c, name in enumerate(table.names):
+    for c, name in enumerate(names):
         match = _LABEL.fullmatch(name)
         if match:
             quantity = match.group(1).lower().removeprefix("t")
@@ -102,14 +111,18 @@ def _columns(table: Table) -> dict[str, tuple[int, str]]:
     return out
 
 
-def _times(table: Table) -> tuple[Array, datetime | None]:
+def _times(table: Table, names: Sequence[str]) -> tuple[Array, datetime | None]:
     if len(table.names) == 1:
         text = "expected a row of names, and cells separated by commas, semicolons or tabs"
         raise table.error(f"{text}, got {show(table.names[0])}; export it like this")
-    found = [(c, m) for c, name in enumerate(table.names) if (m := _TIMES.fullmatch(name))]
+    found = [(c, m) for c, name in enumerate(names) if (m := _TIMES.fullmatch(name))]
     if len(found) != 1:
         got = ", ".join(table.names[c] for c, _m in found)
-        todo = f"got {got}; rename the others" if got else "got none; add or rename it"
+        todo = (
+            f"got {got}; rename the others"
+            if got
+            else "got none; add or rename it, or say --columns THEIRS=t_s"
+        )
         raise table.error(f"expected one column of times such as t_s, {todo}")
     column, match = found[0]
     first = began(table, column)

@@ -14,7 +14,6 @@ from typing import Any, TypeAlias
 import click
 
 from seecr import SeecrError
-from seecr.compiled.compile_notice import tell_compiling
 from seecr.errors import printable
 from seecr.version import full_version
 
@@ -94,7 +93,6 @@ class LazyGroup(click.Group):
         if not extra.pop("standalone_mode", True):
             return self._run(*args, **extra)
         if not args and extra.get("args") is None:  # as a program, not by Python
-            tell_compiling(self._tell_compiling)
             gc.set_threshold(100_000, 50, 100)  # collecting took an eighth of the time
             signal.signal(signal.SIGTERM, _end)
         given = args[0] if args else extra.pop("args", None)
@@ -126,10 +124,6 @@ class LazyGroup(click.Group):
             f"a defect of {own}, not of your input: {what}; please report it "
             f"with the command and what {DEBUG} shows (CONTRIBUTING.md)"
         )
-
-    def _tell_compiling(self) -> None:
-        text = "compiling the solver, only this first time; it takes up to a minute"
-        click.echo(f"{self.name}: {text}", err=True)
 
     def _refuse(self, text: str, status: int = BAD_INPUT) -> int:
         for line in text.splitlines():  # several faults of one file are a line each

@@ -106,18 +106,21 @@ def command(
 
     Rest lengths are the straight lengths at the reference pose. The program says what it deduced
     and what it left out, and whether the platform comes to rest at the reference pose: with a
-    certificate, or with the directions in which nothing holds it.
+    certificate, or with the directions in which nothing holds it. At rest some cables may be slack:
+    it says which, and whether tensions within the limits could hold the platform there with all of
+    them, which is what seecr map asks of each pose.
 
     \b
     Exit status: 0 at rest, 2 bad input (nothing is written), 3 written, but it does not rest at its
     reference pose.
     """
-    from seecr import solve
+    from seecr import solve, workspace_map
     from seecr.cli.arguments import notes_of
     from seecr.files import check_writable, json_text
     from seecr.importing.draft import write_robot
     from seecr.show.files import SweepRows
-    from seecr.show.pose_words import at_rest, home_lines, reason
+    from seecr.show.pose_words import at_rest, home_lines, open_lines, reason
+    from seecr.workspace.grid import own_directions
 
     out = out if folder is None else folder / out
     _check_out(out, force, [points, *files])
@@ -129,7 +132,11 @@ def command(
     if pretension is not None:
         robot = _tightened(robot, pretension)
     check_writable(out)
-    solution = solve(robot, robot.reference_pose)
+    solution, home = solve(robot, robot.reference_pose), robot.reference_pose[:3]
+    along, (lowest, highest) = own_directions(robot), draft.limits
+    place = home if along is None else along @ home
+    mapped = workspace_map(robot, *place, lowest=lowest, highest=highest, elastic=False)
+    held, margin = bool(mapped.feasible.all()), float(mapped.margin.min())
     notes = (*notes, *notes_of(None, solution))
     read = [points, *files]
     made = options.made_by(*read)
@@ -142,12 +149,14 @@ def command(
         "rest_lengths_m": robot.rest_lengths, "reference_pose": robot.reference_pose,
         "joints": [f"{joint.kind} {joint.name}" for joint in robot.joints],
         "tension_limits_N": draft.limits, "notes": notes, "home": SweepRows(solution).as_json()[0],
+        "can_be_held": held, "margin_N": margin,
         "why_not": None if status == 0 else reason(solution),
     }  # fmt: skip
     limits = dict(zip(("--lowest", "--highest"), draft.limits, strict=True)).items()
     said = [f"{name}={value:g}" for name, value in limits if 0.0 < value < math.inf]
     lines = [
         f"{out}: {robot!r}", *(f"note: {note}" for note in notes), *home_lines(solution),
+        *open_lines(solution, held, draft.limits),
         following("seecr", "map", out, *said),
     ]  # fmt: skip
     click.echo(json_text(document) if as_json else "\n".join(lines))

@@ -9,7 +9,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,9 @@ from seecr.pose import LARGEST, Array
 EXPECTED_FILE = "expected a CSV file in UTF-8 with a header row and one row per resting pose"
 # Most cells of a column that are named one by one where they are no numbers.
 _MOST_CELLS = 3
+# Most characters of a title that are shown.
+_MOST_TITLE = 40
+_NUMBER = re.compile(r"[-+]?[\d.,]+([eE][-+]?\d+)?")
 _MEANS = re.compile("mean|average|avg|mittel|durchschnitt|moyenne", re.IGNORECASE)
 
 _PARQUET_MAGIC = b"PAR1"
@@ -151,7 +154,9 @@ def read_table(path: Path) -> Table:
     if data.startswith(_PARQUET_MAGIC):
         return _read_parquet(path)
     if is_workbook(data):
-        return _of_rows(path, sheet_rows(path, file, sheet), ";", "row", ())
+        rows = sheet_rows(path, file, sheet)
+        titles, said = _titles(((number, cells) for number, cells in rows), "row")
+        return _of_rows(path, rows[titles:], ";", "row", said)
     text, notes = decoded(path, data, EXPECTED_FILE)
     return _read_csv(path, text, notes)
 
@@ -168,8 +173,29 @@ def _read_csv(path: Path, text: str, notes: list[str]) -> Table:
     if not numbered:
         raise InputFileError.at(path, f"is empty; {EXPECTED_FILE}")
     _check_first_line(path, *numbered[0])
+    split = said[1] if said else "[,;\t]"
+    titles, above = _titles(((number, re.split(split, line)) for number, line in numbered), "line")
+    numbered = numbered[titles:]
     separator = said[1] if said else _separator(path, *numbered[0])
-    return _of_rows(path, _csv_rows(path, numbered, separator), separator, "line", notes)
+    rows = _csv_rows(path, numbered, separator)
+    return _of_rows(path, rows, separator, "line", [*notes, *above])
+
+
+def _titles(rows: Iterable[tuple[int, Sequence[str]]], word: str) -> tuple[int, list[str]]:
+    """How many rows with one text alone are above a row of several names; and a note on them."""
+    titles: list[str] = []
+    for count, (number, cells) in enumerate(rows):
+        filled = [text for cell in cells if (text := cell.strip(' "\r\n'))]
+        if len(filled) != 1:
+            names = len(filled) > 1 and not any(map(_NUMBER.fullmatch, filled))
+            if not titles or not names:
+                break
+            noun = "a title" if count == 1 else "titles"
+            return count, [f"Left out: {plural(count, word)} {', '.join(titles)}, {noun}."]
+        if QUANTITY.fullmatch(spelled(filled[0])) or _NUMBER.fullmatch(filled[0]):
+            break
+        titles.append(f"{number} ({filled[0][:_MOST_TITLE]})")
+    return 0, []
 
 
 def _of_rows(

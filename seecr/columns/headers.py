@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING
@@ -55,23 +55,41 @@ def spelled(name: str) -> str:
     return f"{plain}_{unit}" if brackets and unit else name
 
 
-# What the user says of headers, for all files that are read meanwhile.
+# What the user says of headers, for all files that are read meanwhile; and of which of them a file
+# need not have, as others have them.
 _said: ContextVar[Mapping[str, str] | None] = ContextVar("columns", default=None)
+_elsewhere: ContextVar[Collection[str]] = ContextVar("elsewhere", default=())
 
 
 @contextmanager
-def renamed(columns: Mapping[str, str] | None) -> Iterator[None]:
-    """Files that are read meanwhile may have these foreign headers: theirs by ours."""
-    token = _said.set(_said.get() if columns is None else columns)
+def renamed(columns: Mapping[str, str] | None, elsewhere: Collection[str] = ()) -> Iterator[None]:
+    """Files that are read meanwhile may have these foreign headers: theirs by ours.
+
+    Args:
+        columns: theirs with ours. elsewhere: those of them that a file need not have.
+    """
+    said = _said.set(_said.get() if columns is None else columns)
+    others = _elsewhere.set(elsewhere)
     try:
         yield
     finally:
-        _said.reset(token)
+        _said.reset(said)
+        _elsewhere.reset(others)
 
 
 def columns_said() -> Mapping[str, str]:
     """The foreign headers that the user has said, with ours."""
     return _said.get() or {}
+
+
+def said_of(names: Iterable[str]) -> dict[str, str]:
+    """Those of the foreign headers that the user has said that are among some names."""
+    said, every = columns_said(), list(names)
+    return {
+        theirs: ours
+        for theirs, ours in said.items()
+        if any(_meant(theirs, ours, name, said) for name in every)
+    }
 
 
 def parse_columns(text: str) -> dict[str, str]:
@@ -121,7 +139,9 @@ def foreign(table: Table) -> tuple[str, ...]:
             text = f"columns {theirs}={ours}: {next(n for _, n in meant if n)} is no column that "
             text += "is read; expected THEIRS=OURS with one of ours such as meas_x_m or length_1_m"
             faults.add(table.error(text))
-        elif not found and not any(_meant(ours, ours, name, {}) for name in own):
+        elif not (found or theirs in _elsewhere.get()) and not any(
+            _meant(ours, ours, name, {}) for name in own
+        ):
             faults.add(_missing(table, theirs, ours))
         for index, name in found:
             names[index] = str(name)

@@ -320,7 +320,9 @@ def _parse_name(
     units = of_columns(_si_of(quantity))
     if suffix not in units:
         shown = ours.removesuffix(f"_{suffix}") if suffix else ours
-        raise table.error(_unit_fault(shown, suffix, units), column=name)
+        meant = f"{name}={quantity}_{next(iter(units))}"
+        hint = "" if suffix or "" in units else f"; or say it, such as --columns {meant}"
+        raise table.error(_unit_fault(shown, suffix, units) + hint, column=name)
     _check_cable(table, quantity, name, n_cables)
     return quantity, units[suffix]
 

@@ -1,4 +1,4 @@
-"""Reports that compiling takes long, if a caller asks for it; else it is a minute of silence.
+"""Tells once, on standard error, that compiling takes long; else it is a minute of silence.
 
 Numba compiles what its cache on disk does not hold. It notifies of each function that it compiles
 and of none from the cache, so the state of the cache need not be guessed.
@@ -6,17 +6,10 @@ and of none from the cache, so the state of the cache need not be guessed.
 
 from __future__ import annotations
 
-import os
+import sys
 from collections.abc import Callable
+from multiprocessing import parent_process
 from threading import Lock, Timer
-
-__all__ = [
-    "Watch",
-    "begins",
-    "ends",
-    "tell_compiling",
-]
-
 
 Say = Callable[[], None]
 
@@ -24,16 +17,23 @@ Say = Callable[[], None]
 _PATIENCE = 2.0
 
 
+def _say() -> None:
+    """Tell people who called a function or a command; processes that these start tell nothing."""
+    if sys.stderr is not None and parent_process() is None:
+        text = "compiling the solver, only this first time; it takes a minute or two"
+        sys.stderr.write(f"seecr: {text}\n")
+
+
 class Watch:
-    """Calls ``say`` once in this process, when compiling has gone on for a while.
+    """Calls ``say`` once, when compiling has gone on for a while.
 
     Args:
         say: the function to call, in a thread of its own.
         patience: [s] how long compiling may go on before that.
     """
 
-    def __init__(self, say: Say, patience: float = _PATIENCE) -> None:
-        self._say, self._patience, self._process = say, patience, os.getpid()
+    def __init__(self, say: Say = _say, patience: float = _PATIENCE) -> None:
+        self._say, self.patience = say, patience
         self._lock, self._depth, self._said = Lock(), 0, False
         self._timer: Timer | None = None
 
@@ -41,8 +41,8 @@ class Watch:
         """Compilation of a function begins; others may begin before it ends."""
         with self._lock:
             self._depth += 1
-            if self._timer is None and not self._said and os.getpid() == self._process:
-                self._timer = Timer(self._patience, self._look)
+            if self._timer is None and not self._said:
+                self._timer = Timer(self.patience, self._look)
                 self._timer.daemon = True
                 self._timer.start()
 
@@ -59,22 +59,5 @@ class Watch:
             self._say()
 
 
-_watch: Watch | None = None
-
-
-def tell_compiling(say: Say) -> None:
-    """From now on call ``say``, once, if compiling takes long."""
-    global _watch
-    _watch = Watch(say)
-
-
-def begins() -> None:
-    """Pass on that compilation of a function begins."""
-    if _watch is not None:
-        _watch.begins()
-
-
-def ends() -> None:
-    """Pass on that compilation of a function has ended."""
-    if _watch is not None:
-        _watch.ends()
+watch = Watch()
+"""That of this process."""

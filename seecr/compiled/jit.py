@@ -5,7 +5,7 @@ from __future__ import annotations
 from numba import njit
 from numba.core import event
 
-from seecr.compiled import compile_notice
+from seecr.compiled.compile_notice import watch
 
 _COMMON = {"cache": True, "nogil": True, "error_model": "numpy"}
 # Numba counts references to arrays, atomically, at every call and slice. That took three quarters
@@ -18,10 +18,10 @@ class _Listener(event.Listener):
     """Is notified when Numba compiles; functions from its cache are not compiled."""
 
     def on_start(self, _: event.Event) -> None:
-        compile_notice.begins()
+        watch.begins()
 
     def on_end(self, _: event.Event) -> None:
-        compile_notice.ends()
+        watch.ends()
 
 
 event.register("numba:compile", _Listener())  # type: ignore[no-untyped-call]

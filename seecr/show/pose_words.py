@@ -359,6 +359,42 @@ def home_lines(solution: Solution) -> Iterator[str]:
     yield f"  {reason(solution)}"
 
 
+def open_lines(solution: Solution, held: bool, limits: tuple[float, float]) -> Iterator[str]:
+    """What a rest at the reference pose leaves open: slack cables, and tensions beyond limits.
+
+    Args:
+        held: whether tensions within ``limits`` [N] of all cables balance the load there.
+    """
+    if not at_rest(solution):
+        return
+    robot, (lowest, highest) = solution.robot, limits
+    within = f"of {lowest:g} N or more"
+    if np.isfinite(highest):
+        within = f"from {lowest:g} to {highest:g} N"
+    slack = solution.slack[0] & robot.driven
+    names = [name for name, hangs in zip(robot.cable_names, slack, strict=True) if hangs]
+    if not held:
+        yield (
+            f"  no tensions {within} in all cables balance the load there: seecr map counts such "
+            "a pose as one that cannot be held; expected crossed cables, more of them, or another "
+            "reference pose (--at)"
+        )
+    elif names:
+        verb = "hangs" if len(names) == 1 else "hang"
+        yield (
+            f"  {some(names)} {verb} slack there, and where cables hang slack crosscheck plan "
+            f"finds few poses; tensions {within} could hold the platform with all of them taut: "
+            "--pretension 10 shortens them so"
+        )
+    over = [
+        f"{name} {significant(tension, 3)} N"
+        for name, tension in zip(robot.cable_names, solution.tensions[0], strict=True)
+        if tension > highest
+    ]
+    if over:
+        yield f"  beyond {highest:g} N there: {some(over)}"
+
+
 def reason(solution: Solution) -> str:
     """Why a robot does not rest where it was sent: directions in which no cable resists."""
     robot, pose = solution.robot, solution.pose[0]

@@ -35,7 +35,8 @@ def test_foreign_headers_on_every_command_that_reads_rows(public: Path, tmp_path
     assert done.stdout.splitlines()[-1].endswith(f"--columns '{SIMULATOR},T*=tension_*_N'")
     # said for one command alone
     refused = ran(f"crosscheck compare {robot} {table} --out {tmp_path / 'out'}", 2)
-    assert "column t: missing unit; expected t_s" in refused.stderr
+    said = "column t: missing unit; expected t_s or t_ms; or say it, such as --columns t=t_s"
+    assert said in refused.stderr
 
 
 def test_all_faults_of_all_files_end_with_2_and_leave_nothing(public: Path, tmp_path: Path) -> None:

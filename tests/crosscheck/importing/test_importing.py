@@ -10,6 +10,7 @@ from pathlib import Path
 import made_recordings as made_of
 import numpy as np
 import pytest
+from called import ran, refused_in_a_line
 from made_data import run, soft_cogiro, soft_xml, term
 from scipy.spatial.transform import Rotation
 
@@ -207,6 +208,26 @@ def test_recordings_are_a_case_folder_in_one_call(made, commands, tmp_path):
         crosscheck.import_case("csv", log, robot, sent)
     with pytest.raises(InputError, match=r"has different numbers from .*\.xml"):
         crosscheck.import_case("poses", log, ROBOT, sent, out=tmp_path / "other")
+
+
+FOREIGN = "T=t_s,px=meas_x_m,py=meas_y_m,pz=meas_z_m,q_*=meas_q*,X=cmd_x_m,Y=cmd_y_m,Z=cmd_z_m"
+
+
+def test_headers_of_other_programs_are_said_for_both_files(made, commands, tmp_path):
+    """Some are in one of them, others in both; what is in none of them is refused."""
+    robot, log = tmp_path / "robot.xml", tmp_path / "a.csv"
+    robot.write_text(soft_xml(), encoding="utf-8")
+    right = import_case("poses", made_of.poses_csv(log, made), robot, commands).measured
+    made_of.poses_csv(log, made, labels="T,px,py,pz,q_w,q_x,q_y,q_z")
+    sent = commands.read_text().replace("t_s,cmd_x_m,cmd_y_m,cmd_z_m", "T,X,Y,Z")
+    commands.write_text(sent)
+    words = f"crosscheck import poses {log} --robot {robot} --commands {commands}"
+    ran(f"{words} --columns {FOREIGN} --out {tmp_path / 'case'}", 0)
+    data = crosscheck.load_measurements(tmp_path / "case" / "measured.csv", robot)
+    assert data.position == pytest.approx(right.position, abs=1e-8)
+    assert data.command_pose == pytest.approx(right.command_pose, abs=1e-8)
+    assert "the file has no column pw" in refused_in_a_line(f"{words} --columns {FOREIGN},pw=run")
+    assert "; or say it, such as --columns T=t_s" in refused_in_a_line(words)
 
 
 def test_positions_alone_and_level_commands(tmp_path):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import as_json, following, ran, refused_in_a_line
+from called import BARE, as_json, following, ran, refused_in_a_line
 from published import caspr_files, wirex_file
 
 import seecr
@@ -70,6 +70,37 @@ def test_pretension_holds_the_reference_pose() -> None:
     assert np.abs(document["home"]["deviation_m"]).max() < 1e-12
     assert min(document["home"]["tensions_N"]) >= 90 - 1e-9
     assert document["joints"] == [] and document["why_not"] is None
+
+
+CORNERS = [(x, y, z) for z in (3, 0) for x, y in ((0, 0), (6, 0), (6, 4), (0, 4))]
+HEAD = "exit_x_m,exit_y_m,exit_z_m,anchor_x_m,anchor_y_m,anchor_z_m"
+
+
+@pytest.mark.parametrize(
+    ("cables", "options", "held", "told"),
+    [
+        (8, "--at 3 2 1.5", True, "hang slack there, and where cables hang slack crosscheck plan"),
+        (8, "--at 3 2 1.5 --pretension 30", True, ""),
+        (4, "--at 6.5 2 1", False, "no tensions of 0 N or more in all cables balance the load"),
+    ],
+    ids=["a hall", "a tight hall", "outside"],
+)
+def test_at_rest_says_what_it_leaves_open(cables: int, options: str, held: bool, told: str) -> None:
+    """What tensions could hold is asked as a map asks it.
+
+    Eight cables that do not cross balance any weight in their middle, by symmetry. Outside the
+    frame all four upper ones pull inwards, and none outwards: two hang slack, and it rests turned.
+    """
+    anchors = [(0.1 * (x - 3), 0.1 * (y - 2), 0.1 * (z - 1.5)) for x, y, z in CORNERS]
+    rows = [",".join(map(str, (*a, *b))) for a, b in zip(CORNERS, anchors, strict=True)]
+    Path("points.csv").write_text("\n".join([HEAD, *rows[:cables]]) + "\n")
+    words = f"{NEW} --mass 25kg --ea 3e5 {options} --force"
+    assert as_json(words)["can_be_held"] == held
+    said = ran(words, 0).stdout
+    assert told in said and ("hang slack" in said) == ("hang slack" in told)
+    assert ("no tensions" in said) != held
+    at = " ".join(options.split()[1:4])
+    ran(f"seecr map hall.xml --grid {at} --no-elastic {BARE}", 0 if held else 2)
 
 
 def test_a_robot_that_does_not_rest_is_written_and_told() -> None:

@@ -48,6 +48,8 @@ SAME = {
     "brackets": "cmd_x [mm], cmd_y(mm) ,cmd_z [m]\n300,250,0.1\n-1.5,260.25,1.1005\n",
     "capitals": PLAIN.replace("cmd_x_mm", "CMD_X_MM").replace("cmd_y_mm", "Cmd Y [MM]"),
     "mean": PLAIN + "Mean,1,2\nStd. Dev.,,\n",
+    "title": "Hall 3 in May\n" + PLAIN,
+    "titles": "Hall 3;;\n\nposes of 4 May;;\n" + PLAIN.replace(",", ";"),
 }  # fmt: skip
 
 
@@ -59,6 +61,11 @@ def test_one_table_in_many_spellings(tmp_path: Path, name: str) -> None:
     grouped = ("thousands and points", "quoted thousands", "thousands and commas", "blanks",
                "narrow blanks", "Swiss")  # fmt: skip
     assert ("Thousands" in said) == (name in grouped)
+    title = {
+        "title": "Left out: line 1 (Hall 3 in May), a title.",
+        "titles": "Left out: lines 1 (Hall 3), 3 (poses of 4 May), titles.",
+    }.get(name)
+    assert title in columns.notes if title else "title" not in said
     assert ("Left out: lines 4 (Mean), 5 (Std. Dev.), computed" in said) == (name == "mean")
 
 
@@ -113,6 +120,7 @@ def test_a_workbook_reads_as_its_csv(tmp_path: Path) -> None:
                 [-1.5, 260.25, "1 100.5"], ["Average", None, None]):  # fmt: skip
         first.append(row)
     second = book.create_sheet("day 2")
+    second.append(["Tuesday", None, None])
     second.append(["cmd_x_m", "cmd_y_m", "cmd_z_m"])
     second.append([0.5, 0.25, 0.1])
     path = tmp_path / "poses.xlsx"

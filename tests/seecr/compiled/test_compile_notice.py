@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 from threading import Event
 
 import numba
 import pytest
 
-from seecr.compiled import compile_notice, jit
-from seecr.compiled.compile_notice import Watch
+from seecr.compiled import jit
+from seecr.compiled.compile_notice import Watch, watch
 
 LONG = 10.0  # [s] a thread that does not say it by then never does
 
@@ -41,9 +42,9 @@ def test_numba_tells_of_what_it_compiles_and_not_of_what_it_has(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     seen: list[str] = []
-    monkeypatch.setattr(compile_notice, "begins", lambda: seen.append("begins"))
-    monkeypatch.setattr(compile_notice, "ends", lambda: seen.append("ends"))
-    assert jit.compile_notice is compile_notice
+    monkeypatch.setattr(watch, "begins", lambda: seen.append("begins"))
+    monkeypatch.setattr(watch, "ends", lambda: seen.append("ends"))
+    assert jit.watch is watch
 
     @numba.njit  # type: ignore[misc]
     def twice(x: float) -> float:
@@ -54,26 +55,37 @@ def test_numba_tells_of_what_it_compiles_and_not_of_what_it_has(
     assert twice(3.0) == 6.0 and seen == ["begins", "ends"]
 
 
-@pytest.mark.slow
-def test_a_program_tells_it_on_standard_error_and_python_is_left_in_peace() -> None:
-    code = """
-import sys, time
-from seecr.compiled import compile_notice
-from seecr.cli import main
-from click.testing import CliRunner
-CliRunner().invoke(main, ["--help"])
-assert compile_notice._watch is None
-sys.argv = ["seecr", "--version"]
-try:
-    main()
-except SystemExit:
-    pass
-compile_notice._watch._patience = 0.0
-compile_notice.begins()
-time.sleep(0.5)
+LINE = "seecr: compiling the solver, only this first time; it takes a minute or two\n"
+WAITS = """
+import time
+from seecr.compiled.compile_notice import watch
+
+def wait():
+    watch.patience = 0.0
+    watch.begins()
+    time.sleep(0.5)
 """
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert (
-        run.stderr == "seecr: compiling the solver, only this first time; it takes up to a minute\n"
+STARTED = "import sys, multiprocessing; sys.path.append('.'); from waits import wait\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        ("wait()", LINE),
+        ("child = multiprocessing.get_context('spawn').Process(target=wait)\n"
+         "child.start(); child.join(); assert child.exitcode == 0", ""),
+    ],
+    ids=["a program", "a process of its"],
+)  # fmt: skip
+def test_it_is_told_on_standard_error_once(code: str, said: str, tmp_path: Path) -> None:
+    """To whoever called, in Python too; not by each process that shares the work."""
+    (tmp_path / "waits.py").write_text(WAITS)
+    code = f"{STARTED}if __name__ == '__main__':\n" + "\n".join(
+        f"    {line}" for line in code.splitlines()
     )
-    assert run.stdout.startswith("seecr, version")
+    (tmp_path / "run.py").write_text(code)
+    run = subprocess.run(
+        [sys.executable, "run.py"], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert (run.stderr, run.stdout) == (said, "")
