@@ -65,10 +65,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope="session", autouse=True)
 def no_lines_of_progress() -> None:
     """A busy machine adds none to what commands print: tests of other words read all of it."""
-    from seecr.cli import options
+    from seecr.cli import progress
     from seecr.compiled.compile_notice import watch
 
-    options.SECONDS_BETWEEN_LINES = watch.patience = threading.TIMEOUT_MAX
+    progress.SECONDS_BETWEEN_LINES = watch.patience = threading.TIMEOUT_MAX
 
 
 @pytest.fixture

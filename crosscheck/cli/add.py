@@ -11,6 +11,8 @@ import click
 from crosscheck.cli import choices
 from crosscheck.cli.following import Given, after_fit
 from seecr.cli import options
+from seecr.cli.progress import progress_share
+from seecr.cli.results import made_by, result_in
 
 if TYPE_CHECKING:
     from seecr import Model
@@ -76,8 +78,8 @@ def command(
         _check_names(old, name, refit, model)
     measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     check_place(model)
-    with options.result_in(out, "add.json") as keep:
-        with options.progress_share(f"adding {' + '.join(names)}") as progress:
+    with result_in(out, "add.json") as keep:
+        with progress_share(f"adding {' + '.join(names)}") as progress:
             if effect is not None:
                 found = add_effect(machine, measured, effect, old, progress, per=per)
             else:
@@ -85,7 +87,7 @@ def command(
         found = replace(found, notes=(*said, *found.notes))
         written = found.pays or force
         # of the model as it was read
-        made = options.made_by(machine.source, *data, all_from, model)
+        made = made_by(machine.source, *data, all_from, model)
         more = {"model_notes": list(old.notes)}
         text = choices.keep_grown(found, model, before, written, made, keep, more)
     if as_json:

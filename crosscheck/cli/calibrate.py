@@ -9,7 +9,8 @@ import click
 from crosscheck.cli import choices
 from crosscheck.cli.following import Given, after_fit
 from seecr.cli import options
-from seecr.cli.durations import say_duration
+from seecr.cli.progress import progress_share, say_duration
+from seecr.cli.results import made_by, result_in
 
 
 @options.command(
@@ -52,12 +53,12 @@ def command(
     old = choices.model_or_new(model, machine)
     measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     check_place(model)
-    with options.result_in(out, "calibration.json") as keep:
+    with result_in(out, "calibration.json") as keep:
         say_duration("calibrate", measured.n_rows, "rows", as_json)
-        with options.progress_share("calibrating") as progress:
+        with progress_share("calibrating") as progress:
             found = calibrate(machine, measured, old, progress, only=only, exclude=exclude)
         written = found.pays or (force and found.settled)
-        made = options.made_by(machine.source, *data, model)  # of the model as it was read
+        made = made_by(machine.source, *data, model)  # of the model as it was read
         text = choices.keep_grown(found, model, before, written, made, keep, {})
     if as_json:
         click.echo(text)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from seecr.cli import notes
+from seecr.cli import results
 from seecr.cli.options import FILE, columns, fix, option, passive, together, words_option
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def model_or_new(path: Path, robot: Robot) -> Model:
 def untold(found: Any) -> Any:
     """The same result without the notes about the robot, which were told before."""
     out = copy(found)
-    object.__setattr__(out, "notes", type(found.notes)(notes.untold(found.notes)))
+    object.__setattr__(out, "notes", type(found.notes)(results.untold(found.notes)))
     return out
 
 

@@ -9,6 +9,8 @@ import click
 from crosscheck.cli import choices
 from crosscheck.cli.following import Given, after_comparison
 from seecr.cli import options
+from seecr.cli.progress import progress_share
+from seecr.cli.results import made_by
 
 
 @options.command(
@@ -76,11 +78,11 @@ def command(
     machine = robot_at(robot)
     measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     own = load_model(model, machine) if model is not None else None
-    made = options.made_by(machine.source, *data, model)
+    made = made_by(machine.source, *data, model)
     names, sometimes = ["comparison.json", "comparison.html"], ["comparison.rrd"]
     with (
         staged(out, names=names, sometimes=sometimes, read=data, made=made) as folder,
-        options.progress_share("comparing") as progress,
+        progress_share("comparing") as progress,
     ):
         found = compare(machine, measured, own.terms if own else ())
         beyond = exceeded(limits, found)

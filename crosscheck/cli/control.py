@@ -10,6 +10,8 @@ import click
 from seecr.cli import control as at_rest
 from seecr.cli import options
 from seecr.cli.following import following
+from seecr.cli.progress import progress_bar
+from seecr.cli.results import files_of_pictures, made_by
 
 
 @options.command(
@@ -73,18 +75,18 @@ def command(
     known, own = model_at(believes, machine), model_at(true, machine)
     wanted, free = at_rest.wanted_of(machine, poses)
     names = at_rest.parts_of(scheme)
-    pictures, every_picture = options.files_of_pictures("control", figure, True)
+    pictures, every_picture = files_of_pictures("control", figure, True)
     recordings = {f"{name}.rrd" for name in names}
     names_out = {"control.json", *pictures, *(f"{name}.csv" for name in names)}
     names_out |= set() if no_recording else recordings
-    made = options.made_by(machine.source, poses, believes, true)
+    made = made_by(machine.source, poses, believes, true)
     where: dict[str, Any] = {
         "sometimes": every_picture | recordings, "read": with_toml(poses), "made": made,
     }  # fmt: skip
     top = float("inf") if winch_speed is None else winch_speed
     with staged(out, names=names_out, **where) as folder:
         given = at_rest.arguments(machine, **ways)
-        with options.progress_bar("moving", len(names) * len(wanted.commands)) as tell:
+        with progress_bar("moving", len(names) * len(wanted.commands)) as tell:
             result = control_in_time(
                 machine, wanted.commands, scheme=names, believes=known or (), true=own or (),
                 any_orientation=free, winches=Winches(bandwidth, top, damping),

@@ -10,7 +10,8 @@ import click
 from crosscheck.cli import choices
 from crosscheck.cli.following import Given, after_diagnosis
 from seecr.cli import options
-from seecr.cli.durations import say_duration
+from seecr.cli.progress import progress_share, say_duration
+from seecr.cli.results import made_by
 
 if TYPE_CHECKING:
     from crosscheck import Diagnosis
@@ -67,11 +68,11 @@ def command(
     own = load_model(model, machine) if model is not None else new_model(machine)
     if model_out is not None:
         check_place(model_out)
-    made = options.made_by(machine.source, *data, model)
+    made = made_by(machine.source, *data, model)
     names, sometimes = ["diagnosis.json", "diagnosis.html"], ["diagnosis.rrd"]
     with staged(out, names=names, sometimes=sometimes, read=data, made=made) as folder:
         say_duration("diagnose", measured.n_rows, "rows", as_json, ", longer if much is missing")
-        with options.progress_share("diagnosing") as progress:
+        with progress_share("diagnosing") as progress:
             found = diagnose(
                 machine, measured, own, progress, only=only, exclude=exclude,
                 tolerance=tolerance,

@@ -8,6 +8,7 @@ import click
 
 from seecr.cli import options
 from seecr.cli.following import following
+from seecr.cli.results import made_by, result_in
 
 
 @options.command("crosscheck effects", "crosscheck effects pulley_radius --robot robot.xml")
@@ -35,8 +36,8 @@ def command(name: str | None, robot: Path | None, out: Path | None, as_json: boo
     chosen = [effect_named(name)] if name is not None else list(catalogue().values())
     rows = [effect_record(effect, machine) for effect in chosen]
     told = rows[0] if name is not None else {"effects": rows}
-    text = json_text({"made": options.made_by(None if machine is None else machine.source), **told})
-    with options.result_in(out, "effects.json") as keep:
+    text = json_text({"made": made_by(None if machine is None else machine.source), **told})
+    with result_in(out, "effects.json") as keep:
         keep(text)
     if as_json:
         click.echo(text)

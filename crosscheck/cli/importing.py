@@ -9,6 +9,8 @@ import click
 
 from seecr.cli import options
 from seecr.cli.following import following
+from seecr.cli.progress import progress_share
+from seecr.cli.results import made_by
 
 
 @options.command(
@@ -101,9 +103,9 @@ def command(
     machine = robot_at(robot)
     choices = ImportChoices.said(machine, **said)
     check_case(out, FILES, robot)
-    with options.progress_share("reading the recordings") as progress:
+    with progress_share("reading the recordings") as progress:
         found = import_case(form, files, machine, logs, choices)
-        made = options.made_by(machine.source, *files, *logs)
+        made = made_by(machine.source, *files, *logs)
         progress("writing the case", 0.9)
         write_case(found, robot, out, made)
         progress("writing the case", 1.0)

@@ -10,7 +10,8 @@ import click
 from crosscheck.cli import choices
 from crosscheck.cli.following import Given, after_plan
 from seecr.cli import options
-from seecr.cli.durations import say_duration
+from seecr.cli.progress import progress_share, say_duration
+from seecr.cli.results import made_by
 
 
 @options.command(
@@ -106,14 +107,14 @@ def command(
     sigma = Sigma.parsed(sigmas)
     given = None if poses is None else load_commands(poses, machine, sigma=sigma)
     sigma = sigma if given is None else given.sigma
-    made = options.made_by(machine.source, poses)
+    made = made_by(machine.source, poses)
     where = planned_files(out, poses)
     with staged(out, read=with_toml(poses), made=made, **where) as folder:
         if given is None:
             say_duration("choose", rows or 0, "poses to choose", as_json)
         else:
             say_duration("plan", given.n_rows, "rows", as_json)
-        with options.progress_share("planning") as progress:
+        with progress_share("planning") as progress:
             asked: dict[str, Any] = {
                 "reads": reads, "limits": (lowest, highest), "box": room, "tilt": turn,
                 "floor": floor,

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from seecr.cli import options
-from seecr.cli.durations import say_duration
 from seecr.cli.following import following, passive_lines
+from seecr.cli.progress import executor_of, progress_bar, say_duration
+from seecr.cli.results import made_by
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -113,7 +114,7 @@ def command(
         return 0
     at_once = jobs or processors()
     say_duration("run", sum(map(len, chosen)), "poses", as_json, at_once=at_once)
-    with options.executor_of(scheduler) as executor:
+    with executor_of(scheduler) as executor:
         run = _run(chosen, thresholds, seed, at_once, not no_recordings, out, executor)
     _tell(run, out, not no_recordings, as_json)
     return run.outcome.exit_status
@@ -140,9 +141,9 @@ def _run(
     # effects alone have no worst pose
     every = {f"{case.name}.rrd" for case in chosen}
     names = {RESULTS, "junit.xml", "summary.md", "thresholds.toml", *(every if recordings else ())}
-    where: dict[str, Any] = {"sometimes": {FILE_NAME, *every}, "made": options.made_by()}
+    where: dict[str, Any] = {"sometimes": {FILE_NAME, *every}, "made": made_by()}
     with staged(out, names=names, **where) as folder:
-        with options.progress_bar("compiling", sum(map(len, chosen))) as advance:
+        with progress_bar("compiling", sum(map(len, chosen))) as advance:
             run = run_suite(
                 chosen, thresholds, seed=seed, jobs=jobs,
                 record=partial(_record, folder=folder) if recordings else None,

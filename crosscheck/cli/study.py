@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 from seecr.cli import options
+from seecr.cli.progress import executor_of, progress_bar
+from seecr.cli.results import made_by
 
 if TYPE_CHECKING:
     from crosscheck import Study, Tolerance
@@ -66,12 +68,12 @@ def command(
 
     within = _limits(sizes)
     every, data = read_cases(cases)  # mistakes are told before workers are asked for
-    made = options.made_by(cases)
+    made = made_by(cases)
     names = ["study.csv", "study.json"]
     with staged(out, names=names, sometimes=("study.png", "study.svg"), made=made) as folder:
         with (
-            options.executor_of(scheduler, min(jobs or processors(), len(every))) as executor,
-            options.progress_bar("studying", len(every)) as tell,
+            executor_of(scheduler, min(jobs or processors(), len(every))) as executor,
+            progress_bar("studying", len(every)) as tell,
         ):
             found = studied(every, data, executor, out, within, tell)
         rows, status = found.records(), 3 if found.failed else 0

@@ -12,7 +12,8 @@ from click.core import ParameterSource
 from crosscheck.cli import choices
 from seecr.cli import options
 from seecr.cli.following import following, typed
-from seecr.cli.notes import untold
+from seecr.cli.progress import progress_bar
+from seecr.cli.results import made_by, untold
 
 if TYPE_CHECKING:
     from crosscheck import Twin
@@ -85,15 +86,19 @@ def command(
       measured.toml    the noise of the readings
       answer.sealed    what was hidden; no other command opens it
     """
+    from seecr.cli.following import introduce_all
+
     if opened is not None:
         given = {
             name for name in context.params
             if context.get_parameter_source(name) is not ParameterSource.DEFAULT
         }  # fmt: skip
-        if given - {"opened", "as_json"}:
+        if given - {"opened", "as_json", "names"} or not all(".py" in name for name in names):
             raise click.UsageError(
-                "--open shows an existing case; leave out all other options but --json"
+                "--open shows an existing case; leave out all other options but --json and "
+                "--effect FILE.py:CLASS"
             )
+        introduce_all(names)
         return _open(opened, as_json)
     if robot is None or seed is None:
         raise click.UsageError("expected ROBOT.xml and --hide SEED, or --open FILE")
@@ -102,7 +107,6 @@ def command(
             "--effect already sets how many effects are hidden; leave out --effects"
         )
     from crosscheck import Sigma, load_commands, make_twin
-    from seecr.cli.own_effects import introduce_all
 
     files = list(dict.fromkeys(name for name in names if ".py" in name))
     own = dict(zip(files, introduce_all(files), strict=True))
@@ -113,20 +117,21 @@ def command(
     machine = robot_at(robot)
     commands = load_commands(poses, machine, sigma=noise) if poses is not None else None
     # whatever is hidden, the bar shows the same: rows of one kind, done or not
-    with options.progress_bar("measuring", 1) as advance:
+    with progress_bar("measuring", 1) as advance:
         twin = make_twin(
             machine, seed, effects=names or None, n_effects=count, out=out, tensions=tensions,
             poses=commands, sigma=commands.sigma if commands else noise, maybe_none=maybe_none,
             progress=lambda rows, now: advance(0, "measuring"),
         )  # fmt: skip
         advance(1, "measured")
-    _tell(twin, out, options.made_by(twin.robot.source, poses) if as_json else None)
+    _tell(twin, out, made_by(twin.robot.source, poses) if as_json else None)
     return 0
 
 
 def _tell(twin: Twin, out: Path, made: Made | None) -> None:
     """What was made, as JSON where it is told how it was made."""
     from crosscheck.twin import FILES
+    from seecr.cli.following import given_effects
     from seecr.counted import counted
     from seecr.files import json_text
 
@@ -137,7 +142,7 @@ def _tell(twin: Twin, out: Path, made: Made | None) -> None:
         document = {"made": made, **twin.as_json(), "folder": str(out), "files": files}
         click.echo(json_text(document, indent=2))
         return
-    sigma = twin.answer.sigma
+    sigma, own = twin.answer.sigma, given_effects()
     noise = f"{1e3 * sigma['position_m']:.3g} mm"
     if "orientation_rad" in sigma:
         noise += f", {math.degrees(sigma['orientation_rad']):.2g} deg"
@@ -146,7 +151,7 @@ def _tell(twin: Twin, out: Path, made: Made | None) -> None:
     rows, runs = counted(twin.measured.n_rows, "row"), counted(len(twin.measured.runs), "run")
     click.echo(f"{rows} of {twin.robot.name} in {runs}; noise {noise}")
     click.echo(f"written to {out}: {', '.join(files)}")
-    click.echo(f"to see what is hidden: {typed('crosscheck', 'twin', '--open', out)}")
+    click.echo(f"to see what is hidden: {typed('crosscheck', 'twin', '--open', out, *own)}")
     click.echo(following("crosscheck", "diagnose", out / "robot.xml", out / "measured.csv"))
 
 
@@ -154,12 +159,14 @@ def _open(path: Path, as_json: bool) -> int:
     from crosscheck import unseal
     from crosscheck.show.effects import parameter_lines
     from crosscheck.twin import FILES
+    from seecr import catalogue
+    from seecr.counted import some
     from seecr.files import json_text
 
     answer = unseal(path)
     if as_json:
         files = [path / name for name in FILES] if path.is_dir() else [path]
-        click.echo(json_text({"made": options.made_by(*files), **answer.as_json()}, indent=2))
+        click.echo(json_text({"made": made_by(*files), **answer.as_json()}, indent=2))
         return 0
     if not answer.hidden:
         click.echo("nothing was hidden")
@@ -168,6 +175,11 @@ def _open(path: Path, as_json: bool) -> int:
         click.echo(f"{name}: moves readings by up to {moves.max:.3g} times their noise")
         for line in parameter_lines(name, values):
             click.echo(f"  {line}")
+    if strange := [name for name in answer.hidden if name not in catalogue()]:
+        click.echo(
+            f"{some(strange)}: of a file of its own; --effect FILE.py:CLASS names it, here and in "
+            "the next command"
+        )
     case = path if path.is_dir() else path.parent
     click.echo(following("crosscheck", "diagnose", case / "robot.xml", case / "measured.csv"))
     return 0

@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from seecr.cli import options
 from seecr.cli.following import following
+from seecr.cli.results import made_by
 
 _SUFFIXES = (".toml", ".json")
 # Options of `compare` that are for two models alone, and those that are for either.
@@ -64,7 +64,7 @@ def compare_two(
         raise click.UsageError(f"--fail-on: expected moved, got {wrong[0]}")
     if model_out is not None:
         check_place(model_out)
-    made = options.made_by(before, now)
+    made = made_by(before, now)
     with staged(out, names=["models.json"], read=[before, now], made=made) as folder:
         found = compare_models(before, now)
         status = 1 if (fail_on and found.differs) or _unwritten(found.pooled, model_out) else 0

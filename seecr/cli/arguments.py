@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seecr import Commands, InputError, Model, Robot, Solution, load_model, load_robot
 from seecr.cli.following import passive_lines
-from seecr.cli.notes import tell
+from seecr.cli.results import tell
 from seecr.columns.commands import read_commands
 from seecr.columns.plausible import ABSURD, scalar_last
 from seecr.counted import counted

@@ -9,6 +9,8 @@ import click
 
 from seecr.cli import options
 from seecr.cli.following import following
+from seecr.cli.progress import progress_bar
+from seecr.cli.results import files_of_pictures, made_by
 
 if TYPE_CHECKING:
     from seecr import Robot
@@ -127,12 +129,12 @@ def command(
     known, own = model_at(believes, machine), model_at(true, machine)
     wanted, free = wanted_of(machine, poses)
     names = parts_of(scheme)
-    pictures, every_picture = options.files_of_pictures("control", figure, no_recording)
-    made = options.made_by(machine.source, poses, believes, true)
+    pictures, every_picture = files_of_pictures("control", figure, no_recording)
+    made = made_by(machine.source, poses, believes, true)
     names_out = {"control.json", "control.csv", *pictures}
     where: dict[str, Any] = {"sometimes": every_picture, "read": with_toml(poses), "made": made}
     with staged(out, names=names_out, **where) as folder:
-        with options.progress_bar("controlling", len(names)) as tell:
+        with progress_bar("controlling", len(names)) as tell:
             result = control(
                 machine, wanted.commands, scheme=names, believes=known or (), true=own or (),
                 any_orientation=free, progress=lambda _name: tell(1, ""),

@@ -10,7 +10,8 @@ import click
 
 from seecr.cli import options
 from seecr.cli.following import following, given_with, mapping
-from seecr.cli.notes import untold
+from seecr.cli.progress import progress_share
+from seecr.cli.results import made_by, untold
 
 if TYPE_CHECKING:
     from seecr import Model, Robot
@@ -110,11 +111,11 @@ def command(
     limits = float("inf") if highest is None else highest
     near = aim_of(aim, machine.n_driven)
     commands_of_it = ("corrected.csv", "corrected.toml", "table.csv")
-    made = options.made_by(machine.source, poses, model)
+    made = made_by(machine.source, poses, model)
     where: dict[str, Any] = {"read": with_toml(poses), "made": made}
     with staged(out, names=["correction.json"], sometimes=commands_of_it, **where) as folder:
         check_ours(out, commands_of_it)
-        with options.progress_share("correcting") as tell:
+        with progress_share("correcting") as tell:
             found = correct(
                 machine, wanted.commands, effects=own or (), lowest=lowest, highest=limits,
                 aim=near, prefer=prefer, any_orientation=turns,

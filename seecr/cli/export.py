@@ -8,7 +8,7 @@ import click
 
 from seecr.cli import options
 from seecr.cli.following import following
-from seecr.cli.notes import untold
+from seecr.cli.results import made_by, untold
 
 
 @options.command(
@@ -65,7 +65,7 @@ def command(
     if beside not in files and beside.is_file():
         notes.append(_without(beside))
     document = {
-        "made": options.made_by(machine.source, model), "exit_status": 0, "notes": notes,
+        "made": made_by(machine.source, model), "exit_status": 0, "notes": notes,
         "files": [str(path) for path in files], **found.as_json(),
     }  # fmt: skip
     place = [f"{value + 0.0:g}" for value in coordinates or machine.reference_pose[:3]]

@@ -15,15 +15,53 @@ if TYPE_CHECKING:
     from seecr import Commands, Model, Robot, Solution
 
 STDIN = "/dev/stdin"
-PASSIVE = "seecr.passive"
-"""Where the running command keeps the lines that ``--passive`` named."""
+# In a context's ``meta``: what ``--passive`` and ``--effect`` named, for the command that follows.
+_PASSIVE, _EFFECTS = "seecr.passive", "seecr.own_effects"
 _SAVED = "INPUT"  # stands for a file that came through a pipe
+
+
+def _kept(key: str) -> tuple[str, ...]:
+    """What the running command keeps of an option; nothing where Python calls it."""
+    ctx = click.get_current_context(silent=True)
+    return () if ctx is None else tuple(ctx.meta.get(key, ()))
+
+
+def keep_passive(ctx: click.Context, names: Iterable[str]) -> None:
+    """Keep the lines that ``--passive`` names."""
+    ctx.meta[_PASSIVE] = tuple(names)
 
 
 def passive_lines() -> tuple[str, ...]:
     """The lines that ``--passive`` of the running command named."""
-    ctx = click.get_current_context(silent=True)
-    return () if ctx is None else tuple(ctx.meta.get(PASSIVE, ()))
+    return _kept(_PASSIVE)
+
+
+def introduce_all(texts: Sequence[str]) -> list[str]:
+    """Make the effects of ``FILE.py:CLASS`` part of the catalogue; their names.
+
+    Raises:
+        InputError: one that cannot be had, or two of one name.
+    """
+    from seecr import InputError, introduce
+    from seecr.effects.loaded import load_effect
+
+    found: dict[str, str] = {}
+    for text in texts:
+        name = introduce(load_effect(text)).name
+        if found.setdefault(name, text) != text:
+            raise InputError(
+                f"--effect: {found[name]} and {text} are both called {name}; expected a name of "
+                "its own for each"
+            )
+    context = click.get_current_context(silent=True)
+    if context is not None and texts:
+        context.meta[_EFFECTS] = tuple(dict.fromkeys(texts))
+    return list(found)
+
+
+def given_effects() -> tuple[str, ...]:
+    """What ``--effect`` was given to the command that is running, with its option, as words."""
+    return tuple(word for text in _kept(_EFFECTS) for word in ("--effect", text))
 
 
 def following(*words: object) -> str:
@@ -33,8 +71,6 @@ def following(*words: object) -> str:
     are named again.
     """
     if words[0] in ("seecr", "crosscheck"):
-        from seecr.cli.own_effects import given_effects
-
         passive = passive_lines()
         named = ("--passive", ",".join(passive)) if passive else ()
         words = (*words, *given_effects(), *named)

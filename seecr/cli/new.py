@@ -11,6 +11,7 @@ import click
 
 from seecr.cli import options
 from seecr.cli.following import following
+from seecr.cli.results import made_by
 
 if TYPE_CHECKING:
     from seecr import Robot
@@ -139,7 +140,7 @@ def command(
     held, margin = bool(mapped.feasible.all()), float(mapped.margin.min())
     notes = (*notes, *notes_of(None, solution))
     read = [points, *files]
-    made = options.made_by(*read)
+    made = made_by(*read)
     out.parent.mkdir(parents=True, exist_ok=True)
     write_robot(robot, out, f"{robot.name}; written by {made.command}")
     status = 0 if at_rest(solution) else 3

@@ -5,31 +5,22 @@ from __future__ import annotations
 import difflib
 import math
 import re
-import shlex
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from time import monotonic
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from seecr.cli.following import PASSIVE, STDIN
+from seecr.cli.following import STDIN, introduce_all, keep_passive
 from seecr.cli.group import ARGUMENTS
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
-    from seecr.files import Made
+    pass
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 # A number below zero, or an axis of a grid that begins with one.
 _NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?(:.*)?")
-
-SECONDS_BETWEEN_LINES = 15.0
-"""How often work that takes long tells where it is, without a terminal."""
 
 
 class _Told(click.ParamType):  # type: ignore[type-arg]
@@ -190,8 +181,6 @@ pictures = together(
 
 def _introduced(_ctx: click.Context, _param: click.Parameter, texts: tuple[str, ...]) -> None:
     """Effects of the user's own files, made part of the catalogue; the option's callback."""
-    from seecr.cli.own_effects import introduce_all
-
     introduce_all(texts)
 
 
@@ -220,7 +209,7 @@ def words_of(ctx: click.Context, param: click.Parameter, texts: Sequence[str]) -
 
 
 def _keep_passive(ctx: click.Context, param: click.Parameter, texts: Sequence[str]) -> None:
-    ctx.meta[PASSIVE] = words_of(ctx, param, texts)
+    keep_passive(ctx, words_of(ctx, param, texts))
 
 
 passive = words_option(
@@ -265,13 +254,6 @@ columns = option(
 )
 
 
-def files_of_pictures(name: str, figure: str, no_recording: bool) -> tuple[set[str], set[str]]:
-    """Pictures of that name: those that ``--figure`` and ``--no-recording`` ask for, and all."""
-    every = {kind: f"{name}.{kind}" for kind in ("png", "svg", "rrd")}
-    now = {figure} | (set() if no_recording else {"rrd"})
-    return {file for kind, file in every.items() if kind in now}, {*every.values()}
-
-
 def turned(of: str) -> Callable[[F], F]:
     """``--turned``, the orientation ``of`` what it is said to be of."""
     said = f"Orientation of {of}.  [default: that of the reference pose]"
@@ -296,101 +278,7 @@ def check_finite(ctx: click.Context, param: click.Parameter, value: float | None
     return value
 
 
-def made_by(*files: Path | None) -> Made:
-    """How the command that is running came to its result, from these files."""
-    from seecr.files import Made
-
-    ctx = click.get_current_context()
-    words = [ctx.find_root().info_name or "seecr", *ctx.meta.get(ARGUMENTS, [])]
-    return Made.now(shlex.join(words), files)
-
-
 scheduler = option(
     "--scheduler ADDRESS",
     "The workers of this scheduler of dask.distributed do the work; needs seecr[cluster].",
 )
-
-
-@contextmanager
-def executor_of(scheduler: str | None, jobs: int = 1) -> Iterator[Executor | None]:
-    """The workers of ``--scheduler``, or so many processes; None for this process alone."""
-    from seecr.parallel import cluster, processes
-
-    def tell(text: str) -> None:
-        click.echo(f"note: {text}", err=True)
-
-    with processes(jobs) if scheduler is None else cluster(scheduler, tell) as executor:
-        yield executor
-
-
-@contextmanager
-def progress_bar(text: str, total: int) -> Iterator[Callable[[int, str], None]]:
-    """A progress bar on standard error; a line now and then where that is no terminal.
-
-    Args:
-        text: what is going on. total: steps to come.
-
-    Yields:
-        a function to call with the steps done since the last call, and what is going on now.
-    """
-    if not sys.stderr.isatty():
-        yield _lines(text, total)
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    name = TextColumn("{task.description}")
-    columns = (name, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(text, total=total)
-
-        def advance(steps: int, now: str) -> None:
-            bar.update(task, advance=steps, description=now or text)
-
-        yield advance
-
-
-def _lines(text: str, total: int) -> Callable[[int, str], None]:
-    """Tells on standard error how far the work is, where it takes long."""
-    done, last = 0, monotonic()
-
-    def advance(steps: int, now: str) -> None:
-        nonlocal done, last
-        done += steps
-        if monotonic() - last >= SECONDS_BETWEEN_LINES:
-            last = monotonic()
-            click.echo(f"{text}: {100 * done // max(total, 1)} %{now and ', '}{now}", err=True)
-
-    return advance
-
-
-@contextmanager
-def progress_share(text: str) -> Iterator[Callable[[str, float], None]]:
-    """A progress bar for work that tells its share done; it never goes back.
-
-    Yields:
-        a function to call with what is going on now and the share of it (0 to 1) that is done.
-    """
-    done = 0
-    with progress_bar(text, 100) as advance:
-
-        def tell(now: str, share: float) -> None:
-            nonlocal done
-            percent = max(done, int(100 * share))
-            advance(percent - done, now)
-            done = percent
-
-        yield tell
-
-
-@contextmanager
-def result_in(out: Path | None, name: str) -> Iterator[Callable[[str], None]]:
-    """A function that keeps a result's text in a folder, if any; it is tried before the work."""
-    from seecr.files import write_text
-    from seecr.folders import staged
-
-    if out is None:
-        yield lambda _text: None
-        return
-    with staged(out, names=[name]) as folder:
-        yield lambda text: write_text(folder / name, text + "\n")

@@ -9,7 +9,8 @@ import click
 
 from seecr.cli import options
 from seecr.cli.following import after_pose
-from seecr.cli.notes import untold
+from seecr.cli.progress import progress_share
+from seecr.cli.results import made_by, result_in, untold
 
 if TYPE_CHECKING:
     from seecr import Barrier
@@ -64,7 +65,7 @@ def command(
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
     command = pose_of(coordinates, machine)
-    with options.progress_share("solving") as tell:
+    with progress_share("solving") as tell:
         solution = solve(machine, command, effects=own or ())
         lasting = [] if alone or own is None else on_their_way(machine, command, own)
         tell("other equilibria", 0.1)
@@ -85,7 +86,7 @@ def command(
     notes = list(notes_of(own, solution))
     unsought = list(unsought_lines(lasting))
     text = json_text({
-        "made": options.made_by(machine.source, model), "exit_status": status,
+        "made": made_by(machine.source, model), "exit_status": status,
         "robot": machine.name, "cables": machine.cable_names,
         **SweepRows(solution, spread=spread).as_json()[0], "sentence": solution.sentence(0),
         "slack_cables": int(solution.slack[0].sum()) if solution.converged[0] else None,
@@ -95,7 +96,7 @@ def command(
         "equilibria": None if others is None else SweepRows(others), "barriers": passes,
         "notes": [*notes, *unsought],
     })  # fmt: skip
-    with options.result_in(out, "pose.json") as keep:
+    with result_in(out, "pose.json") as keep:
         keep(text)
     lines = [
         *untold(notes), *pose_lines(solution, spread=spread),

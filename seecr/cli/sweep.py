@@ -12,7 +12,8 @@ import click
 
 from seecr.cli import options
 from seecr.cli.following import after_sweep
-from seecr.cli.notes import untold
+from seecr.cli.progress import progress_bar
+from seecr.cli.results import files_of_pictures, made_by, untold
 
 if TYPE_CHECKING:
     from seecr import BarManifold, Commands, Model, Robot, SlackSpan, Solution
@@ -90,13 +91,13 @@ def command(
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
     commands, more, said, wanted, runs = commands_of(machine, poses, **ways)
-    made = options.made_by(machine.source, poses, model)
-    pictures, every = options.files_of_pictures("sweep", figure, no_recording)
+    made = made_by(machine.source, poses, model)
+    pictures, every = files_of_pictures("sweep", figure, no_recording)
     names, sometimes = {"sweep.json", "sweep.csv", *pictures}, {"sweep.toml", *every}
     where: dict[str, Any] = {"read": with_toml(poses), "made": made}
     with staged(out, names=names, sometimes=sometimes, **where) as folder:
         check_ours(out, ["sweep.toml"])  # it would say what sweep.csv beside it is
-        with options.progress_bar("solving", len(commands)) as tell:
+        with progress_bar("solving", len(commands)) as tell:
             solution, search = _solved(machine, commands, own, follow, method)
             spread = None
             if own is not None:

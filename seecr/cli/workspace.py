@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from seecr.cli import options
-from seecr.cli.durations import say_duration
 from seecr.cli.following import following
-from seecr.cli.notes import untold
+from seecr.cli.progress import executor_of, progress_bar, say_duration
+from seecr.cli.results import files_of_pictures, made_by, untold
 
 if TYPE_CHECKING:
     from seecr import Workspace
@@ -115,15 +115,15 @@ def command(
         "lowest": lowest, "highest": np.inf if highest is None else highest,
         "wrenches": wrenches or None, "effects": own or (),
     }  # fmt: skip
-    pictures, sometimes = options.files_of_pictures("map", figure, no_recording)
-    made = options.made_by(machine.source, model)
+    pictures, sometimes = files_of_pictures("map", figure, no_recording)
+    made = made_by(machine.source, model)
     # a figure of few axes is not drawn
     names = {"map.json", "map.npz", *(pictures & {"map.rrd"})}
     with staged(out, names=names, sometimes=sometimes, made=made) as folder:
         say_duration("map", total, "poses", as_json)
         with (
-            options.executor_of(scheduler) as executor,
-            options.progress_bar("mapping", total) as tell,
+            executor_of(scheduler) as executor,
+            progress_bar("mapping", total) as tell,
         ):
             found = workspace_map(
                 machine, *axes, orientation=turned or None, elastic=not no_elastic,

@@ -79,9 +79,9 @@ def _numbers(table: Table, quantity: str, index: int, unit: Unit, faults: Faults
     values = faults.of(lambda: table.numbers(index, blank_is_nan=optional))
     if values is None:
         return np.full(len(table.line), math.nan)
-    for row in np.flatnonzero(values <= 0.0) if optional else ():
+    for row in np.flatnonzero(values <= 0.0).tolist() if optional else ():
         text = f"expected a number above zero, got {show(table.cells[index][row])}"
-        faults.add(table.error(text, row=int(row), column=column))
+        faults.add(table.error(text, row=row, column=column))
     return np.asarray(unit.to_si(values))
 
 

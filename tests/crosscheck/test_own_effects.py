@@ -26,6 +26,10 @@ FILE = Path(__file__).parents[1] / "support" / "hoses.py"
 def fresh() -> Iterator[None]:
     """What a test makes known stays in it."""
     yield
+    fresh_catalogue()
+
+
+def fresh_catalogue() -> None:
     registry._introduced.clear()
     registry._given.clear()
     registry.catalogue.cache_clear()
@@ -189,6 +193,7 @@ def test_commands_take_it_from_its_file(tmp_path: Path, monkeypatch: pytest.Monk
     own = ("--effect", f"{FILE}:Hose")
     text = call("twin", "demobot_cogiro", "--hide", 7, *own, "--out", "case")
     assert f"measured.csv --effect {FILE}:Hose" in text
+    assert f"twin --open case --effect {FILE}:Hose" in text
     files = ("case/robot.xml", "case/measured.csv")
     said = call(
         "diagnose", *files, *own, "--only", "hose", "--no-recording", "--model-out", "m.toml"
@@ -197,7 +202,14 @@ def test_commands_take_it_from_its_file(tmp_path: Path, monkeypatch: pytest.Monk
     assert "Model and data agree" in call("compare", *files, "--model", "m.toml", *own)
     assert "Written to n.toml: hose" in call("add", "hose", *files, "--model", "n.toml", *own)
     assert "hose" in call("effects", *own) and "your own" in call("effects", "hose", *own)
-    assert "pull = " in call("twin", "--open", "case")
+    opened = call("twin", "--open", "case", *own)
+    assert "pull = " in opened and opened.endswith(f"measured.csv --effect {FILE}:Hose\n")
+    fresh_catalogue()  # as in another process
+    unnamed = call("twin", "--open", "case")
+    assert "pull_N = " in unnamed
+    assert "hose: of a file of its own; --effect FILE.py:CLASS names it, here and" in unnamed
+    refused = call("twin", "--open", "case", "--effect", "pulley_radius", status=2)
+    assert "leave out all other options but --json and --effect FILE.py:CLASS" in refused
 
 
 GOOD = FILE.read_text(encoding="utf-8")

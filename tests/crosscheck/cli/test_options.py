@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import inspect
 import re
+import sys
 from pathlib import Path
+from typing import Any
 
 import click
 import pytest
@@ -14,9 +16,9 @@ import crosscheck.cli
 import seecr.cli
 from crosscheck.cli.compare import command as compare_command
 from crosscheck.comparison.limits import RULES, option
-from seecr.cli import options
+from seecr.cli import options, progress
 from seecr.cli.group import LazyGroup
-from seecr.cli.options import progress_bar, progress_share
+from seecr.cli.progress import progress_bar, progress_share, say_duration
 
 
 @click.command()
@@ -61,7 +63,7 @@ def test_every_limit_is_an_option_of_compare() -> None:
 def test_without_a_terminal_long_work_tells_where_it_is_and_never_goes_back(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(options, "SECONDS_BETWEEN_LINES", 0.0)
+    monkeypatch.setattr(progress, "SECONDS_BETWEEN_LINES", 0.0)
     with progress_share("working") as tell:
         for share in (0.25, 0.75, 0.5, 1.0):
             tell("on it", share)
@@ -90,6 +92,25 @@ def test_short_work_says_nothing_without_a_terminal(capsys: pytest.CaptureFixtur
         tell("done", 1.0)
     captured = capsys.readouterr()
     assert captured.out == "" and captured.err == ""
+
+
+def test_a_terminal_is_told_how_long_work_takes(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def said(work: str, count: int, noun: str, **more: Any) -> str:
+        say_duration(work, count, noun, **more)
+        out, err = capsys.readouterr()
+        assert out == ""
+        return err
+
+    assert said("diagnose", 144, "rows") == ""  # no terminal
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    # 1.5 s + 144 x 0.027 s
+    assert said("diagnose", 144, "rows", more=", or so") == "about 5 s for 144 rows, or so\n"
+    assert said("diagnose", 10_000, "rows") == "about 5 min for 10000 rows\n"
+    assert said("run", 2868, "poses", at_once=2) == "about 20 s for 2868 poses\n"
+    assert said("diagnose", 144, "rows", silent=True) == ""  # JSON alone
+    assert said("map", 1000, "poses") == ""  # done before it is read
 
 
 @pytest.mark.parametrize("group", [crosscheck.cli.main, seecr.cli.main])

@@ -73,7 +73,8 @@ def test_a_bar_is_told_what_is_done(words: str, monkeypatch: pytest.MonkeyPatch)
     def bar(text: str, total: int) -> Iterator[Any]:
         yield lambda steps, now: said.append((now, steps))
 
-    monkeypatch.setattr("seecr.cli.options.progress_bar", bar)
+    for module in ("progress", "sweep"):
+        monkeypatch.setattr(f"seecr.cli.{module}.progress_bar", bar)
     Path("p.csv").write_text(f"{POSES}0.4,0.25,0.2\n0.45,0.25,0.2\n")
     sweeps = words.startswith("sweep")
     ran(f"seecr {words.format(COGIRO)} {BARE if sweeps else ''}", 0)
