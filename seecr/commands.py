@@ -344,17 +344,9 @@ def waypoints_of(robot: Robot, commands: Commands, waypoints: float | None = Non
     # a run's clock starts at its first row: until then the robot waits at the reference pose
     elapsed = np.where(fresh, 0.0, since / np.maximum(steps, 1))[source]
     elapsed[step == 0] = np.where(fresh, since, 0.0)[source[step == 0]]
-    whole = Commands(
-        pose=pose,
-        lengths=lengths,
-        run=(np.zeros(n, dtype=np.int64) if commands.run is None else commands.run)[source],
-        time=None if commands.time is None else commands.time[source],
-        temperature=None if commands.temperature is None else commands.temperature[source],
-        told=commands.told,
-        loads=None if commands.loads is None else commands.loads.rows(source),
-        stands=None if commands.stands is None else commands.stands[source],
-        clock=None if commands.clock is None else commands.clock[source],
-    )
+    run = np.zeros(n, dtype=np.int64) if commands.run is None else commands.run
+    rows_of = replace(commands, parts={}, line=None).rows(source)
+    whole = replace(rows_of, pose=pose, lengths=lengths, run=run[source])
     return Path(robot, commands, whole, rows, source, first, elapsed, steps)
 
 

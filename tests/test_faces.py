@@ -97,7 +97,7 @@ seecr.columns.csv: table_text
 seecr.columns.commands: CommandFile read_commands
 seecr.columns.headers: columns_said parse_columns renamed
 seecr.columns.plausible: ABSURD scalar_last
-seecr.counted: counted
+seecr.counted: counted some
 seecr.description.cables: ea_of
 seecr.description.fingerprint: fingerprint
 seecr.description.fixing: told write_fixed
@@ -114,6 +114,7 @@ seecr.folders: check_ours staged
 seecr.files: Made check_writable json_text with_toml write_text write_texts
 seecr.importing.caspr: read_caspr
 seecr.importing.draft: write_robot
+seecr.importing.firmware: firmware_text read_firmware settings_beside
 seecr.importing.points_table: read_points
 seecr.importing.wirex: read_wirex
 seecr.parallel: cluster processes processors

@@ -100,7 +100,7 @@ def keep_grown(
     Args:
         found: with its model. model: the file for that; replaces: its state when it was read.
         made: of the files as they were read.
-        keep: keeps the JSON, see :func:`seecr.cli.options.result_in`. more: for the JSON too.
+        keep: keeps the JSON, see :func:`seecr.cli.results.result_in`. more: for the JSON too.
     """
     from crosscheck import save_model
     from seecr.files import json_text

@@ -150,22 +150,9 @@ def _quaternions(
             f"{said!r} with {counted(len(given), 'column')} of rotations; export it again"
         )
         raise block.rows.error(text, block.rows.first)
-    return _of_euler(block.numbers(given), said.upper())
-
-
-def _of_euler(degrees: Array, order: str) -> Array:
-    """Quaternions (n, 4) of angles (n, 3) about X, Y and Z; NaN where the body was not seen.
-
-    Motive turns about moving axes in the order of the type's letters ("relative" in its SDK's
-    samples): XYZ is R = Rx Ry Rz.
-    """
-    seen = np.isfinite(degrees).all(axis=1)
-    out = np.full((len(degrees), 4), np.nan)
-    which = ["XYZ".index(axis) for axis in order]
-    if seen.any():
-        turn = Rotation.from_euler(order, degrees[seen][:, which], degrees=True)
-        out[seen] = turn.as_quat(scalar_first=True)
-    return out
+    # Motive turns about moving axes in the order of the type's letters ("relative" in its SDK's
+    # samples): XYZ is R = Rx Ry Rz
+    return rotations(np.radians(block.numbers(given)), said.upper())
 
 
 # CSV and text exports of Vicon's Nexus: blocks of segments and of trajectories.
@@ -301,16 +288,19 @@ def _rotations(one: _Found, columns: dict[str, int], rotation: str | None) -> Ar
     if unit is None:
         text = f"expected deg or rad under the labels, got {_unit(one, given[0])!r}"
         raise one.block.rows.error(text, one.block.label_row + 1)
-    angles = unit.to_si(one.block.numbers(given))
-    out = np.full((len(angles), 4), np.nan)
-    seen = np.isfinite(angles).all(axis=1)
-    out[seen] = rotations(angles[seen], rotation).as_quat(scalar_first=True)
-    return out
+    return rotations(unit.to_si(one.block.numbers(given)), rotation)
 
 
-def rotations(angles: Array, rotation: str) -> Rotation:
-    """Rotations from three numbers (n, 3) [rad], of a kind in :data:`ROTATIONS`."""
+def rotations(angles: Array, rotation: str) -> Array:
+    """Quaternions (n, 4) of three numbers (n, 3) [rad], of a kind in :data:`ROTATIONS`.
+
+    NaN where the body was not seen.
+    """
+    out, seen = np.full((len(angles), 4), np.nan), np.isfinite(angles).all(axis=1)
     if rotation == "vector":
-        return Rotation.from_rotvec(angles)
-    order = ["xyz".index(axis) for axis in rotation.lower()]
-    return Rotation.from_euler(rotation, angles[:, order])
+        turn = Rotation.from_rotvec(angles[seen])
+    else:
+        order = ["xyz".index(axis) for axis in rotation.lower()]
+        turn = Rotation.from_euler(rotation, angles[seen][:, order])
+    out[seen] = turn.as_quat(scalar_first=True)
+    return out

@@ -10,7 +10,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "sweep": ("sweep", "The same for many commands: along a line, on a grid, or from a file."),
     "map": ("workspace", "Workspace: where the platform can be held, and where it comes to rest."),
     "correct": ("correct", "Find the commands that bring the platform to the wanted poses."),
-    "new": ("new", "Write a robot's MJCF from a table of points, or from CASPR or WireX."),
+    "new": ("new", "Write a robot's MJCF from a table of points, CASPR, WireX or firmware."),
     "control": ("control", "What the robot does under different schemes of control."),
     "export": ("export", "Write a calibrated robot as MJCF."),
 }

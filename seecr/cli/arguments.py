@@ -14,10 +14,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seecr import Commands, InputError, Model, Robot, Solution, load_model, load_robot
+from seecr import (
+    Commands,
+    InputError,
+    InputFileError,
+    Model,
+    Robot,
+    Solution,
+    load_model,
+    load_robot,
+)
 from seecr.cli.following import passive_lines
 from seecr.cli.results import tell
-from seecr.columns.commands import read_commands
+from seecr.columns.commands import CommandFile, read_commands
 from seecr.columns.plausible import ABSURD, scalar_last
 from seecr.counted import counted
 from seecr.description.cables import ea_of
@@ -166,6 +175,22 @@ def check_unit(name: str, turn: Sequence[float]) -> None:
         raise InputError(
             f"{name}: expected a unit quaternion, scalar first, got one of norm {norm:.4g}"
         )
+
+
+def wanted_poses_of(poses: Path, robot: Robot, computed_by: str) -> CommandFile:
+    """The poses of a file that are wanted of the robot.
+
+    Raises:
+        InputFileError: it is no list of commands, or states lengths, which are computed.
+    """
+    wanted = read_commands(poses, robot)
+    if wanted.commands.lengths is not None:
+        raise InputFileError.at(
+            poses,
+            "contains rest lengths; expected the wanted poses, such as cmd_x_m cmd_y_m cmd_z_m: "
+            f"lengths are what {computed_by} computes",
+        )
+    return wanted
 
 
 def commands_of(

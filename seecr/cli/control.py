@@ -178,16 +178,9 @@ def wanted_of(machine: Robot, poses: Path) -> tuple[Any, bool]:
     Raises:
         InputFileError: it holds lengths, or is no list of commands.
     """
-    from seecr import InputFileError
-    from seecr.columns.commands import read_commands
+    from seecr.cli.arguments import wanted_poses_of
 
-    wanted = read_commands(poses, machine)
-    if wanted.commands.lengths is not None:
-        raise InputFileError.at(
-            poses,
-            "contains rest lengths; expected the wanted poses, such as cmd_x_m cmd_y_m cmd_z_m: "
-            "lengths are what a scheme of control computes",
-        )
+    wanted = wanted_poses_of(poses, machine, "a scheme of control")
     return wanted, wanted.any_orientation and machine.n_driven < machine.n_dof
 
 

@@ -89,7 +89,7 @@ def command(
     Exit status: 0 all poses reached, or some and the others replaced by the nearest, 2 bad input,
     3 a pose without an answer, one at which the platform does not come to rest, or none reached.
     """  # fmt: skip
-    from seecr import InputFileError, correct, kept_chance
+    from seecr import correct, kept_chance
     from seecr.cli.arguments import model_at, notes_of, robot_at
     from seecr.files import json_text, with_toml, write_texts
     from seecr.folders import check_ours, staged
@@ -99,12 +99,6 @@ def command(
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
     wanted = _wanted(machine, poses, **ways)
-    if wanted.commands.lengths is not None:
-        raise InputFileError.at(
-            poses or Path("--grid"),
-            "contains rest lengths; expected the wanted poses, such as cmd_x_m cmd_y_m cmd_z_m: "
-            "lengths are what correct computes",
-        )
     wanted, tracker = _as_tracked(machine, wanted, own, as_read)
     # fewer cables than degrees of freedom hold no orientation of one's choice
     turns = wanted.any_orientation and machine.n_driven < machine.n_dof
@@ -157,11 +151,11 @@ def _wanted(
     """The wanted poses of a file or of a grid; each of a grid is a run of its own."""
     import numpy as np
 
-    from seecr.cli.arguments import commands_of
-    from seecr.columns.commands import CommandFile, read_commands
+    from seecr.cli.arguments import commands_of, wanted_poses_of
+    from seecr.columns.commands import CommandFile
 
     if poses is not None and grid is None and turned is None:
-        return read_commands(poses, robot)
+        return wanted_poses_of(poses, robot, "correct")
     found, _more, notes, _wanted, _runs = commands_of(robot, poses, None, None, grid, turned)
     each = np.arange(len(found))
     return CommandFile(replace(found, run=each), None, tuple(map(str, each)), notes)

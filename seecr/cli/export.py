@@ -19,11 +19,15 @@ from seecr.cli.results import made_by, untold
 @options.robot
 @click.argument("out", type=options.FILE, metavar="OUT.xml")
 @click.argument("coordinates", nargs=-1, type=options.Number(), metavar="[X Y Z [QW QX QY QZ]]")
+@options.option(
+    "--firmware [reprap|klipper|maslow]",
+    "Also write its exit points as settings of that firmware, beside OUT.xml.",
+)
 @options.option("--out DIR", "Write OUT.xml into this folder.", name="folder")
 @options.as_json
 def command(
     robot: Path, out: Path, coordinates: tuple[float, ...], cable: str | None, model: Path | None,
-    folder: Path | None, as_json: bool,
+    firmware: str | None, folder: Path | None, as_json: bool,
 ) -> int:  # fmt: skip
     """Write a robot with the effects of its model as MJCF, as far as MJCF can express them.
 
@@ -31,7 +35,7 @@ def command(
     brings it to rest where seecr predicts. Pulleys, sag and the like need bodies that a description
     does not have: these go into OUT-mujoco.xml, for MuJoCo alone, at the pose X Y Z (by default the
     reference pose), with the equilibrium as its keyframe. The program lists what is not in any
-    file.
+    file. Firmware knows exit points alone: seecr correct --grid writes a table of lengths.
 
     \b
     Exit status: 0 all well, 2 bad input, 3 no equilibrium at the pose to export at.
@@ -40,6 +44,7 @@ def command(
     from seecr.cli.arguments import model_at, pose_of, robot_at
     from seecr.columns.plausible import scalar_last
     from seecr.files import check_writable, json_text, write_texts
+    from seecr.importing.firmware import firmware_text, settings_beside
 
     machine = robot_at(robot, cable)
     out = out if folder is None else folder / out
@@ -57,8 +62,11 @@ def command(
             "leave it out"
         )
     check_writable(out)
-    out.parent.mkdir(parents=True, exist_ok=True)
     files = {out: found.text} | ({beside: found.mujoco_text} if found.mujoco_text else {})
+    if firmware is not None:
+        settings = settings_beside(firmware, out)
+        files[settings] = firmware_text(firmware, found.robot.exit_points)
+    out.parent.mkdir(parents=True, exist_ok=True)
     write_texts(files, "cannot write the MJCF")
     slip = scalar_last(machine, coordinates[3:])
     notes = [*machine.notes, *(own.notes if own else ()), *slip]
@@ -70,7 +78,9 @@ def command(
     }  # fmt: skip
     place = [f"{value + 0.0:g}" for value in coordinates or machine.reference_pose[:3]]
     then = following("seecr", "pose", out, *place)
-    lines = [*untold(notes), *found.lines(out.name, beside.name), then]
+    lines = [*untold(notes), *found.lines(out.name, beside.name)]
+    lines += [] if firmware is None else [f"{settings.name} has the exit points for {firmware}"]
+    lines.append(then)
     click.echo(json_text(document) if as_json else "\n".join(lines))
     return 0
 

@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from seecr import Robot
     from seecr.importing.draft import Draft
 
-_FILES = {"caspr": ("BODIES.xml", "CABLES.xml"), "wirex": ("FILE.wcrfx",)}
+_FILES = {
+    "caspr": ("BODIES.xml", "CABLES.xml"), "wirex": ("FILE.wcrfx",), "reprap": ("CONFIG.g",),
+    "klipper": ("PRINTER.cfg",), "maslow": ("MASLOW.yaml",),
+}  # fmt: skip
 _POSE = "X Y Z [QW QX QY QZ]"
 
 
@@ -60,6 +63,7 @@ def _pose(
     "seecr new plotter.xml --points points.csv --mass 800g --ea 3kN --planar xz",
     "seecr new cogiro.xml --from caspr CoGiRo_bodies.xml CoGiRo_cables.xml --ea 3e5N",
     "seecr new ipanema.xml --from wirex IPAnema.wcrfx",
+    "seecr new printer.xml --from reprap config.g --mass 5kg --ea 20kN",
     cls=_PoseCommand,
 )
 @click.argument("out", type=options.FILE, metavar="OUT.xml")
@@ -69,7 +73,11 @@ def _pose(
     "A table, one row a cable: exit_x_m exit_y_m exit_z_m in the base frame, anchor_x_m anchor_y_m "
     "anchor_z_m in the platform's, and name, ea_N or stiffness_N_m where cables differ.",
 )
-@options.option("--from [caspr|wirex]", "Read FILE... of that program instead.", name="program")
+@options.option(
+    "--from [caspr|wirex|reprap|klipper|maslow]",
+    "Read FILE... of that program or firmware instead.",
+    name="program",
+)
 @options.option("--set ID", "Of CASPR's sets of cables, this one.", name="cable_set")
 @options.option("--mass KG", "Mass of the platform, such as 25kg.")
 @click.option(
@@ -103,7 +111,7 @@ def command(
     com: tuple[float, ...] | None, pretension: float | None, planar: str | None, free: bool,
     force: bool, folder: Path | None, as_json: bool,
 ) -> int:  # fmt: skip
-    """Write a robot's MJCF from its points, or from a file of CASPR or WireX.
+    """Write a robot's MJCF from its points, or from a file of CASPR, WireX or a firmware.
 
     Rest lengths are the straight lengths at the reference pose. The program says what it deduced
     and what it left out, and whether the platform comes to rest at the reference pose: with a
@@ -207,6 +215,7 @@ def _draft(
         InputFileError: the files are not such.
     """
     from seecr.importing.caspr import read_caspr
+    from seecr.importing.firmware import read_firmware
     from seecr.importing.points_table import read_points
     from seecr.importing.wirex import read_wirex
 
@@ -214,7 +223,7 @@ def _draft(
         got = "none" if points is None else "both"
         raise click.UsageError(
             "expected one of --points POINTS.csv, --from caspr BODIES.xml CABLES.xml and --from "
-            f"wirex FILE.wcrfx, got {got}"
+            f"wirex FILE.wcrfx (or reprap, klipper, maslow), got {got}"
         )
     wanted = _FILES.get(program or "", ())
     if len(files) != len(wanted):
@@ -225,7 +234,7 @@ def _draft(
         raise click.UsageError("--set is for --from caspr; leave it out")
     if program == "caspr":
         return read_caspr(files[0], files[1], cable_set)
-    if program == "wirex":
-        return read_wirex(files[0])
+    if program is not None:
+        return read_wirex(files[0]) if program == "wirex" else read_firmware(program, files[0])
     assert points is not None
     return read_points(points)

@@ -44,7 +44,7 @@ def away_from(robot: Robot, poses: Array | None, lengths: Array | None) -> Array
 def check_commands(
     columns: Columns, robot: Robot, poses: Array | None, lengths: Array | None
 ) -> None:
-    """Refuse commands far outside the robot, or off its joints.
+    """Refuse commands far outside the robot; poses are those of its joints.
 
     Raises:
         InputFileError: with line and column of the first.
@@ -66,14 +66,6 @@ def check_commands(
 
 def _refuse_another(columns: Columns, robot: Robot, poses: Array) -> None:
     """Refuse commands (n, 7) that are most likely for another robot."""
-    off = off_joints(robot, poses)
-    if off is not None:
-        raise columns.table.error(
-            f"the joints of robot {robot.name} cannot reach the commanded pose: it is off by "
-            f"{off[1]}; expected a pose that they can reach; are these the commands of another "
-            "robot?",
-            row=off[0],
-        )
     away = np.linalg.norm(poses[:, :3] - robot.reference_pose[:3], axis=1)
     if len(away) >= _SEVERAL and np.median(away) > robot.reach:
         raise columns.table.error(

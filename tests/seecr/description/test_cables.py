@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
+from sources import ROOT
 
 from seecr.description.cables import MATERIALS, breaking_words, ea_of, rope_of
 from seecr.errors import InputError
@@ -41,6 +44,16 @@ def test_stiffness_and_weight_grow_with_the_square_of_the_diameter(material: str
     # no rope is stiffer than a solid bar of steel, or heavier
     area = np.pi * 0.001**2
     assert thin.ea < 210e9 * area and thin.weight < 7850 * 9.81 * area
+
+
+def test_the_page_has_these_numbers() -> None:
+    page = (ROOT / "docs" / "formats.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([a-z\dx ]+)` \| ([\d.]+) \| ([\d.]+) \|", page, re.MULTILINE)
+    assert [name for name, _ea, _weight in rows] == list(MATERIALS)
+    for name, ea, weight in rows:
+        rope = rope_of(f"{name} 1mm")
+        assert float(ea) == pytest.approx(1e-3 * rope.ea, rel=2e-3)
+        assert float(weight) == pytest.approx(1e3 * rope.weight / 9.80665, rel=2e-3)
 
 
 def test_steel_alone_is_7x19_and_a_number_is_itself() -> None:
