@@ -130,12 +130,10 @@ def path_to(search: Search, listed: Sequence[str], whole: bool) -> ModelPath:
     if named and search.wants_refit:
         stages.append(stage(f"{start}, fitted", "", search.none.fit))
     while left:
-        tried = {k: search.reached(key, key | {k}) for k in left}
-        fitted = {k: found for k, found in tried.items() if found is not None}
-        if not fitted:
+        following = search.next_of(key, left)
+        if following is None:
             break
-        best = max(fitted, key=lambda k: (fitted[k].score, k))
-        found = fitted[best]
+        best, found = following
         if whole and len(left) == 1:
             found = search.at_plausible_sizes(found)
         label = f"+ {name_of(best)}" + (f" (each {part_of(best)})" if part_of(best) else "")

@@ -9,8 +9,8 @@ at the right shape: their columns are those at their most promising shape beside
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from math import lgamma, log
@@ -18,10 +18,18 @@ from math import lgamma, log
 import numpy as np
 from numpy.typing import NDArray
 
+from crosscheck.fit.algebra import inverse_of
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Reason, Why
 from crosscheck.fit.state import State, derivatives, known_readings
-from crosscheck.inference.evidence import Linear, MemberColumns, Solved, best_widths, log_gain
+from crosscheck.inference.evidence import (
+    Linear,
+    MemberColumns,
+    Solved,
+    averaged,
+    best_widths,
+    log_gain,
+)
 from crosscheck.inference.fields import Varying, fields_about
 from crosscheck.inference.fit import FLAT, TRACKER, Data, Fit
 from crosscheck.inference.priors import ANEW, FIELD_WIDTHS, UNKNOWN, WIDTHS
@@ -156,6 +164,7 @@ class Catalogue:
         members: those that may be missing, by key. reasons: why others cannot be.
         fields: columns (N, k) of what an unknown effect may change, by key.
         kinds: what each field changes.
+        shapes_met: columns of each shape of what waits, about the first fit that asked for them.
     """
 
     data: Data
@@ -164,6 +173,7 @@ class Catalogue:
     reasons: Mapping[str, Reason]
     fields: Mapping[str, Array] = field(default_factory=dict)
     kinds: Mapping[str, Varying] = field(default_factory=dict)
+    shapes_met: dict[str, list[Array]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, data: Data, stood: Terms) -> Catalogue:
@@ -188,7 +198,7 @@ class Catalogue:
         every = {f"~{k}": one for k, one in enumerate(fields_about(fit))}
         columns = {key: part for key, (_kind, part) in every.items()}
         kinds = {key: kind for key, (kind, _part) in every.items()}
-        return Catalogue(self.data, self.stood, self.members, self.reasons, columns, kinds)
+        return replace(self, fields=columns, kinds=kinds)
 
     @cached_property
     def effects(self) -> tuple[str, ...]:
@@ -345,23 +355,32 @@ class About:
             self._take(member.key, member.term, own, np.zeros(own.shape[1]))
 
     def _late_columns(self, member: Member) -> None:
-        """An effect that waits, at the shape that promises most."""
+        """An effect that waits, at the shape that promises most.
+
+        Shapes are told apart by what the readings lack, and hardly by where the other effects have
+        moved the robot: their columns are computed once, those of the best shape about each fit.
+        """
         shapes = member.layout.effect.shapes(self.fit.state.prediction.setup)
         starts = [Term(member.layout, member.layout.start(s)) for s in shapes]
         if not member.layout.shape.any() and all(_at_null(t).sum() < len(t.layout) for t in starts):
             starts.append(member.term)  # one of its values may act without the others
         if not starts:
             return
-        columns = [self.added(term) for term in starts]
-        gains = [
-            max(self._gain(t, x), self._gain_at_its_size(t))
-            for t, x in zip(starts, columns, strict=True)
-        ]
+        met = self.every.shapes_met
+        first = member.key not in met or len(met[member.key]) != len(starts)
+        if first:
+            met[member.key] = [self.added(term) for term in starts]
+        gains = self._gains(starts, met[member.key])
+        at_size = self._gain_at_its_size(member)
         best = int(np.argmax(gains))
-        mean = float(np.logaddexp.reduce(gains) - np.log(len(gains)))
-        self.prices[member.key] = gains[best] - mean
+        columns = met[member.key][best] if first else self.added(starts[best])
+        if not first:
+            gains[best] = self._gains([starts[best]], [columns])[0]
+        gains = np.maximum(gains, at_size)
+        mean = averaged(gains)
+        self.prices[member.key] = float(gains[best]) - mean
         self._late[member.key] = mean
-        self._take(member.key, starts[best], columns[best], np.zeros(columns[best].shape[1]))
+        self._take(member.key, starts[best], columns, np.zeros(columns.shape[1]))
 
     def _take(self, key: str, term: Term, columns: Array, z: Array) -> None:
         if key not in self.every.members and term.name not in self.every.stood:
@@ -386,43 +405,50 @@ class About:
         """ln evidence that members outside the fit gain beside it, each by itself."""
         had = {*self.every.keys_of(self.fit.terms).values(), *self._late}
         others = {key: x for key, x in self.columns.items() if key not in had}
-        return {key: self._gain(self.starts[key], x) for key, x in others.items()} | self._late
+        gains = self._gains([self.starts[key] for key in others], list(others.values()))
+        return dict(zip(others, gains.tolist(), strict=True)) | self._late
 
     @cached_property
-    def _fitted(self) -> tuple[Array, Array]:
-        free = self.fit.free
-        return self.fit.jacobian[:, free] * self.fit.width[free], self.fit.state.white
+    def _own(self) -> tuple[tuple[Array, Array], tuple[Array, Array], Array]:
+        """The fit's free columns in units of their width and its residual, split, and V."""
+        fit, free = self.fit, self.fit.free
+        own = fit.metric.split(fit.jacobian[:, free] * fit.width[free])
+        normal = own[0].T @ own[0] - own[1].T @ own[1]
+        return own, fit.metric.split(fit.state.white), inverse_of(normal + np.eye(len(normal)))
 
-    def _gain(self, term: Term, columns: Array) -> float:
-        """ln evidence that columns (N, k) of an effect gain beside the fit and its field."""
-        if not columns.shape[1]:
-            return -np.inf
-        metric, (own, left) = self.fit.metric, self._fitted
-        normal, gradient = metric.normal(np.hstack([own, columns]), left)
-        p = own.shape[1]
-        inner = normal[:p, :p] + np.eye(p)
-        rate = np.linalg.solve(inner, np.column_stack([normal[:p, p:], gradient[:p]]))
-        one_sided = (term.layout.lower == term.layout.null)[_at_null(term)]
-        return log_gain(
-            normal[p:, p:] - normal[p:, :p] @ rate[:, :-1],
-            gradient[p:] - normal[p:, :p] @ rate[:, -1],
-            widths_for(term.layout, self.fit.data.free), one_sided,
-        )  # fmt: skip
+    def _gains(self, terms: Sequence[Term], columns: Sequence[Array]) -> Array:
+        """(k,) ln evidence that columns (N, .) of effects gain beside the fit, each by itself."""
+        (own, own_field), (left, left_field), inverse = self._own
+        along = own.T @ left - own_field.T @ left_field
+        out = np.full(len(terms), -np.inf)
+        for k, (term, x) in enumerate(zip(terms, columns, strict=True)):
+            if not x.shape[1]:
+                continue
+            white, field = self.fit.metric.split(x)
+            cross = own.T @ white - own_field.T @ field
+            rate = inverse @ cross
+            out[k] = log_gain(
+                white.T @ white - field.T @ field - cross.T @ rate,
+                white.T @ left - field.T @ left_field - rate.T @ along,
+                widths_for(term.layout, self.fit.data.free),
+                (term.layout.lower == term.layout.null)[_at_null(term)],
+            )
+        return out
 
-    def _gain_at_its_size(self, term: Term) -> float:
+    def _gain_at_its_size(self, member: Member) -> float:
         """The same by what an expected size changes, for one amplitude with no shape or history.
 
         Sag grows with the square of the weight: its derivative at no weight says next to nothing.
         """
-        if len(term.layout) != 1 or term.layout.shape.any():
+        if len(member.layout) != 1 or member.layout.shape.any():
             return -np.inf
-        there = _at_its_size(term.layout)
+        there = _at_its_size(member.layout)
         if self.problem.experiment.setup([there.effect()]).has_history:
             return -np.inf
         moved = self.fit.data.state(self.fit.terms.with_term(there), self.fit.state)
         if not moved.valid:
             return -np.inf
-        return self._gain(term, (self.fit.state.white - moved.white)[:, None])
+        return float(self._gains([member.term], [(self.fit.state.white - moved.white)[:, None]])[0])
 
     # --- the linear model ---
 

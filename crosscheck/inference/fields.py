@@ -117,6 +117,17 @@ def fields_about(fit: Fit) -> list[tuple[Varying, Array]]:
     return [(what, columns) for part in parts for what, columns in part() if np.any(columns)]
 
 
+def smooth_over_place(fit: Fit, kind: int) -> Array:
+    """(N, k) a smooth function of the place for each channel of one kind of readings.
+
+    It is a Gaussian process that is forgotten after half the range of an axis.
+    """
+    problem = fit.data.problem
+    shapes = waves(fit.state.prediction.pose[:, :3], 1.0)[problem.row_of]
+    columns = per_channel(fit.data, shapes)
+    return columns[:, np.any(columns[fit.data.chain.kind == kind], axis=0)]
+
+
 class _FieldColumns:
     """The columns about a model."""
 

@@ -114,35 +114,30 @@ class Metric:
         """Whitened values, the field left in."""
         return whitened(self.chain, self.noise, self.weight, values)
 
-    def _in_field(self, white: Array) -> Array:
+    def split(self, values: Array) -> tuple[Array, Array]:
+        """Whitened values a and what the field takes of them, b: <x, y> is a_x a_y - b_x b_y."""
+        white = self.white(values)
+        if self.field is None:
+            return white, np.zeros((0, *values.shape[1:]))
         along = self._columns.T @ white
-        return np.asarray(
-            linalg.solve_triangular(self._root, along, lower=True, check_finite=False)
-        )
+        part = linalg.solve_triangular(self._root, along, lower=True, check_finite=False)
+        return white, np.asarray(part)
 
     def power(self, residual: Array) -> float:
         """<r, r> of a residual (N,)."""
-        white = self.white(residual)
-        out = float(white @ white)
-        if self.field is not None:
-            part = self._in_field(white)
-            out -= float(part @ part)
-        return out
+        white, part = self.split(residual)
+        return float(white @ white) - float(part @ part)
 
     def normal(self, x: Array, residual: Array) -> tuple[Array, Array]:
         """<x, x> and <x, r> of columns (N, p) and a residual (N,)."""
-        white, left = self.white(x), self.white(residual)
-        normal, gradient = white.T @ white, white.T @ left
-        if self.field is not None:
-            part, rest = self._in_field(white), self._in_field(left)
-            normal, gradient = normal - part.T @ part, gradient - part.T @ rest
-        return normal, gradient
+        (white, part), (left, rest) = self.split(x), self.split(residual)
+        return white.T @ white - part.T @ part, white.T @ left - part.T @ rest
 
     def less_field(self, residual: Array) -> Array:
         """A residual (N,) without the most probable part of the field, if there is one."""
         if self.field is None:
             return residual
-        part = self._in_field(self.white(residual))
+        _white, part = self.split(residual)
         most = linalg.solve_triangular(self._root, part, lower=True, trans=1, check_finite=False)
         return np.asarray(residual - self.field @ most)
 

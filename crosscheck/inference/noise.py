@@ -303,27 +303,34 @@ class NoisePrior:
         )
 
     def log(self, noise: Noise) -> float:
-        """ln prior density of the noise's size."""
-        parts = self._parts(np.log(noise.scale[self.kinds]))
-        return float(np.sum(np.logaddexp.reduce(parts, axis=0)))
+        """ln prior density of the noise's size and correlation."""
+        return float(np.sum(np.logaddexp.reduce(self._parts(noise), axis=0)))
 
     def misjudged(self, noise: Noise) -> Array:
         """(kinds,) probability that a statement was misjudged; 0 where there is none."""
-        parts = self._parts(np.log(noise.scale[self.kinds]))
+        parts = self._parts(noise)
         chance = np.exp(parts[1] - np.logaddexp.reduce(parts, axis=0))
         return np.asarray(chance * (self.stated & ~self.bound))
 
-    def is_unknown(self, noise: Noise) -> float:
+    def is_unknown(self, noise: Noise, place: float = 0.0) -> float:
         """Probability that what a fit takes for noise is something unknown.
 
-        It is if it is larger than stated and slow, or larger than anybody misjudges.
+        It is if it is larger than stated and slow, or larger than anybody misjudges; or, by the
+        odds ``place``, if it goes along from row to row because it goes by the place.
         """
         rho, scale = noise.rho[self.kinds], noise.scale[self.kinds]
         no_noise = (rho >= priors.SLOW) | (scale > priors.MISJUDGED_MOST)
-        return float(np.max(self.misjudged(noise) * no_noise, initial=0.0))
+        misjudged = self.misjudged(noise)
+        goes_by_place = (misjudged > 0.5) * (rho > 0.0) * place / (1.0 + place)
+        return float(np.max(np.maximum(misjudged * no_noise, goes_by_place), initial=0.0))
 
-    def _parts(self, off: Array) -> Array:
-        """(2, kinds) ln density of ln(noise/stated), as stated and misjudged."""
+    def _parts(self, noise: Noise) -> Array:
+        """(2, kinds) ln density of ln(noise/stated) and rho, as stated and misjudged.
+
+        A stated noise is that of a sensor, whose readings from pose to pose hardly know of one
+        another: rho has the density 2 (1 - rho).
+        """
+        off, alike = np.log(noise.scale[self.kinds]), noise.rho[self.kinds]
 
         def normal(width: Array) -> Array:
             return np.asarray(-0.5 * (off / width) ** 2 - np.log(width))
@@ -335,4 +342,5 @@ class NoisePrior:
         above = self.bound & (off > 0.0)
         as_stated = np.where(above, -np.inf, as_stated)
         misjudged = np.where(above, normal(np.full(len(off), priors.MISJUDGED_BY)), misjudged)
-        return np.stack([as_stated, np.where(self.stated, misjudged, -np.inf)])
+        sizes = np.stack([as_stated, np.where(self.stated, misjudged, -np.inf)])
+        return sizes + np.where(self.stated, np.log(2.0 * (1.0 - alike)), 0.0)

@@ -34,10 +34,11 @@ from crosscheck.inference.catalogue import (
     part_of,
 )
 from crosscheck.inference.evidence import Solved, best_widths, log_evidence
+from crosscheck.inference.fields import smooth_over_place
 from crosscheck.inference.fit import TRACKER, Data, Fit, fit, unfitted
 from crosscheck.inference.hypothesis import Hypothesis, scored, wider
 from crosscheck.inference.noise import Noise, NoisePrior
-from crosscheck.inference.priors import EQUAL, FEW, MAY_BE_UNKNOWN, WITHIN
+from crosscheck.inference.priors import EQUAL, FEW, MAY_BE_UNKNOWN, MISJUDGED, WITHIN
 from seecr.effects import Knowledge, Term
 from seecr.pose import Array
 
@@ -60,8 +61,13 @@ _LONG = 4
 # Effort: most hypotheses that are fitted about one linear model, and most linear models about
 # better and better hypotheses.
 _FITS, _ROUNDS = 8, 4
+# Sets with one more member that promises to lose, which are fitted all the same: with its own noise
+# the member may explain more. The linear model about the smaller set is good enough for others.
+_LOSING = 2
 # Most fits of one hypothesis: the second with the prior widths that the first asks for.
 _REFITS = 2
+# The key of a smooth function of the place that stands for noise.
+_PLACE = "~place"
 # Sets whose neighbours are looked at where a search ends.
 _WIDENED = 30
 
@@ -266,11 +272,22 @@ class Search:
         assert found is not None
         return found
 
-    def reached(self, start: Key, key: Key) -> Hypothesis | None:
-        """A hypothesis, fitted from another one if it was not met; None if it has no solution."""
-        if key not in self.cache:
-            self.fit(self.scores_about(self._at(start)), key)
-        return self.cache[key]
+    def next_of(self, start: Key, members: Iterable[str]) -> tuple[str, Hypothesis] | None:
+        """Which of some members is worth most beside a fitted hypothesis; None if none has a fit.
+
+        As in the search, what the linear model considers worse by WITHIN is not fitted.
+        """
+        scores, found = self.scores_about(self._at(start)), dict[str, Hypothesis]()
+        promised = {k: scores.promised(start | {k}) for k in members}
+        for k in sorted(promised, key=lambda k: (-promised[k], k)):
+            best = max((h.score for h in found.values()), default=-np.inf)
+            if start | {k} not in self.cache and promised[k] > best - WITHIN:
+                self.fit(scores, start | {k})
+            one = self.cache.get(start | {k})
+            if one is not None:
+                found[k] = one
+        best_of_all = max(found, key=lambda k: (found[k].score, k), default=None)
+        return None if best_of_all is None else (best_of_all, found[best_of_all])
 
     def at_plausible_sizes(self, found: Hypothesis) -> Hypothesis:
         """A hypothesis fitted anew with prior widths of one expected size at least.
@@ -413,9 +430,9 @@ class Search:
         held = {k: max(w, 1.0) if self._waits(k) else w for k, w in widths.items()}
         found = self._fitted(key, start, held)
         for _ in range(_REFITS):
-            best = self._take(new := scored(self.every, key, found, held))
-            if new.wanted is None or best is not new or self._is_endless(key):
-                break
+            new = scored(self.every, key, found, held)
+            if self._take(new) is not new or new.wanted is None or self._is_endless(key):
+                return self._at(key)
             held = new.wanted
             found = self._fitted(key, found.state, held, found.noise)
         return self._take(scored(self.every, key, found, held))
@@ -580,15 +597,18 @@ class Search:
 
     def _fit_best(self, scores: Scores, centre: Hypothesis, first: Iterable[Key]) -> None:
         """Fit some hypotheses, and what a linear model considers best, within the budget."""
-        seen, done = scores.seen, 0
+        seen, done, added = scores.seen, 0, 0
         top = max(seen.values())
         for key in first:
             self._fit_new(scores, key)
         met = any(map(self._is_endless, first))
         for key in scores.best(4 * _FITS):
-            adds = key > centre.key and seen[key] < top - EQUAL
-            if not adds and done < _FITS and not (met and self._is_endless(key)):
-                done += self._fit_new(scores, key)
+            loses = key > centre.key and seen[key] < seen.get(centre.key, top)
+            if loses and (added == _LOSING or seen[key] < top - EQUAL):
+                continue
+            if done < _FITS and not (met and self._is_endless(key)):
+                fitted = self._fit_new(scores, key)
+                done, added = done + fitted, added + (loses and fitted > 0)
                 met = met or self._is_endless(key)
 
     def _fit_new(self, scores: Scores, key: Key) -> int:
@@ -619,11 +639,14 @@ class Search:
             near |= scores.with_forms(best.key)
             if core != best.key:
                 near[core] = base - 1.0
-            done = 0
+            done, added = 0, 0
             for key in _ranked(near):
-                least = EQUAL if key > best.key else WITHIN
-                if near[key] > base - least and done < _FITS:
-                    done += self._fit_new(scores, key)
+                loses = key > best.key and near[key] < base
+                if loses and (added == _LOSING or near[key] < base - EQUAL):
+                    continue
+                if near[key] > base - WITHIN and done < _FITS:
+                    fitted = self._fit_new(scores, key)
+                    done, added = done + fitted, added + (loses and fitted > 0)
             self.last, self.near = scores, near
             if self.best is best and best.field is None and len(core - self.stood) <= FEW:
                 scores.widen(best.key)
@@ -651,6 +674,29 @@ class Search:
             fitted = self.cache.get(at)
             loss = loss if fitted is None else self.best.score - fitted.score
         return loss
+
+    def odds_of_place(self) -> float:
+        """Odds that what the best hypothesis takes for noise goes by the place and not by row.
+
+        A noise larger than stated that goes along from row to row may be the sensor's, or a smooth
+        error over the workspace, which nobody calls noise. Both have as many numbers and are as
+        probable beforehand. They differ in what they foretell of near places in other runs.
+        """
+        best, prior = self.best, NoisePrior.of(self.data.problem)
+        misjudged, odds = prior.misjudged(best.fit.noise), 0.0
+        widths = {name_of(k): w for k, w in best.widths.items() if not is_field(k)}
+        for kind, p in zip(prior.kinds, misjudged, strict=True):
+            if best.field is not None or p < MAY_BE_UNKNOWN or best.fit.noise.rho[kind] == 0.0:
+                continue
+            columns = smooth_over_place(best.fit, int(kind))
+            scale, rho = best.fit.noise.scale.copy(), best.fit.noise.rho.copy()
+            scale[kind], rho[kind] = 1.0, 0.0
+            every = replace(self.every, fields={_PLACE: columns})
+            start = 3.0 * columns
+            found = fit(self.data, best.fit.state, widths, start, noise=Noise(scale, rho))
+            other = scored(every, best.key | {_PLACE}, found, {**best.widths, _PLACE: 3.0})
+            odds = max(odds, float(np.exp(min(other.score + np.log(MISJUDGED) - best.score, 50.0))))
+        return odds
 
     def needed(self, some: Iterable[str]) -> float:
         """ln evidence that members add beside all others, about the fit of all effects together."""

@@ -111,10 +111,11 @@ class Posterior:
         total = float(np.logaddexp.reduce(list(scores.values())))
         share = {k: float(np.exp(s - total)) for k, s in scores.items()}
         fitted = search.fitted
+        place = search.odds_of_place()
         loud = {
             k: 1.0
             if any(map(is_field, k))
-            else prior.is_unknown(fitted.get(k, search.best).fit.noise)
+            else prior.is_unknown(fitted.get(k, search.best).fit.noise, place)
             for k in scores
         }
         unknown = sum(share[k] * p for k, p in loud.items())

@@ -166,7 +166,9 @@ def test_the_prior_of_the_size_is_a_density(source: str) -> None:
 
     def density(log_size: float) -> float:
         size = float(np.exp(log_size))
-        return float(np.exp(prior.log(Noise(np.array([size, 1.0, 1.0]), np.zeros(3)))))
+        # linear in the correlation, so that its value in the middle is its integral
+        alike = np.array([0.5, 0.0, 0.0])
+        return float(np.exp(prior.log(Noise(np.array([size, 1.0, 1.0]), alike))))
 
     total, _ = integrate.quad(density, -30.0, 30.0, limit=400, points=[0.0])
     # of two kinds, of which the other one has the stated size

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from itertools import chain, combinations
@@ -25,9 +26,11 @@ from crosscheck.preparation.prepare import prepare
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.effects import ApartLayout, Term, Terms, layout_of
+from seecr.pose import Array
 
 SOME = ("pulley_radius", "stiffness", "platform_mass", "length_scale", "centre_of_mass")
 HIDDEN = ("pulley_radius", "stiffness")
+LOUD_M = 9e-5
 
 
 def begun(data: Measurements, some: tuple[str, ...] = SOME, of: Robot | None = None) -> Search:
@@ -134,6 +137,41 @@ def test_the_winner_is_the_same_in_any_order_of_runs_and_effects() -> None:
         other = judged(searched(shuffled(readings(), random), some))
         assert other.verdict is first.verdict and set(other.sure) == set(first.sure), seed
         assert other.posterior.unknown == pytest.approx(first.posterior.unknown, abs=1e-3)
+
+
+def louder(data: Measurements, error: Array) -> Measurements:
+    """Positions with another error (n, 3), three times as large as their noise."""
+    return replace(data, position=data.position + LOUD_M * error / error.std())
+
+
+def along_runs(data: Measurements) -> Array:
+    """Errors of a sensor that keep 0.85 of themselves from row to row, anew in each run."""
+    random, run = np.random.default_rng(3), data.run_index
+    out = random.standard_normal((len(run), 3))
+    for k in np.flatnonzero(run[1:] == run[:-1]) + 1:
+        out[k] = 0.85 * out[k - 1] + np.sqrt(1.0 - 0.85**2) * out[k]
+    return out
+
+
+def over_places(data: Measurements) -> Array:
+    """Errors that are a smooth function of the place."""
+    assert data.command_pose is not None
+    place = data.command_pose[:, :3]
+    unit = (place - place.mean(axis=0)) / np.ptp(place, axis=0).max()
+    return np.stack([np.sin(unit @ [6.0, 0.0, 5.0 * k] + k) for k in (-1.0, 0.5, 1.0)], axis=1)
+
+
+@pytest.mark.parametrize(("error", "is_unknown"), [(along_runs, False), (over_places, True)])
+def test_loud_noise_that_goes_by_the_place_is_none(
+    error: Callable[[Measurements], Array], is_unknown: bool
+) -> None:
+    """Both go along from row to row; one of them also from run to run."""
+    search = searched(louder(readings(), error(readings())), HIDDEN)
+    unknown = Posterior.of(search).unknown
+    assert unknown > 0.95 if is_unknown else unknown < 0.05
+    search.cache = {k: h for k, h in search.cache.items() if not any(map(is_field, k))}
+    odds = search.odds_of_place()
+    assert odds > 20.0 if is_unknown else odds < 0.05
 
 
 @cache
