@@ -38,8 +38,8 @@ PAGE = """# Performance
 `make bench` writes this page, on {count}. "One by one" is the compiled descent of a single
 pose, which small batches still take; "abreast" is the same descent for sixteen poses at once, which
 batches from 64 poses on take. Both are the whole of `seecr.solve`, in microseconds a pose on one
-processor. "Left" are poses that lanes leave to the descent of one: falls, saddles, poses that are
-free to move, and rests within rounding of a cable's rest length.
+processor. "Left" are poses that lanes leave to the descent of one: falls, saddles, and rests within
+rounding of a cable's rest length.
 
 {table}
 

@@ -76,6 +76,7 @@ if TYPE_CHECKING:
         solution_manifold,
     )
     from seecr.workspace.spans import SlackSpan, slack_spans
+    from seecr.workspace.stored import StoredMap, store_map
     from seecr.workspace.zones import Zone, feasible, slack_zones, tension_margin
 
 __version__ = "0.1.0"
@@ -103,6 +104,7 @@ _MODULES = {
     "inverse.correction": ("Correction", "correct"),
     "workspace.grid": ("Workspace",),
     "workspace.maps": ("default_axes", "with_history", "workspace_map"),
+    "workspace.stored": ("StoredMap", "store_map"),
     "description.mjcf": ("load_robot", "model_names", "model_path",),
     "prediction.model": ("Model", "load_model", "new_model"),
     "equilibrium.search": ("equilibria",),
@@ -128,15 +130,16 @@ __all__ = [
     "InputError",
     "InputFileError", "Joint", "Jump", "Knowledge", "Loads", "Midlines", "MissingPackageError",
     "Model", "NoRestError", "Prediction", "Readings", "Robot", "RobotError", "Scheme",
-    "SeecrError", "SensorNoise", "Setup", "SlackSpan", "Solution", "Spread", "Status", "Term",
+    "SeecrError", "SensorNoise", "Setup", "SlackSpan", "Solution", "Spread", "Status", "StoredMap",
+    "Term",
     "Terms", "Workspace", "Zone", "bar_balances", "bar_equilibria", "bar_manifold", "bar_tilt",
     "barriers", "boundary", "catalogue", "control", "correct", "default_axes", "effect_named",
     "equilibria", "export", "feasible", "held_chance", "introduce", "kept_chance", "layout_of",
     "load_model",
     "load_robot", "midline_point", "midline_points", "model_names", "model_path", "new_model",
     "parameter", "placed", "predict", "sensitivities", "slack_spans", "slack_zones",
-    "solution_manifold", "solve", "spread_of", "tension_margin", "tracked", "with_history",
-    "workspace_map",
+    "solution_manifold", "solve", "spread_of", "store_map", "tension_margin", "tracked",
+    "with_history", "workspace_map",
 ]  # fmt: skip
 
 

@@ -15,9 +15,9 @@ import os
 import pickle
 import signal
 import threading
-from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import (
+    FIRST_EXCEPTION,
     BrokenExecutor,
     CancelledError,
     Executor,
@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 R = TypeVar("R")
 
+BLOCK = 64
+"""Rows of a batch that may depend on one another, in their last digit: they stay together."""
 # Fewer poses than this are not worth a second thread.
 _CHUNK = 128
 # A scheduler that is there answers within a second; over a slow network it may take a few.
@@ -61,72 +63,70 @@ def processors() -> int:
 def in_parts(run: Callable[[slice], None], n: int, threads: int | None = None) -> None:
     """Run a job on n rows, in as many parts as there are threads, if these have enough rows.
 
-    Within a part of another job it is not divided: the other threads are busy.
+    Within a part of another job it is not divided: the other threads are busy. Parts begin at
+    multiples of :data:`BLOCK`.
     """
     count = max(1, n // _CHUNK)
     if count > 1:  # asking the system takes longer than a few rows
         most = 1 if _is_whole() else threads
         count = min(count, processors() if most is None else most)
-    edges = [n * k // count for k in range(count + 1)]
+    edges = [n * k // count // BLOCK * BLOCK for k in range(count)] + [n]
     run_parts(run, [slice(a, b) for a, b in pairwise(edges)])
 
 
 @contextmanager
 def undivided() -> Iterator[None]:
     """Batches of this thread stay whole: the other processors are busy."""
-    before, _at.whole = _is_whole(), True
+    before = _is_whole()
+    _stay_whole(True)
     try:
         yield
     finally:
-        _at.whole = before
+        _stay_whole(before)
 
 
 def _is_whole() -> bool:
     return getattr(_at, "whole", False)
 
 
+def _stay_whole(whole: bool) -> None:
+    _at.whole = whole
+
+
 def run_parts(run: Callable[[slice], None], parts: list[slice]) -> None:
-    """Run a job on every part of a batch, in this thread and others, one per processor.
+    """Run a job on every part of a batch, in one thread per processor.
 
     Each thread takes the next part that is left, so that none waits for another before the end.
     After an error no further part is begun.
     """
-    if len(parts) == 1 or _is_whole():
+    executor = threads() if len(parts) > 1 else None
+    if executor is None:
         for part in parts:
             run(part)
         return
-    left = deque(parts)
-
-    def work() -> None:
-        try:
-            with undivided():
-                while True:
-                    try:
-                        part = left.popleft()
-                    except IndexError:
-                        return
-                    run(part)
-        except BaseException:
-            left.clear()
-            raise
-
-    others = [_threads().submit(work) for _ in range(min(processors(), len(parts)) - 1)]
+    futures = [executor.submit(run, part) for part in parts]
     try:
-        work()
+        wait(futures, return_when=FIRST_EXCEPTION)
     finally:
-        wait(others)
-    for other in others:
-        other.result()
+        begun = [future for future in futures if not future.cancel()]
+        wait(begun)
+    for future in begun:
+        future.result()
+
+
+def threads() -> Executor | None:
+    """The threads of this process, one per processor, as an executor; None where they are busy."""
+    return None if _is_whole() or processors() == 1 else _pool()
 
 
 @lru_cache(maxsize=1)
-def _threads() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(max_workers=processors())
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(processors(), initializer=_stay_whole, initargs=(True,))
 
 
 if hasattr(os, "register_at_fork"):
     # a forked process has the pool, but none of its threads
-    os.register_at_fork(after_in_child=_threads.cache_clear)
+    os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
 # --- tasks on an executor -------------------------------------------------------------------------
@@ -277,6 +277,8 @@ class _Parcel:
 
 def _sent(function: Any, executor: Executor) -> Any:
     """What tasks are given of their function: a client of dask sends it to each worker once."""
+    if isinstance(executor, ThreadPoolExecutor):
+        return function
     data = pickle.dumps(function)
     parcel = _Parcel(hashlib.sha256(data).hexdigest(), data)
     client = getattr(executor, "_client", None)
@@ -293,10 +295,10 @@ def _unpacked(parcel: _Parcel) -> Any:
     return pickle.loads(parcel.data)
 
 
-def _whole(parcel: _Parcel, item: Any) -> Any:
+def _whole(sent: Any, item: Any) -> Any:
     """One task, in one thread."""
     with undivided():
-        return _unpacked(parcel)(item)
+        return (_unpacked(sent) if isinstance(sent, _Parcel) else sent)(item)
 
 
 def _is_end(error: Exception) -> bool:

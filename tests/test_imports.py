@@ -19,7 +19,7 @@ from sources import ROOT, imports, imports_of, modules, name_of, tree_of
 # The rooms, folders or files, floor by floor from the lowest up.
 TABLE = (
     "seecr: errors lazy version counted parallel compiled",
-    "seecr: files folders pose arguments result units",
+    "seecr: files folders pose arguments result units parts",
     "seecr: description commands columns importing",
     "seecr: effects statics prediction",
     "seecr: tensions equilibrium inverse workspace exported controlled",

@@ -5,11 +5,9 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -18,11 +16,13 @@ import numpy as np
 from crosscheck.measurements.read import load_commands, load_measurements
 from seecr.columns.commands import read_commands
 from seecr.columns.csv import Table, read_table, show
+from seecr.description.fingerprint import all_numbers
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.effects import Term, Terms
 from seecr.errors import Faults, InputError, SeecrError
-from seecr.files import digits_of, path_of, plain, toml_path
+from seecr.files import digits_of, path_of, toml_path
+from seecr.parts import key_of
 from seecr.pose import Array
 from seecr.prediction.model import Model, load_model
 from seecr.units import of_columns
@@ -45,8 +45,6 @@ _OPTIONS = dict.fromkeys(word for needs, takes in _DOES.values() for word in nee
 _CHANGE = re.compile(r"(mass|ea|ea_(\d+)|(exit|anchor)_(\d+)_([xyz]))_([a-zA-Z]+)")
 _EFFECT = re.compile(r"(\w+)\.(\w+)")
 _SI = {"mass": "kg", "ea": "N", "exit": "m", "anchor": "m"}
-# What of a robot is words, by which no result is another.
-_WORDS = ("name", "cable_names", "source", "read", "left_out")
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,8 +165,8 @@ class _Reader:
         grid = {"axes": at("grid", _axes, given["grid"], robot)} if "grid" in given else {}
         data, digits = at("data", self._read, do, given.get("data"), robot)
         of_model = "" if model is None else digits_of(model.path)
-        key = _hash([
-            full_version(), do, robot_table(robot), digits, of_model, numbers, grid,
+        key = key_of([
+            full_version(), do, all_numbers(robot), digits, of_model, numbers, grid,
             [[term.name, term.vector] for term in terms],
         ])  # fmt: skip
         return StudyCase(name, do, robot, given, effects, data, numbers | grid, key)
@@ -195,7 +193,7 @@ class _Reader:
         if not cell:
             return "", []
         path = self._path(cell)
-        name = _hash([do, str(path), robot_table(robot)])
+        name = key_of([do, str(path), all_numbers(robot)])
         if name not in self._data:
             if do == "sweep":
                 self._data[name] = read_commands(path, robot).commands
@@ -290,12 +288,3 @@ def _values_of(given: Mapping[str, str]) -> dict[str, dict[str, float]]:
         if (match := _EFFECT.fullmatch(column)) is not None:
             found.setdefault(match[1], {})[match[2]] = _number(cell)
     return found
-
-
-def robot_table(robot: Robot) -> dict[str, Any]:
-    """All numbers of a robot."""
-    return {f.name: getattr(robot, f.name) for f in fields(Robot) if f.name not in _WORDS}
-
-
-def _hash(what: Any) -> str:
-    return hashlib.sha256(json.dumps(plain(what), sort_keys=True).encode()).hexdigest()[:16]

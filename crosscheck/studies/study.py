@@ -12,16 +12,20 @@ from typing import Any
 
 from crosscheck.diagnosis.result import Tolerance
 from crosscheck.studies.cases import GivenCases, StudyCase, read_cases
-from crosscheck.studies.parts import parts_in
 from crosscheck.studies.tasks import FAILED, run_study_case
 from seecr.arguments import check_kind, silent
 from seecr.counted import counted
 from seecr.errors import ExecutorError
 from seecr.files import path_of
 from seecr.parallel import as_done
+from seecr.parts import parts_in
 from seecr.result import Record, Result
 from seecr.version import full_version
 
+MARK = "crosscheck.study"
+"""Key of what is said of a case, in its part."""
+FILES = ("study.csv", "study.json", "study.png", "study.svg")
+"""What the command writes beside the folder of parts."""
 # Most cases that are named where it is told which of them are within limits.
 _MOST = 12
 
@@ -134,8 +138,8 @@ def studied(
     folder: Path | None, within: Tolerance | None, progress: Callable[[int, str], None],
 ) -> Study:  # fmt: skip
     """The same of cases that are read, with their data."""
-    with parts_in(folder) as parts:
-        found: dict[str, Any] = {case.key: parts.read(case) for case in every}
+    with parts_in(folder, MARK, FILES) as parts:
+        found: dict[str, Any] = {case.key: parts.read(case.key) for case in every}
         missing = {case.key: case for case in every if found[case.key] is None}
         todo = list(missing.values())
         if len(todo) < len(every):
@@ -146,7 +150,7 @@ def studied(
             with closing(as_done(one, todo, executor)) as results:
                 for i, (rows, summary) in results:
                     if rows is not None:
-                        parts.keep(todo[i], rows, summary)
+                        parts.keep(todo[i].key, rows, summary)
                     found[todo[i].key] = summary
                     done += 1
                     progress(1, todo[i].name)

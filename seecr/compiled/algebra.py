@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from seecr.compiled.jit import jit, jit_allocating, jit_inner
+from seecr.compiled.jit import jit, jit_allocating, jit_inner, jit_lanes
 
 
 @jit
@@ -257,15 +257,16 @@ def deviate_rows(deviation, poses, out):
 
 # The smallest eigenvalue of small symmetric matrices, and an eigenvector of it.
 #
-# Householder's reflections make the matrix tridiagonal, Laguerre's steps on its characteristic
-# polynomial find the eigenvalue from below, and inverse iteration with the matrix itself finds the
-# eigenvector (Wilkinson, The Algebraic Eigenvalue Problem, 5.29, 7.26 and 5.54). This takes a
-# fifth of the time of all eigenvectors, and is as exact, to rounding of the largest entry, whether
-# the eigenvalue is repeated, negative or zero.
+# Jacobi's rotations make a matrix diagonal (Golub and Van Loan, Matrix Computations, 8.5). They
+# are as exact, to rounding of the largest entry, whether the eigenvalue is repeated, negative or
+# zero. They need no branches, so that sixteen matrices are rotated abreast, in lanes as those of
+# seecr.compiled.lanes: numbers of all lanes are the last axis.
 
-# For matrices whose largest entry is 1: the rounding of zero, and how far below the smallest
-# eigenvalue the first shift for a Cholesky factor is.
-_ROUNDING, _BELOW = 2e-16, 1e-15
+# Lanes; of matrices whose largest entry is 1 the entries that are rounding; and most sweeps, of
+# which five or six are enough.
+_LANES, _ROUNDING, _SWEEPS = 16, 1e-17, 30
+# Keeps a division from being 0/0; smaller numbers need no rotation.
+_NOTHING = 1e-30
 # Squared motion that is added, relative to the largest, where joints can be moved without the
 # platform.
 _IDLE = 1e-14
@@ -273,130 +274,74 @@ _IDLE = 1e-14
 _AS_LARGE = 1.0 - 1e-6
 
 
-@jit_inner
-def _make_tridiagonal(a, diagonal, beside, v, p):
-    """Diagonal (n,) and subdiagonal (n - 1, then 0); the lower triangle is overwritten."""
-    n = a.shape[0]
-    for k in range(n - 2):
-        size = 0.0
-        for i in range(k + 1, n):
-            v[i] = a[i, k]
-            size += v[i] * v[i]
-        size = math.sqrt(size)
-        diagonal[k], beside[k] = a[k, k], 0.0
-        if size == 0.0:
-            continue
-        beside[k] = -size if v[k + 1] >= 0.0 else size
-        v[k + 1] -= beside[k]
-        # I - factor v v' is the reflection
-        factor, along = 1.0 / (size * abs(v[k + 1])), 0.0
-        for i in range(k + 1, n):
-            total = 0.0
-            for j in range(k + 1, i + 1):
-                total += a[i, j] * v[j]
-            for j in range(i + 1, n):
-                total += a[j, i] * v[j]
-            p[i] = factor * total
-            along += p[i] * v[i]
-        along *= 0.5 * factor
-        for i in range(k + 1, n):
-            p[i] -= along * v[i]
-        for i in range(k + 1, n):
-            for j in range(k + 1, i + 1):
-                a[i, j] -= v[i] * p[j] + p[i] * v[j]
-    for k in range(max(n - 2, 0), n):
-        diagonal[k] = a[k, k]
-        beside[k] = a[k + 1, k] if k + 1 < n else 0.0
+@jit_lanes
+def _rotate(a, vectors, turn, p, q):
+    """Rotate coordinates p < q of every lane that is active, so that its entry p, q gets zero.
 
-
-@jit_inner
-def _sums(diagonal, beside, at):
-    """Sums of 1/(lambda - at) and of its square over the eigenvalues; 0 if one lies below ``at``.
-
-    They follow from the pivots of the matrix minus ``at``, whose product is the characteristic
-    polynomial, and from the pivots' first two derivatives.
+    ``a`` (d, d, lanes) are upper triangles, ``turn`` (3, lanes) cosine, sine, and 1 where active.
     """
-    one, two = 0.0, 0.0
-    square, inverse, slope, bend = 0.0, 0.0, 0.0, 0.0
-    for i in range(diagonal.shape[0]):
-        # of the pivot before: slope and bend are divided by it
-        part = square * inverse
-        pivot = diagonal[i] - at - part
-        if not pivot > 0.0:
-            return 0.0, 0.0
-        inverse = 1.0 / pivot
-        bend = part * (bend - 2.0 * slope * slope) * inverse
-        slope = (part * slope - 1.0) * inverse
-        one -= slope
-        two += slope * slope - bend
-        square = beside[i] * beside[i]
-    return one, two
+    for i in range(_LANES):
+        beside, apart = turn[2, i] * a[p, q, i], a[q, q, i] - a[p, p, i]
+        size = abs(apart) + math.sqrt(apart * apart + 4.0 * beside * beside) + _NOTHING
+        tangent = (2.0 * beside if apart >= 0.0 else -2.0 * beside) / size
+        cosine = 1.0 / math.sqrt(1.0 + tangent * tangent)
+        turn[0, i], turn[1, i] = cosine, tangent * cosine
+        a[p, p, i] -= tangent * beside
+        a[q, q, i] += tangent * beside
+        a[p, q, i] -= beside
+    for k in range(a.shape[0]):
+        if k != p and k != q:
+            r, s, u, v = min(k, p), max(k, p), min(k, q), max(k, q)
+            for i in range(_LANES):
+                c, w, x, y = turn[0, i], turn[1, i], a[r, s, i], a[u, v, i]
+                a[r, s, i], a[u, v, i] = c * x - w * y, w * x + c * y
+        for i in range(_LANES):
+            c, w, x, y = turn[0, i], turn[1, i], vectors[k, p, i], vectors[k, q, i]
+            vectors[k, p, i], vectors[k, q, i] = c * x - w * y, w * x + c * y
 
 
 @jit_inner
-def _smallest(diagonal, beside):
-    """The smallest eigenvalue of a tridiagonal matrix with entries of size 1.
-
-    Laguerre's steps from below never pass it; a step that passes it by rounding is halved.
-    """
-    n, low = diagonal.shape[0], np.inf
-    for i in range(n):
-        low = min(low, diagonal[i] - abs(beside[i]) - (abs(beside[i - 1]) if i > 0 else 0.0))
-    one, two, step = 0.0, 0.0, _ROUNDING
-    while one == 0.0:
-        low -= step
-        step *= 2.0
-        one, two = _sums(diagonal, beside, low)
-    step = 1.0
-    while step > _ROUNDING and low + step > low:
-        root = max(n * two - one * one, 0.0)
-        step = n / (one + math.sqrt((n - 1.0) * root))
-        while step > _ROUNDING:
-            there, squared = _sums(diagonal, beside, low + step)
-            if there > 0.0:
-                low, one, two = low + step, there, squared
-                break
-            step *= 0.5
-    return low
+def _begin(matrix, a, vectors, i):
+    """Put a matrix, scaled, into lane i; returns its largest entry, nan if one is not finite."""
+    d, top = matrix.shape[0], 0.0
+    for r in range(d):
+        for c in range(r + 1):
+            size = abs(matrix[r, c])
+            top = size if size > top or not math.isfinite(size) else top
+    known = 0.0 < top < np.inf
+    for r in range(d):
+        for c in range(r + 1):
+            a[c, r, i] = matrix[r, c] / top if known else 0.0
+            vectors[c, r, i] = vectors[r, c, i] = 1.0 if r == c else 0.0
+    return top if top < np.inf else np.nan
 
 
 @jit_inner
-def _softest(matrix, scaled, factor, work, direction):
-    """Smallest eigenvalue of a matrix, from its lower triangle; fills the direction (n,)."""
-    n, top = matrix.shape[0], 0.0
-    finite = True
-    for i in range(n):
-        for j in range(i + 1):
-            finite = finite and math.isfinite(matrix[i, j])
-            top = max(top, abs(matrix[i, j]))
-    for k in range(n):
-        direction[k] = np.nan if not finite else 1.0 if k == 0 else 0.0
-    if top == 0.0 or not finite:
-        return 0.0 if finite else np.nan
-    for i in range(n):
-        for j in range(i + 1):
-            scaled[i, j] = factor[i, j] = matrix[i, j] / top
-    diagonal, beside, x = work[0], work[1], work[2]
-    _make_tridiagonal(factor, diagonal, beside, x, work[3])
-    least = _smallest(diagonal, beside)
-    below = _BELOW
-    while not cholesky(scaled, below - least, factor):
-        below *= 2.0
-    for k in range(n):
-        # irregular, so that no eigenvector is orthogonal to it
-        x[k] = 1.0 / (k + 1.618)
-    for _ in range(3):
-        solve_factored(factor, x, direction)
-        size, largest = norm(direction), 0.0
-        for k in range(n):
-            x[k] = direction[k] / size
-            largest = max(largest, abs(x[k]))
-    first = 0
-    while abs(x[first]) < _AS_LARGE * largest:
+def _are_active(a, turn):
+    """Fill turn[2] with 1 where a lane is not diagonal yet; returns whether any is."""
+    some = False
+    for i in range(_LANES):
+        most = 0.0
+        for q in range(a.shape[0]):
+            for p in range(q):
+                most = max(most, abs(a[p, q, i]))
+        turn[2, i] = 1.0 if most > _ROUNDING else 0.0
+        some = some or most > _ROUNDING
+    return some
+
+
+@jit_inner
+def _first_positive(vector, scale):
+    """Multiply a vector by scale, and turn it so that its largest component is positive."""
+    largest, first = 0.0, 0
+    for k in range(vector.shape[0]):
+        largest = max(largest, abs(vector[k]))
+    while first < vector.shape[0] - 1 and abs(vector[first]) < _AS_LARGE * largest:
         first += 1
-    for k in range(n):
-        direction[k] = x[k] if x[first] > 0.0 else -x[k]
-    return least * top
+    if vector[first] < 0.0:
+        scale = -scale
+    for k in range(vector.shape[0]):
+        vector[k] *= scale
 
 
 @jit_allocating
@@ -407,10 +352,26 @@ def softest_batch(matrices, values, directions):
     length and a positive largest component; for a repeated eigenvalue they are any of its
     eigenvectors.
     """
-    d = matrices.shape[1]
-    scaled, factor, work = np.empty((d, d)), np.empty((d, d)), np.empty((4, d))
-    for k in range(len(matrices)):
-        values[k] = _softest(matrices[k], scaled, factor, work, directions[k])
+    n, d = matrices.shape[:2]
+    a, vectors, turn = (np.empty((d, d, _LANES)), np.empty((d, d, _LANES)), np.empty((3, _LANES)))
+    tops = np.empty(_LANES)
+    for first in range(0, n, _LANES):
+        for i in range(_LANES):
+            tops[i] = _begin(matrices[min(first + i, n - 1)], a, vectors, i)
+        for _ in range(_SWEEPS):
+            if not _are_active(a, turn):
+                break
+            for p in range(d - 1):
+                for q in range(p + 1, d):
+                    _rotate(a, vectors, turn, p, q)
+        for i in range(min(_LANES, n - first)):
+            best, at = 0, first + i
+            for k in range(d):
+                best = k if a[k, k, i] < a[best, best, i] else best
+            values[at] = a[best, best, i] * tops[i]
+            for k in range(d):
+                directions[at, k] = vectors[k, best, i] + 0.0 * tops[i]
+            _first_positive(directions[at], 1.0 / norm(directions[at]))
 
 
 @jit_inner
@@ -447,28 +408,6 @@ def _onto_motion(matrix, factor, out):
             out[i, j] = total / factor[i, i]
 
 
-@jit_inner
-def _motion_of(direction, factor, columns, motion):
-    """The motion (6,) of steps L^-T direction, with a positive largest component."""
-    d = direction.shape[0]
-    for back in range(d):
-        i = d - 1 - back
-        for k in range(i + 1, d):
-            direction[i] -= factor[k, i] * direction[k]
-        direction[i] /= factor[i, i]
-    largest, first = 0.0, 0
-    for k in range(6):
-        motion[k] = 0.0
-        for i in range(d):
-            motion[k] += direction[i] * columns[i, k]
-        largest = max(largest, abs(motion[k]))
-    while first < 5 and abs(motion[first]) < _AS_LARGE * largest:
-        first += 1
-    if motion[first] < 0.0:
-        for k in range(6):
-            motion[k] = -motion[k]
-
-
 @jit_allocating
 def softest_motions(matrices, columns, values, motions):
     """The same on joints, as motions (n, 6) of the platform: of K v = value M v, M their products.
@@ -476,17 +415,24 @@ def softest_motions(matrices, columns, values, motions):
     Unlike eigenvalues of K, which is by steps of the joints, they do not depend on the order and
     places of joints. ``columns`` (n, d, 6) are the platform's motion per step of each joint.
     """
-    d = matrices.shape[1]
-    scaled, factor, work = np.empty((d, d)), np.empty((d, d)), np.empty((4, d))
-    own, reduced, direction = np.empty((d, d)), np.empty((d, d)), np.empty(d)
-    for k in range(len(matrices)):
-        values[k] = math.nan
-        for i in range(6):
-            motions[k, i] = math.nan
-        if not np.isfinite(columns[k]).all():
-            continue
-        _factor_motion(columns[k], reduced, own)
-        _onto_motion(matrices[k], own, reduced)
-        values[k] = _softest(reduced, scaled, factor, work, direction)
-        if math.isfinite(values[k]):
-            _motion_of(direction, own, columns[k], motions[k])
+    n, d = matrices.shape[:2]
+    factors, reduced, steps = np.empty((n, d, d)), np.empty((n, d, d)), np.empty((n, d))
+    for k in range(n):
+        if np.isfinite(columns[k]).all():
+            _factor_motion(columns[k], reduced[k], factors[k])
+            _onto_motion(matrices[k], factors[k], reduced[k])
+        else:
+            reduced[k] = factors[k] = math.nan
+    softest_batch(reduced, values, steps)
+    for k in range(n):
+        # the motion of steps L^-T direction
+        for back in range(d):
+            i = d - 1 - back
+            for j in range(i + 1, d):
+                steps[k, i] -= factors[k, j, i] * steps[k, j]
+            steps[k, i] /= factors[k, i, i]
+        for j in range(6):
+            motions[k, j] = 0.0
+            for i in range(d):
+                motions[k, j] += steps[k, i] * columns[k, i, j]
+        _first_positive(motions[k], 1.0)

@@ -3,7 +3,7 @@
 A lane takes the steps of ``solve_one`` one by one, with its trust region and its tests, so that it
 arrives where that arrives. What a lane cannot do it leaves to ``solve_one``, which begins again
 from the start: cables that are not straight and linear, moments, steps away from saddles, falls,
-and whatever does not end in a certified equilibrium. That includes rests free to move: along such a
+and whatever does not end in an equilibrium that is certified, or free to move. Along a free
 direction rounding decides where a descent ends.
 
 LLVM turns a loop over the lanes into vector instructions if its body has no branches, if the number
@@ -37,6 +37,7 @@ from seecr.compiled.columns import (
     IDLE,
     N_COLUMNS,
     REST,
+    SINGULAR,
     SINGULAR_PART,
     TOLERANCE,
     WINCH_SIDE,
@@ -337,10 +338,13 @@ def _step(S):
         least = 1e-6 * (S[_TOP + i] if S[_TOP + i] > 0.0 else loose) + 1e-300
         raised = 4.0 * shift if 4.0 * shift > least else least
         fails = ~(low > 0.0) & ~back
-        going = S[_END + i] == 0.0
-        S[_FAILED + i] = 1.0 if going & fails else 0.0
-        S[_SHIFT + i] = raised if going & fails else shift
-        S[_END + i] = 2.0 if (S[_END + i] == 1.0) & fails else S[_END + i]
+        going, rests = S[_END + i] == 0.0, S[_END + i] == 1.0
+        # a rest that is not stable is free to move, unless it is a saddle: see escape
+        firm = rests & (shift < 0.0)
+        S[_FAILED + i] = 1.0 if (going | firm) & fails else 0.0
+        shift = raised if going & fails else shift
+        S[_SHIFT + i] = -shift if firm & fails else shift
+        S[_END + i] = 2.0 if rests & ~firm & fails else S[_END + i]
 
 
 @jit_inner
@@ -627,7 +631,7 @@ def descend_abreast(
             count[row] = int(S[_COUNT + i])
             outcome[row] = -1
             if S[_END + i] == 1.0:
-                outcome[row] = CONVERGED
+                outcome[row] = CONVERGED if S[_SHIFT + i] < 0.0 else SINGULAR
                 residual[row] = S[_SIZE + i] / S[_SCALE + i]
                 energy[row] = S[_AT_ENERGY + i]
                 for k in range(7):

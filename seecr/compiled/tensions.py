@@ -12,7 +12,13 @@ import math
 
 import numpy as np
 
-from seecr.compiled.algebra import cholesky, eliminate, rotated_less, solve_factored
+from seecr.compiled.algebra import (
+    cholesky,
+    eliminate,
+    largest_diagonal,
+    rotated_less,
+    solve_factored,
+)
 from seecr.compiled.jit import jit_allocating, jit_inner
 
 # A matrix is singular if a pivot of its factor is below this part of the largest.
@@ -22,6 +28,8 @@ _TOP = 1e7
 _PIVOTS, _ROUNDING = 200, 1e-12
 # Rounding relative to the artificial functions, and the weight from which one of them is active.
 _OWN_ROUNDING, _HOLDS = 1e-14, 1e-9
+# A system with a pivot below this part of the largest loses too many digits for a margin.
+_NEARLY_SINGULAR = 1e-9
 
 
 @jit_inner
@@ -86,35 +94,31 @@ def null_space(matrix, load, work, particular, null):
 
 @jit_inner
 def _rows(particular, null, low, high, top, a, b):
-    """The functions a nu + b whose minimum is maximised, artificial first; returns how many."""
+    """Fill the functions a nu + b whose minimum is maximised: artificial, lower, upper ones."""
     m, r = null.shape
-    for j in range(r + 1):
-        for k in range(r):
+    for k in range(r):
+        for j in range(r + 1):
             a[j, k] = -1.0 if j == r else (1.0 if j == k else 0.0)
+        for i in range(m):
+            a[r + 1 + i, k], a[r + 1 + m + i, k] = null[i, k], -null[i, k]
+    for j in range(r + 1):
         b[j] = top
-    count = r + 1
     for i in range(m):
-        for k in range(r):
-            a[count, k] = null[i, k]
-        b[count] = particular[i] - low[i]
-        count += 1
-        if high[i] != np.inf:
-            for k in range(r):
-                a[count, k] = -null[i, k]
-            b[count] = high[i] - particular[i]
-            count += 1
-    return count
+        b[r + 1 + i], b[r + 1 + m + i] = particular[i] - low[i], high[i] - particular[i]
 
 
 @jit_allocating
-def _largest_least(a, b, count, r, scale, answer):
+def _largest_least(a, b, scale, basis, answer):
     """max over nu of min_i (a_i nu + b_i) by the dual simplex; nan if it does not end.
 
-    Infinite if artificial functions, the first r + 1, limit it. ``answer`` (r + 1,) is nu and the
-    minimum, which the artificial functions keep finite.
+    Infinite if artificial functions, the first r + 1, limit it. ``basis`` (r + 1,) and ``answer``
+    (r + 1,) are filled: the functions that limit it, and nu and the minimum, which the artificial
+    functions keep finite.
     """
-    k = r + 1
-    basis = np.arange(k)
+    k = basis.shape[0]
+    r = k - 1
+    for row in range(k):
+        basis[row] = row
     system, right = np.empty((k, k)), np.empty(k)
     # weights of the basis: they sum the coefficients of nu to zero and those of the margin to one
     weights, change = np.full(k, 1.0 / k), np.empty(k)
@@ -129,7 +133,7 @@ def _largest_least(a, b, count, r, scale, answer):
         for c in range(k):
             size = max(size, _OWN_ROUNDING * abs(answer[c]))
         least, enters = -size, -1
-        for i in range(count):
+        for i in range(b.shape[0]):
             value = b[i] - answer[r]
             for c in range(r):
                 value += a[i, c] * answer[c]
@@ -164,6 +168,17 @@ def _largest_least(a, b, count, r, scale, answer):
     return np.nan
 
 
+# Of a row of poses, those of a grid, neighbours are mostly limited by the same cables.
+#
+# With the limits that are reached, the tensions of the other cables and the margin follow from one
+# system of d equations, and the weights of the limits from its transpose. If no limit is exceeded
+# and no weight is negative, that is the largest margin, without a null space and without pivots.
+
+# Neighbours that are tried one after the other: BLOCK of seecr.parallel. The next ones begin anew,
+# so that digits do not depend on how a batch is divided.
+_BLOCK = 64
+
+
 @jit_allocating
 def _space(d, m):
     """Scratch arrays for any number of poses."""
@@ -171,19 +186,94 @@ def _space(d, m):
     return (
         np.empty((m, d + 1)), np.empty(m), np.empty((m, m - d)),
         np.empty((rows, max(m - d, 1))), np.empty(rows), np.empty(m - d + 1),
+        np.empty(m - d + 1, np.int64), np.empty((d, d)), np.empty((d, d)), np.empty(d),
+        np.empty(d), np.empty(d),
     )  # fmt: skip
 
 
 @jit_inner
-def _least_margin(matrix, loads, low, high, scale, space):
-    """The smallest margin [N] over loads (k, d); nan if the matrix is singular."""
-    work, particular, null, a, b, answer = space
+def _margin(matrix, load, low, high, scale, side, space):
+    """The margin [N] of one load; nan if the matrix is singular. Fills ``side`` (m,) see _again."""
+    work, particular, null, a, b, answer, basis = space[:7]
+    d, m = matrix.shape
+    side[:] = 0
+    if not null_space(matrix, load, work, particular, null):
+        return np.nan
+    _rows(particular, null, low, high, _TOP * scale, a, b)
+    found = _largest_least(a, b, scale, basis, answer)
+    for row in range(basis.shape[0]):
+        number = basis[row] - (m - d + 1)
+        if number >= 0:
+            side[number % m] += 1 if number < m else -1
+    return found
+
+
+@jit_inner
+def _again(matrix, load, low, high, scale, side, space):
+    """The margin [N] if the same limits are reached as at a neighbour; nan if others are.
+
+    ``side`` (m,) is 1 for cables at their lower limit, -1 at their upper one, 0 for the others.
+    """
+    system, transposed, right, found, dual = space[7:]
+    d, m = matrix.shape
+    free = 0
+    for i in range(m):
+        free += side[i] == 0
+    if free != d - 1:  # also where nothing is known, or both limits of one cable are reached
+        return np.nan
+    column = 0
+    for k in range(d):
+        right[k], system[k, d - 1] = load[k], 0.0
+    for i in range(m):
+        if side[i] == 0:
+            for k in range(d):
+                system[k, column] = matrix[k, i]
+            column += 1
+        else:
+            limit = low[i] if side[i] > 0 else high[i]
+            for k in range(d):
+                right[k] -= matrix[k, i] * limit
+                system[k, d - 1] += side[i] * matrix[k, i]
+    for k in range(d):
+        dual[k] = 0.0
+        for j in range(d):
+            transposed[k, j] = system[j, k]
+    eliminate(system, right, found)
+    top, least = largest_diagonal(system), np.inf
+    for k in range(d):
+        least, right[k] = min(least, abs(system[k, k])), 1.0 if k == d - 1 else 0.0
+    if not least > _NEARLY_SINGULAR * top:
+        return np.nan
+    eliminate(transposed, right, dual)
+    margin, column, allowed = found[d - 1], 0, scale * _ROUNDING
+    for i in range(m):
+        if side[i] == 0:
+            pull = found[column]
+            column += 1
+            if min(pull - low[i], high[i] - pull) < margin - allowed:
+                return np.nan
+        else:
+            weight = 0.0
+            for k in range(d):
+                weight += matrix[k, i] * dual[k]
+            if side[i] * weight < -_ROUNDING or high[i] - low[i] < 2.0 * margin - allowed:
+                return np.nan
+    return margin
+
+
+@jit_inner
+def _least_margin(matrix, loads, low, high, scale, sides, space):
+    """The smallest margin [N] over loads (k, d); nan if the matrix is singular.
+
+    ``sides`` (k, m) say which limits a neighbour reached, or are zero; they are changed.
+    """
     least = np.inf
     for k in range(len(loads)):
-        if not null_space(matrix, loads[k], work, particular, null):
-            return np.nan
-        count = _rows(particular, null, low, high, _TOP * scale, a, b)
-        found = _largest_least(a, b, count, null.shape[1], scale, answer)
+        found = _again(matrix, loads[k], low, high, scale, sides[k], space)
+        if np.isnan(found):
+            found = _margin(matrix, loads[k], low, high, scale, sides[k], space)
+            again = _again(matrix, loads[k], low, high, scale, sides[k], space)
+            found = found if np.isnan(again) else again  # the digits that a neighbour would give
         if np.isnan(found):
             return np.nan
         least = min(least, found)
@@ -194,20 +284,23 @@ def _least_margin(matrix, loads, low, high, scale, space):
 def margins_of(matrices, loads, low, high, scale, out):
     """Margins (n,) of matrices (n, d, m) and loads (n, k, d): the smallest over k loads."""
     space = _space(*matrices.shape[1:])
+    sides = np.zeros((loads.shape[1], matrices.shape[2]), np.int64)
     for r in range(len(matrices)):
-        out[r] = _least_margin(matrices[r], loads[r], low, high, scale, space)
+        if r % _BLOCK == 0:
+            sides[:] = 0
+        out[r] = _least_margin(matrices[r], loads[r], low, high, scale, sides, space)
 
 
 @jit_allocating
 def innermost_of(matrices, loads, low, high, scale, out, tensions):
-    """Like :func:`margins_of`, with one load (n, d) and limits (n, m) each; also fills tensions.
+    """Margins of one load (n, d) and limits (n, m) each, and tensions (n, m) farthest inside.
 
-    ``tensions`` (n, m) are those that stay farthest inside; nan if the margin is not finite.
+    Tensions are nan if the margin is not finite.
     """
-    space = _space(*matrices.shape[1:])
-    null, particular, answer = space[2], space[1], space[5]
+    space, side = _space(*matrices.shape[1:]), np.zeros(matrices.shape[2], np.int64)
+    particular, null, answer = space[1], space[2], space[5]
     for r in range(len(matrices)):
-        out[r] = _least_margin(matrices[r], loads[r : r + 1], low[r], high[r], scale[r], space)
+        out[r] = _margin(matrices[r], loads[r], low[r], high[r], scale[r], side, space)
         for i in range(matrices.shape[2]):
             tensions[r, i] = particular[i] if np.isfinite(out[r]) else np.nan
             for k in range(null.shape[1]):
@@ -220,7 +313,10 @@ def margins_at(poses, exits, anchors, centre, weight, wrenches, low, high, lengt
     m = len(exits)
     matrix, load = np.empty((6, m)), np.empty((len(wrenches), 6))
     arm, unit, space = np.empty(3), np.empty(3), _space(6, m)
+    sides = np.zeros((len(wrenches), m), np.int64)
     for r in range(len(poses)):
+        if r % _BLOCK == 0:
+            sides[:] = 0
         w, x, y, z = poses[r, 3], poses[r, 4], poses[r, 5], poses[r, 6]
         for i in range(m):
             size = 0.0
@@ -247,7 +343,7 @@ def margins_at(poses, exits, anchors, centre, weight, wrenches, low, high, lengt
                 moment = arm[e] * weight[f] - arm[f] * weight[e]
                 load[k, c] = -wrenches[k, c] - weight[c]
                 load[k, 3 + c] = -(wrenches[k, 3 + c] + moment) / length
-        out[r] = _least_margin(matrix, load, low, high, scale, space)
+        out[r] = _least_margin(matrix, load, low, high, scale, sides, space)
 
 
 # Tensions that balance a load and exceed their limits by as little as possible, summed.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +47,15 @@ def fingerprint(robot: Robot) -> tomlkit.items.Table:
     for key, value in numbers.items():
         table[key] = _toml(np.round(np.asarray(value, float), _DIGITS).tolist())
     return table
+
+
+# What of a robot is words, by which no result is another.
+_WORDS = ("name", "cable_names", "source", "read", "left_out")
+
+
+def all_numbers(robot: Robot) -> dict[str, Any]:
+    """All numbers of a robot, by their names."""
+    return {one.name: getattr(robot, one.name) for one in fields(robot) if one.name not in _WORDS}
 
 
 def _toml(value: Any) -> Any:

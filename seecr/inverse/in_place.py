@@ -137,16 +137,19 @@ def turned_in_place(robot: Robot, tables: Tables, low: Array, high: Array) -> Tu
     n, home = len(tables), batch.Evaluation.empty(len(tables), robot.n_cables, robot.n_dof)
     out = Turned(robot, tables, low, high, home.deviation, home.values, np.full(n, -np.inf))
     out.search(np.arange(n), (home.deviation[:, None].copy(), home.values[:, None].copy()))
+    turns = freedoms(robot)[1]
+    if turns == 0:
+        return out
     near = _neighbours(tables.poses[:, :3])
     _spread(out, near, np.flatnonzero(out.found))
-    tilts = freedoms(robot)[1] == 1  # several may hold, and some hold from few starts
+    tilts = turns == 1  # several may hold, and some hold from few starts
     _search_all(out, near, np.ones(n, dtype=bool), _MORE if tilts else _STARTS)
     if tilts:  # the best one counts
         some = np.flatnonzero(out.found)
         out.search(some, _many_starts(out, some, _TILTS), farther=True)
     _improve(out, near[:, :0])
     _spread(out, near, np.flatnonzero(out.found))  # again, from farther inside
-    if robot.n_driven + freedoms(robot)[1] > robot.n_dof + 1:
+    if robot.n_driven + turns > robot.n_dof + 1:
         # each orientation is one of many, and some of these are cut off by the limits
         _search_all(out, near, np.any(out.found[near], axis=1), _MORE)
     _improve(out, near)

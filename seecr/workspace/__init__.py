@@ -19,12 +19,14 @@ if TYPE_CHECKING:
     from seecr.workspace.maps import default_axes, workspace_map
     from seecr.workspace.margins import boundary, held_chance, kept_chance
     from seecr.workspace.spans import SlackSpan, slack_spans
+    from seecr.workspace.stored import StoredMap, store_map
     from seecr.workspace.zones import Zone, feasible, slack_zones, tension_margin
 
 __all__ = [
-    "BarBalance", "BarManifold", "Midlines", "SlackSpan", "Workspace", "Zone", "bar_balances",
-    "bar_manifold", "boundary", "default_axes", "feasible", "held_chance", "kept_chance",
-    "midline_points", "slack_spans", "slack_zones", "tension_margin", "workspace_map",
+    "BarBalance", "BarManifold", "Midlines", "SlackSpan", "StoredMap", "Workspace", "Zone",
+    "bar_balances", "bar_manifold", "boundary", "default_axes", "feasible", "held_chance",
+    "kept_chance", "midline_points", "slack_spans", "slack_zones", "store_map", "tension_margin",
+    "workspace_map",
 ]  # fmt: skip
 
 _MODULES = {
@@ -35,7 +37,8 @@ _MODULES = {
     "grid": ("Workspace",),
     "maps": ("default_axes", "workspace_map"),
     "spans": ("SlackSpan", "slack_spans"),
-    "zones": ("Zone", "feasible", "slack_zones", "tension_margin"),
+    "stored": ("StoredMap", "store_map"),
+    "zones": ("Zone", "feasible", "slack_zones", "store_map", "tension_margin"),
 }  # fmt: skip
 
 __getattr__ = lazily(__name__, {name: m for m, names in _MODULES.items() for name in names})

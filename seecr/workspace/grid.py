@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -15,7 +15,7 @@ from seecr.description.joints import locked, off_joints, shifts
 from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.pose import Array, cross
-from seecr.result import MOTION, Record, Result, named, rows_of
+from seecr.result import MOTION, Record, Result, rows_of
 from seecr.statics.solution import Status
 from seecr.units import millimetres
 from seecr.workspace.zones import is_held
@@ -177,6 +177,12 @@ def codes_of(status: NDArray[np.object_]) -> NDArray[np.int8]:
     return out
 
 
+def steps_of(axis: Array) -> Array:
+    """How much of an axis belongs to each of its values [m]; 1 if it has a single one."""
+    step = np.abs(np.diff(axis))
+    return 0.5 * (np.r_[step, 0.0] + np.r_[0.0, step]) if len(step) else np.ones(1)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Workspace(Result):
     """The workspace on a grid of positions with one orientation; arrays are (nx, ny, nz).
@@ -290,15 +296,21 @@ class Workspace(Result):
             return np.zeros(self.margin.shape, dtype=bool)
         return np.asarray(self.status == STATUSES.index(Status.SINGULAR))
 
+    @property
+    def status_counts(self) -> dict[Status, int]:
+        """At how many poses solves ended in each way; empty without an elastic map."""
+        if self.status is None:
+            return {}
+        counts = np.bincount(self.status.ravel(), minlength=len(STATUSES))
+        return {status: int(n) for status, n in zip(STATUSES, counts, strict=True) if n}
+
     def _unrested(self) -> Iterator[tuple[Status, int, tuple[int, ...]]]:
         """Why the elastic robot is not at rest: each reason, at how many poses, and the first."""
-        if self.status is None:
-            return
-        for code, status in enumerate(STATUSES):
-            own = self.status == code
-            if status is not Status.CONVERGED and own.any():
-                first = np.unravel_index(int(np.argmax(own)), own.shape)
-                yield status, int(own.sum()), tuple(map(int, first))
+        for status, poses in self.status_counts.items():
+            if status is not Status.CONVERGED:
+                own = self.status == STATUSES.index(status)
+                first = np.unravel_index(int(np.argmax(own)), self.margin.shape)
+                yield status, poses, tuple(map(int, first))
 
     def place(self, at: tuple[int, ...]) -> str:
         """Where a pose of the grid is, in words; its index is given."""
@@ -325,11 +337,7 @@ class Workspace(Result):
         It is half a cell at the ends of an axis, so that all of them add up to the box between the
         ends.
         """
-        along = []
-        for axis in self.axes:
-            step = np.abs(np.diff(axis))
-            along.append(0.5 * (np.r_[step, 0.0] + np.r_[0.0, step]) if len(step) else np.ones(1))
-        return np.asarray(np.einsum("i,j,k->ijk", *along))
+        return np.asarray(np.einsum("i,j,k->ijk", *map(steps_of, self.axes)))
 
     def size(self, poses: NDArray[np.bool_]) -> float:
         """Size of the part of the grid's box that belongs to some poses (nx, ny, nz)."""
@@ -425,21 +433,21 @@ class Workspace(Result):
         return rows_of(self.columns())
 
     def columns(self) -> dict[str, Any]:
-        """The columns of the rows, an array or a list each."""
+        """The columns of the rows, an array each."""
         places, names = self.places.reshape(-1, 3), None
         if self.status is not None:
             names = np.array([one.name for one in STATUSES], object)[self.status.ravel()]
         return {
-            **named("{}_m", "xyz", places),
+            **_columns("{}_m", "xyz", places),
             "margin_N": self.margin.ravel(),
             "feasible": self.feasible.ravel(),
             **({} if self.chance is None else {"probability": self.chance.ravel()}),
             "slack": self.slack.ravel(),
             **({} if names is None else {"status": names}),
-            **named("d{}_m", "xyz", self.deviation.reshape(-1, 3)),
-            **named("r{}_rad", "xyz", self.rotation.reshape(-1, 3)),
+            **_columns("d{}_m", "xyz", self.deviation),
+            **_columns("r{}_rad", "xyz", self.rotation),
             "smallest_eigenvalue_N_per_m": self.stiffness.ravel(),
-            **named("softest_{}", MOTION, self.softest.reshape(-1, 6)),
+            **_columns("softest_{}", MOTION, self.softest),
         }
 
     def as_json(self, at_least: float | None = None) -> Record:
@@ -499,6 +507,11 @@ class Workspace(Result):
                 "direction": self.softest[at],
             },
         }
+
+
+def _columns(pattern: str, names: Sequence[str], values: NDArray[Any]) -> dict[str, NDArray[Any]]:
+    """Values (..., k) as columns, with keys from the pattern and each name."""
+    return {pattern.format(name): values[..., k].ravel() for k, name in enumerate(names)}
 
 
 # How a map is cut into slices and where its colours end: the same in pictures and recordings.

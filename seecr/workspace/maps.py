@@ -5,24 +5,23 @@ Grids are processed in parts, so that memory for a million poses is that of the 
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass
-from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seecr.arguments import finite, whole
+from seecr.arguments import finite, silent, whole
 from seecr.commands import Commands
 from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
-from seecr.parallel import as_done, run_parts
+from seecr.parallel import BLOCK, as_done, threads
 from seecr.pose import NORM_TOLERANCE, Array
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.prediction.model import GivenEffects
@@ -43,8 +42,8 @@ Progress = Callable[[int], None]
 
 MOST_POSES = 10_000_000
 """Of a grid or line; more would take days, and all memory."""
-# Poses per part.
-_PART = 5_000
+# Poses that are solved at a time: of all numbers that are kept of a pose, most are not results.
+_PART = 78 * BLOCK
 # Tasks of an executor that a grid is divided into, so that many workers end at about one time; a
 # task of fewer poses is not worth sending, and of more its results fill memory.
 _TASKS, _SMALLEST, _LARGEST = 64, 128, 200_000
@@ -146,7 +145,7 @@ def workspace_map(
     effects: GivenEffects = (),
     elastic: bool = True,
     chance: bool = False,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     executor: Executor | None = None,
 ) -> Workspace:
     """The static-feasible and the elastic workspace on a grid of positions.
@@ -181,80 +180,101 @@ def workspace_map(
     Example:
         ``seecr.workspace_map(robot, [0.3, 0.4], [0.2, 0.3], [0.15]).margin``
     """
+    limits = lowest, highest, wrenches
+    job = map_job(robot, (x, y, z), orientation, limits, effects, elastic, chance)
+    n, found = job.poses, job.blank()
+    size = _PART if executor is None else min(max(-(-n // _TASKS), _SMALLEST), _LARGEST)
+    parts = in_pieces(slice(0, n), -(-size // BLOCK) * BLOCK)
+    workers = threads() if executor is None and len(parts) > 1 else executor
+    with closing(as_done(job.part, parts, workers)) as results:
+        for i, columns in results:
+            for name, values in columns.items():
+                found[name][parts[i]] = values
+            progress(parts[i].stop - parts[i].start)
+    return job.workspace(found)
+
+
+def in_pieces(part: slice, size: int) -> list[slice]:
+    """A range of poses in pieces of at most so many."""
+    return [slice(k, min(k + size, part.stop)) for k in range(part.start, part.stop, size)]
+
+
+def map_job(
+    robot: GivenRobot, axes: Sequence[ArrayLike], orientation: ArrayLike | None,
+    limits: tuple[ArrayLike, ArrayLike, ArrayLike | None], effects: GivenEffects, elastic: bool,
+    chance: bool,
+) -> MapJob:  # fmt: skip
+    """What :func:`seecr.workspace_map` is asked for, checked; arguments and errors are its own."""
     robot = robot_of(robot)
     effects = read_once(effects, robot)
-    axes = (_axis("x", x), _axis("y", y), _axis("z", z))
+    x, y, z = (_axis(name, values) for name, values in zip("xyz", axes, strict=True))
     if chance:
         check_chance(effects)
     if elastic or robot.n_driven < robot.n_dof:
         _refuse_memory(robot, effects)
     turned = robot.reference_pose[3:] if orientation is None else _quaternion(orientation)
     directions = own_directions(robot)
-    refuse_unreached(robot, axes, turned, directions)
-    shape = (len(axes[0]), len(axes[1]), len(axes[2]))
-    n = int(np.prod(shape))
-    job = _Grid(
-        robot, axes, turned, directions, effects, elastic, chance, (lowest, highest, wrenches)
-    )
-    found: dict[str, NDArray[Any]] = {
-        "margin": np.empty(n), "slack": np.full(n, NEVER, np.int8),
-        "moved": np.full((n, 6), np.nan, np.float32), "stiffness": np.full(n, np.nan, np.float32),
-        "softest": np.full((n, 6), np.nan, np.float32),
-        **({"likely": np.empty(n, np.float32)} if chance else {}),
-        **({"status": np.empty(n, np.int8)} if elastic else {}),
-    }  # fmt: skip
-
-    def fill(part: slice, columns: dict[str, NDArray[Any]]) -> None:
-        for name, values in columns.items():
-            found[name][part] = values
-
-    if executor is None:
-        parts = _parts(0, n, _PART)
-        _run_telling(lambda part: fill(part, job.part(part)), parts, progress)
-    else:
-        parts = _parts(0, n, min(max(-(-n // _TASKS), _SMALLEST), _LARGEST))
-        with closing(as_done(job.task, parts, executor)) as results:
-            for i, done in results:
-                for part, columns in done:
-                    fill(part, columns)
-                if progress is not None:
-                    progress(parts[i].stop - parts[i].start)
-    moved, softest = found["moved"], found["softest"]
-    return Workspace(
-        robot, axes, np.asarray(turned), found["margin"].reshape(shape),
-        moved[:, :3].reshape(*shape, 3), moved[:, 3:].reshape(*shape, 3),
-        found["slack"].reshape(shape), found["stiffness"].reshape(shape),
-        softest.reshape(*shape, -1), found["likely"].reshape(shape) if chance else None, elastic,
-        found["status"].reshape(shape) if elastic else None, directions,
-    )  # fmt: skip
-
-
-def _parts(start: int, stop: int, size: int) -> list[slice]:
-    return [slice(k, min(k + size, stop)) for k in range(start, stop, size)]
+    refuse_unreached(robot, (x, y, z), turned, directions)
+    return MapJob(robot, (x, y, z), turned, directions, effects, elastic, chance, limits)
 
 
 @dataclass(frozen=True)
-class _Grid:
+class MapJob:
     """What is computed at the poses of a grid; sent as one to whoever computes a part of it."""
 
     robot: Robot
     axes: tuple[Array, Array, Array]
-    turned: ArrayLike
+    turned: Array
     directions: Array | None
     effects: GivenEffects
     elastic: bool
     chance: bool
     limits: tuple[ArrayLike, ArrayLike, ArrayLike | None]
 
-    def task(self, part: slice) -> list[tuple[slice, dict[str, NDArray[Any]]]]:
-        """A part of many poses, in smaller ones for the sake of memory."""
-        return [(one, self.part(one)) for one in _parts(part.start, part.stop, _PART)]
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Values on each axis."""
+        x, y, z = self.axes
+        return len(x), len(y), len(z)
+
+    @property
+    def poses(self) -> int:
+        """Poses of the grid."""
+        return math.prod(self.shape)
+
+    def blank(self) -> dict[str, NDArray[Any]]:
+        """Arrays for the results at all poses, one after the other."""
+        n = self.poses
+        return {
+            "margin": np.empty(n), "slack": np.full(n, NEVER, np.int8),
+            "moved": np.full((n, 6), np.nan, np.float32),
+            "stiffness": np.full(n, np.nan, np.float32),
+            "softest": np.full((n, 6), np.nan, np.float32),
+            **({"likely": np.empty(n, np.float32)} if self.chance else {}),
+            **({"status": np.empty(n, np.int8)} if self.elastic else {}),
+        }  # fmt: skip
+
+    def workspace(self, found: Mapping[str, NDArray[Any]]) -> Workspace:
+        """The workspace of which all results are known."""
+        grid = {name: values.reshape(*self.shape, *values.shape[1:])
+                for name, values in found.items()}  # fmt: skip
+        return Workspace(
+            robot=self.robot, axes=self.axes, orientation=np.asarray(self.turned),
+            margin=grid["margin"], deviation=grid["moved"][..., :3],
+            rotation=grid["moved"][..., 3:], slack=grid["slack"], stiffness=grid["stiffness"],
+            softest=grid["softest"], chance=grid.get("likely"), elastic=self.elastic,
+            status=grid.get("status"), directions=self.directions,
+        )  # fmt: skip
 
     def part(self, part: slice) -> dict[str, NDArray[Any]]:
-        """Margins and equilibria of a part of the grid's poses."""
+        """Margins and equilibria of a range of poses, in small pieces for the sake of memory."""
+        pieces = [self._piece(piece) for piece in in_pieces(part, _PART)]
+        return {name: np.concatenate([one[name] for one in pieces]) for name in pieces[0]}
+
+    def _piece(self, part: slice) -> dict[str, NDArray[Any]]:
         robot, effects, (lowest, highest, wrenches) = self.robot, self.effects, self.limits
-        rows, shape = np.arange(part.start, part.stop), [len(axis) for axis in self.axes]
-        index = np.unravel_index(rows, shape)
+        rows = np.arange(part.start, part.stop)
+        index = np.unravel_index(rows, self.shape)
         places = np.column_stack([axis[k] for axis, k in zip(self.axes, index, strict=True)])
         places = places if self.directions is None else places @ self.directions
         poses = commanded_poses(np.column_stack([places, np.tile(self.turned, (len(rows), 1))]))
@@ -311,28 +331,6 @@ def with_history(robot: GivenRobot, effects: GivenEffects) -> list[str]:
     robot = robot_of(robot)
     at_home = Experiment(robot, Commands(robot.reference_pose[None]))
     return [one.name for one in effects_of(effects, robot) if at_home.setup([one]).has_history]
-
-
-def _run_telling(
-    fill: Callable[[slice], None], parts: list[slice], progress: Progress | None
-) -> None:
-    """Fill all parts in several threads; the calling thread reports progress for all of them."""
-    if progress is None:
-        return run_parts(fill, parts)
-    here, done = threading.current_thread(), SimpleQueue[int]()
-
-    def tell() -> None:
-        progress(sum(done.get() for _ in range(done.qsize())))
-
-    def one(part: slice) -> None:
-        fill(part)
-        done.put(part.stop - part.start)
-        if threading.current_thread() is here:
-            tell()
-
-    run_parts(one, parts)
-    if not done.empty():
-        tell()
 
 
 def _axis(name: str, values: ArrayLike) -> Array:

@@ -252,20 +252,20 @@ def test_a_map_without_the_elastic_robot_has_no_status(tmp_path: Path) -> None:
 
 def test_a_map_is_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = robot_named("demobot_parallel")
-    axes = np.linspace(0.2, 0.6, 5), np.linspace(0.2, 0.3, 2), np.array([0.1, 0.2])
+    axes = np.linspace(0.1, 0.7, 10), np.linspace(0.1, 0.4, 4), np.linspace(0.1, 0.4, 4)
     whole, done = workspace_map(robot, *axes), list[int]()
 
     def tell(poses: int) -> None:
         assert threading.current_thread() is threading.main_thread()
         done.append(poses)
 
-    monkeypatch.setattr(maps, "_PART", 3)
+    monkeypatch.setattr(maps, "_PART", parallel.BLOCK)
     for processors in (1, 2):
         done.clear()
         monkeypatch.setattr(parallel, "processors", lambda n=processors: n)
         parts = workspace_map(robot, *axes, progress=tell)
-        assert sum(done) == 20 and min(done) > 0
-        assert processors > 1 or done == [3, 3, 3, 3, 3, 3, 2]
+        assert sum(done) == 160 and min(done) > 0
+        assert processors > 1 or done == [64, 64, 32]
         for name in ("margin", "deviation", "rotation", "slack", "stiffness", "softest", "status"):
             np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
 
@@ -339,6 +339,15 @@ def test_margins_of_too_few_cables_are_those_of_tensions_that_hold(name: str) ->
         less = margins_in_place(robot, pose[None], (), 0.6 * margin, np.inf)
         np.testing.assert_allclose(less, 0.4 * margin, rtol=0.02)
         assert margins_in_place(robot, pose[None], (), 1.05 * margin, np.inf)[0] == -np.inf
+
+
+def test_a_cable_on_slides_alone_holds_only_what_hangs_below_it() -> None:
+    """There is no orientation to look for: that was an error where the platform was above."""
+    hung = Robot.from_points([[0, 0, 3]], [0, 0, 0], mass=2, ea=1000, at=[0, 0, 1])
+    found = workspace_map(hung, [0.0, 0.3], 0.0, [1.0, 3.5])
+    assert found.feasible.ravel().tolist() == [True, False, False, False]
+    assert found.margin[0, 0, 0] == pytest.approx(2.0 * 9.81)
+    assert np.all(np.isneginf(found.margin[~found.feasible]))
 
 
 def only_cables(robot: Robot, some: list[int]) -> Robot:
