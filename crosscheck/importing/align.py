@@ -11,11 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.registration import turn_of_points
-from crosscheck.measurements.dwells import mean_rotation
+from crosscheck.importing.dwells import about_mean
 from seecr.counted import counted
 from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate, rotvec_from_quat
 from seecr.units import millimetres
@@ -109,8 +108,7 @@ def unturned(frames: Frames, position: Array, quat: Array | None, told: Array) -
     turned = frames.poses(position, quat)[1]
     if turned is None or np.ptp(told[:, 3:], axis=0).max() > 0.0:
         return []
-    turn = rotvec_from_quat(quat_multiply(turned, quat_conjugate(mean_rotation(turned))))
-    rms = float(np.sqrt(np.mean(np.sum(turn**2, axis=1))))
+    rms = _turning(turned)
     if rms <= _TURNED:
         return []
     return [
@@ -168,7 +166,7 @@ def to_commands(position: Array, quat: Array | None, told: Array, target: Array 
         )
     home = told[:, 3:]
     shift = np.zeros(3) if target is None else target
-    tilted = _varies(home) if target is None else False
+    tilted = target is None and _turning(home) > _TURNED
     turn = None
     for _ in range(_ROUNDS if tilted else 1):
         turn = turn_of_points(position, told[:, :3] + quat_rotate(home, shift))
@@ -198,8 +196,7 @@ def with_target(frames: Frames, quat: Array | None, told: Array, target: Array |
         return replace(frames, free=free)
     base = quat_multiply(frames.turn, quat)
     inside = quat_multiply(quat_conjugate(told[:, 3:]), base)
-    turn = mean_rotation(inside)
-    away = rotvec_from_quat(quat_multiply(inside, quat_conjugate(turn)))
+    turn, away = about_mean(inside)
     left = np.degrees(np.sqrt(np.mean(np.sum(away**2, axis=1))))
     angle = np.degrees(np.linalg.norm(rotvec_from_quat(turn)))
     how = (
@@ -225,9 +222,9 @@ def _target(base: Array, told: Array) -> Array:
     return np.asarray(found[3:])
 
 
-def _varies(quat: Array) -> bool:
-    turns = Rotation.from_quat(quat, scalar_first=True)
-    return bool(np.sqrt(np.mean((turns * turns.mean().inv()).magnitude() ** 2)) > _TURNED)
+def _turning(quat: Array) -> float:
+    """The rms angle [rad] of rotations (n, 4) from their mean."""
+    return float(np.sqrt(np.mean(np.sum(about_mean(quat)[1] ** 2, axis=1))))
 
 
 def _aside(points: Array) -> float:

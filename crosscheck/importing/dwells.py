@@ -7,12 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from crosscheck.importing.logs import Stream
 from crosscheck.measurements.dwells import mean_error, mean_rotation
 from seecr.counted import counted
-from seecr.pose import Array
+from seecr.pose import Array, quat_conjugate, quat_multiply, rotvec_from_quat
 
 REST_FOR = 0.5
 """Shortest dwell [s]."""
@@ -205,10 +204,9 @@ def _averaged(stream: Stream, bounds: list[tuple[int, int]], limit: float) -> Dw
     quat = stream.quat_wxyz
     mean = np.array([stream.position[k].mean(axis=0) for k in rows])
     away = [stream.position[k] - m for k, m in zip(rows, mean, strict=True)]
-    turns = None if quat is None else [mean_rotation(quat[k]) for k in rows]
-    turned = [np.zeros((len(k), 3)) for k in rows]
-    if quat is not None and turns is not None:
-        turned = [_about(quat[k], turn) for k, turn in zip(rows, turns, strict=True)]
+    turns, turned = None, [np.zeros((len(k), 3)) for k in rows]
+    if quat is not None:
+        turns, turned = map(list, zip(*(about_mean(quat[k]) for k in rows), strict=True))
     return Dwells(
         start=start,
         stop=stop,
@@ -227,10 +225,11 @@ def _averaged(stream: Stream, bounds: list[tuple[int, int]], limit: float) -> Dw
     )
 
 
-def _about(quat: Array, mean: Array) -> Array:
-    """Rotation vectors (n, 3) [rad] of rotations relative to their mean."""
-    middle = Rotation.from_quat(mean, scalar_first=True)
-    return np.asarray((Rotation.from_quat(quat, scalar_first=True) * middle.inv()).as_rotvec())
+def about_mean(quat: Array) -> tuple[Array, Array]:
+    """The mean (4,) of rotations (n, 4), and rotation vectors (n, 3) [rad] from it to each."""
+    mean = mean_rotation(quat)
+    back = np.tile(quat_conjugate(mean), (len(quat), 1))
+    return mean, rotvec_from_quat(quat_multiply(quat, back))
 
 
 def _rms(values: Array) -> float:

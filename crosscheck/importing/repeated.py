@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from crosscheck.importing.dwells import about_mean
 from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.measurements.dwells import mean_rotation
 from seecr.counted import counted
-from seecr.pose import Array, quat_conjugate, quat_multiply, rotvec_from_quat
+from seecr.pose import Array
 
 # From so many further visits on the size is known to a factor of 1.4, as a stated one is: that of
 # three coordinates has a relative error of 1 / sqrt(6 n), twice which is 0.4.
@@ -37,7 +37,7 @@ def repeated(data: Measurements, scatter: Sigma) -> tuple[Sigma, str, str]:
     quat = data.quat_wxyz
     kinds = {
         "position_m": [_off(data.position[rows]) for rows in visits],
-        "orientation_rad": [] if quat is None else [_turned(quat[rows]) for rows in visits],
+        "orientation_rad": [] if quat is None else [about_mean(quat[rows])[1] for rows in visits],
         "tension_N": [_off(data.tensions[rows]) for rows in visits],
     }
     further = sum(len(rows) - 1 for rows in visits)
@@ -71,11 +71,6 @@ def _visits(data: Measurements) -> list[list[int]]:
 
 def _off(values: Array) -> Array:
     return np.asarray(values - values.mean(axis=0))
-
-
-def _turned(quat: Array) -> Array:
-    mean = mean_rotation(quat)
-    return rotvec_from_quat(quat_multiply(quat, np.tile(quat_conjugate(mean), (len(quat), 1))))
 
 
 def _pooled(off: list[Array], visits: list[list[int]]) -> float | None:

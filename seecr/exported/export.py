@@ -40,6 +40,7 @@ _BODIES = frozenset(
      "wrench")
 )  # fmt: skip
 _LENGTHS = frozenset(name for name, item in QUANTITIES.items() if item.paid_out)
+_KNOWN = _PLAIN | _BODIES | _LENGTHS
 _PAST = frozenset(name for name, item in QUANTITIES.items() if item.history is not History.NONE)
 
 PAST = "it depends on the motion before"
@@ -70,43 +71,32 @@ class Expressed:
     nowhere: tuple[tuple[Effect, str], ...]
 
 
-def expressed(robot: Robot, effects: Sequence[Effect]) -> Expressed:
-    """Sort effects by where MJCF can express them."""
-    plain: list[Effect] = []
-    bodies: list[Effect] = []
-    lengths: list[Effect] = []
-    nowhere: list[tuple[Effect, str]] = []
-    for effect in effects:
-        edits, law = _edits(robot, effect)
-        if law:
-            nowhere.append((effect, LAW))
-        elif edits & _PAST:
-            nowhere.append((effect, PAST))
-        elif edits and "temperature" in effect.needs:
-            nowhere.append((effect, WARM))
-        elif edits & _BODIES:
-            bodies.append(effect)
-        elif edits & _PLAIN:
-            plain.append(effect)
-        elif edits & _LENGTHS:
-            lengths.append(effect)
-        elif senses(type(effect)):
-            nowhere.append((effect, SENSED))
-    yields = [one for one in bodies if "lift" in _edits(robot, one)[0]]
-    if yields and any("pulley_radius" in _edits(robot, one)[0] for one in bodies):
-        nowhere += [(one, LIFTED_SHEAVE) for one in yields]
-        bodies = [one for one in bodies if one not in yields]
-    return Expressed(tuple(plain), tuple(bodies), tuple(lengths), tuple(nowhere))
+def expressed(robot: Robot, effects: Sequence[Effect], soft: bool = False) -> Expressed:
+    """Sort effects by where MJCF can express them.
 
-
-def without_law(robot: Robot, said: Expressed) -> Expressed:
-    """The same without the effects that bend the cables' elastic law."""
-    bent = [one for one in said.bodies if _edits(robot, one)[0] & {"quadratic", "cubic"}]
-    return replace(
-        said,
-        bodies=tuple(one for one in said.bodies if one not in bent),
-        nowhere=(*said.nowhere, *((one, SOFT) for one in bent)),
-    )
+    Args:
+        robot: as described. effects: with their values.
+        soft: whether cables are stretched to where their polynomial falls, as MuJoCo's then does.
+    """
+    said: dict[str, list[Any]] = {"plain": [], "bodies": [], "lengths": [], "nowhere": []}
+    every = [_edits(robot, effect) for effect in effects]
+    lifts = any("lift" in edits for edits, _law in every)
+    wheels = any("pulley_radius" in edits for edits, _law in every)
+    for effect, (edits, law) in zip(effects, every, strict=True):
+        reasons = {
+            LAW: law,
+            PAST: edits & _PAST,
+            WARM: edits and "temperature" in effect.needs,
+            LIFTED_SHEAVE: lifts and wheels and "lift" in edits,
+            SOFT: soft and edits & {"quadratic", "cubic"},
+            SENSED: not edits & _KNOWN and senses(type(effect)),
+        }
+        places = {"bodies": _BODIES, "plain": _PLAIN, "lengths": _LENGTHS}
+        if why := next((why for why, holds in reasons.items() if holds), ""):
+            said["nowhere"].append((effect, why))
+        elif place := next((place for place, some in places.items() if edits & some), ""):
+            said[place].append(effect)
+    return Expressed(**{place: tuple(some) for place, some in said.items()})
 
 
 def _edits(robot: Robot, effect: Effect) -> tuple[set[str], bool]:
@@ -290,7 +280,7 @@ def _sorted(
     said = expressed(robot, effects)
     solution = _rest(robot, said, pose)
     if solution is not None and _softens(solution):
-        said = without_law(robot, said)
+        said = expressed(robot, effects, soft=True)
         solution = _rest(robot, said, pose)
     return said, solution
 
