@@ -1,7 +1,8 @@
-"""``crosscheck compare``: a model against measurements."""
+"""``crosscheck compare``: a model against measurements, or two models against each other."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -9,8 +10,15 @@ import click
 from crosscheck.cli import choices
 from crosscheck.cli.following import Given, after_comparison
 from seecr.cli import options
+from seecr.cli.following import following
 from seecr.cli.progress import progress_share
 from seecr.cli.results import made_by
+
+# Files that are two models, or their diagnoses.
+_SUFFIXES = (".toml", ".json")
+# Options of `compare` that are for two models alone, and those that are for either.
+_THEIRS = ("model_out", "fail_on")
+_EITHER = ("out", "as_json")
 
 
 @options.command(
@@ -62,10 +70,8 @@ def command(
     components, as in the tables, or on the worst row (the length of its error vector).
     Exit status: 0 all well, 1 a limit exceeded, 2 bad input, 3 rows without an equilibrium.
     """
-    from crosscheck.cli.two_models import are_models, compare_two
-
-    if are_models(robot, data):
-        return compare_two(robot, data[0], out, model_out, fail_on, as_json)
+    if _are_models(robot, data):
+        return _compare_two(robot, data[0], out, model_out, fail_on, as_json)
     from crosscheck import Limits, Sigma, compare, exceeded, load_limits, load_measurements
     from crosscheck.show.pictures import write_page
     from seecr import load_model, with_history
@@ -113,3 +119,76 @@ def command(
     given = Given(robot, data, model, sigmas, lengths, history)
     click.echo(after_comparison(found, given))
     return status
+
+
+# Two models instead of one and its measurements.
+
+
+def _are_models(robot: Path, data: Sequence[Path]) -> bool:
+    """Whether the files of ``compare`` are two models or diagnoses, by what they are called.
+
+    Raises:
+        UsageError: some are, and others are not, or there are more than two; or options of the
+            other way.
+    """
+    files = [robot, *data]
+    models = [file for file in files if file.suffix.lower() in _SUFFIXES]
+    if models and (len(files) != 2 or len(models) != 2):
+        raise click.UsageError(
+            "expected ROBOT.xml DATA.csv..., or two models (A.toml B.toml) or diagnoses "
+            f"(diagnosis.json) of one robot; got {' '.join(map(str, files))}"
+        )
+    _check_options(bool(models))
+    return bool(models)
+
+
+def _check_options(models: bool) -> None:
+    """Refuse options of the other way of ``compare``."""
+    context = click.get_current_context()
+    default = click.core.ParameterSource.DEFAULT
+    for param in context.command.params:
+        of_either = param.name in _EITHER or not param.expose_value
+        if not isinstance(param, click.Option) or param.name is None or of_either:
+            continue
+        given = context.get_parameter_source(param.name) not in (default, None)
+        if given and (param.name in _THEIRS) != models:
+            way = "two models" if param.name in _THEIRS else "ROBOT.xml DATA.csv..."
+            raise click.UsageError(f"{param.opts[0]} is for compare {way}; leave it out")
+
+
+def _compare_two(
+    before: Path, now: Path, out: Path, model_out: Path | None, fail_on: Sequence[str],
+    as_json: bool,
+) -> int:  # fmt: skip
+    """Compare two models, and keep what was found."""
+    from crosscheck import compare_models, save_model
+    from crosscheck.model.write import check_place
+    from crosscheck.show.models import print_models
+    from seecr.files import json_text, write_text
+    from seecr.folders import staged
+
+    if wrong := [word for word in fail_on if word != "moved"]:
+        raise click.UsageError(f"--fail-on: expected moved, got {wrong[0]}")
+    if model_out is not None:
+        check_place(model_out)
+    made = made_by(before, now)
+    with staged(out, names=["models.json"], read=[before, now], made=made) as folder:
+        found = compare_models(before, now)
+        status = 1 if (fail_on and found.differs) or _unwritten(found.pooled, model_out) else 0
+        text = json_text({"made": made, "exit_status": status, **found.as_json()})
+        write_text(folder / "models.json", text + "\n")
+    if model_out is not None and found.pooled is not None:
+        save_model(model_out, found.pooled)
+    if as_json:
+        click.echo(text)
+        return status
+    print_models(found, model_out)
+    click.echo(f"Results in {out}/")
+    kept = model_out if model_out is not None and found.pooled is not None else now
+    model = ("--model", kept) if kept.suffix.lower() == ".toml" else ()
+    click.echo(following("crosscheck", "compare", "ROBOT.xml", "DATA.csv", *model))
+    return status
+
+
+def _unwritten(pooled: object, model_out: Path | None) -> bool:
+    return model_out is not None and pooled is None

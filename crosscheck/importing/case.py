@@ -28,9 +28,9 @@ from crosscheck.importing.align import (
 from crosscheck.importing.choices import ImportChoices
 from crosscheck.importing.join import commanded, joined
 from crosscheck.importing.logs import Logged
-from crosscheck.importing.repeated import repeated
+from crosscheck.importing.noise import noise_of_dwells, noise_words, repeated
 from crosscheck.importing.take import READERS, Take, take_of
-from crosscheck.measurements.data import LEAST, Measurements, Sigma
+from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.read import load_commands, together
 from crosscheck.measurements.write import write_measurements
 from seecr.columns.csv import read_table, table_text
@@ -109,10 +109,6 @@ def _note(take: Take, far: NDArray[np.bool_], off: Array, usual: float) -> str:
     )
 
 
-# Samples that scatter by less than this part of the least change between them show the last digit
-# written and no noise. From q / 2 on, the mean of numbers rounded to q is off by 0.002 q at most:
-# q exp(-2 (pi / 2)^2) / pi, the first term of the Fourier series of the rounding error.
-_DIGITS = 0.5
 # Significant digits of numbers about dwells.
 _WRITTEN = 6
 # Time between consecutive recordings [s].
@@ -245,7 +241,7 @@ def import_case(
         frames = _frames(robot, takes, choices)
     parts = [_measured(take, frames) for take in takes]
     measured = _one([part for part, _noise in parts])
-    scatter = _sigma(takes, [noise for _part, noise in parts])
+    scatter = noise_of_dwells(takes, [noise for _part, noise in parts])
     sigma, origin, repeats = repeated(measured, scatter)
     measured = replace(
         measured, sigma=sigma, sigma_source=origin, free=frames.free,
@@ -253,7 +249,14 @@ def import_case(
     )  # fmt: skip
     off = off_commands(frames, *_rests(robot, takes)) if choices.aligned else []
     off += unturned(frames, *_rests(robot, takes)) if robot.n_driven >= robot.n_dof else []
-    notes = (*said, *strays, frames.how, *off, _noise(replace(measured, sigma=scatter)), repeats)
+    notes = (
+        *said,
+        *strays,
+        frames.how,
+        *off,
+        noise_words(replace(measured, sigma=scatter)),
+        repeats,
+    )
     found = Imported(robot, measured, frames, tuple(takes), notes)
     if source is not None:
         write_case(found, source, Path(str(out)))
@@ -353,48 +356,3 @@ def _one(parts: Sequence[Measurements]) -> Measurements:
         t_s[own] += t_s[whole.file == k - 1][-1] + _BETWEEN - t_s[own][0]
     one = np.zeros(whole.n_rows, dtype=np.int64)
     return replace(whole, t_s=t_s, files=(), file=one, notes=())
-
-
-def _sigma(takes: Sequence[Take], tensions: Sequence[Array]) -> Sigma:
-    """The noise of means, over all dwells; None if the rounding in the files hides it."""
-
-    def pooled(values: Array) -> float | None:
-        rms = _rms(values)
-        return float(f"{rms:.3g}") if rms > LEAST else None
-
-    def of_means(unit: str) -> float | None:
-        error, scatter, step = (
-            np.concatenate([getattr(t.dwells, f"{what}_{unit}")[t.used] for t in takes])
-            for what in ("error", "scatter", "step")
-        )
-        hidden = _rms(scatter) < _DIGITS * np.min(step, initial=np.inf)
-        return None if hidden else pooled(error)
-
-    pulls = np.concatenate([noise[noise > 0.0] for noise in tensions])
-    return Sigma(of_means("m"), of_means("rad"), pooled(pulls))
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
-
-
-def _noise(measured: Measurements) -> str:
-    sigma, parts = measured.sigma, []
-    if sigma.position_m:
-        parts.append(f"position {1e3 * sigma.position_m:.2g} mm")
-    if sigma.orientation_rad:
-        parts.append(f"orientation {np.degrees(sigma.orientation_rad):.2g} deg")
-    if sigma.tension_N:
-        parts.append(f"tension {sigma.tension_N:.2g} N")
-    out = (
-        "noise of the means, estimated from the means of parts of each dwell: "
-        f"{', '.join(parts) or 'none'}"
-    )
-    hidden = ["position"] * (sigma.position_m is None)
-    hidden += ["orientation"] * (sigma.orientation_rad is None and measured.quat_wxyz is not None)
-    if not hidden:
-        return out
-    return (
-        f"{out}; {' and '.join(hidden)} not stated: within a dwell only the last digit changes, if "
-        "any, which shows no noise; other commands estimate it"
-    )

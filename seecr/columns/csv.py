@@ -17,10 +17,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.columns.cells import NOT_READ, OF_NUMBERS, Style, fault_of, is_comment, is_statistic
+from seecr.columns.cells import (
+    NOT_READ,
+    OF_NUMBERS,
+    Style,
+    decoded,
+    fault_of,
+    is_comment,
+    is_statistic,
+    is_workbook,
+    sheet_rows,
+)
 from seecr.columns.cells import show as show  # for those who read tables
 from seecr.columns.headers import QUANTITY, numbered_headers, spelled
-from seecr.columns.sheets import decoded, is_workbook, sheet_rows
 from seecr.counted import counted, plural, some
 from seecr.errors import InputFileError, MissingPackageError, printable
 from seecr.files import of_sheet, read_bytes

@@ -1,4 +1,4 @@
-"""How well poses repeat that the robot was sent to several times: more than dwells can show.
+"""The noise of imported poses: within dwells, and between visits, which show more.
 
 An error that stays the same for a whole dwell, such as a tracker's in its volume or a platform that
 sticks, is in no scatter within dwells. What repeats at one place in every visit is in neither.
@@ -6,19 +6,72 @@ sticks, is in no scatter within dwells. What repeats at one place in every visit
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from crosscheck.importing.dwells import about_mean
-from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.importing.take import Take
+from crosscheck.measurements.data import LEAST, Measurements, Sigma
 from seecr.counted import counted
 from seecr.pose import Array
 
 # From so many further visits on the size is known to a factor of 1.4, as a stated one is: that of
 # three coordinates has a relative error of 1 / sqrt(6 n), twice which is 0.4.
 _LEAST_VISITS = 4
-_DIGITS = 3
+_WRITTEN = 3
+
+# Samples that scatter by less than this part of the least change between them show the last digit
+# written and no noise. From q / 2 on, the mean of numbers rounded to q is off by 0.002 q at most:
+# q exp(-2 (pi / 2)^2) / pi, the first term of the Fourier series of the rounding error.
+_DIGITS = 0.5
+
+
+def noise_of_dwells(takes: Sequence[Take], tensions: Sequence[Array]) -> Sigma:
+    """The noise of means, over all dwells; None if the rounding in the files hides it."""
+
+    def pooled(values: Array) -> float | None:
+        rms = _rms(values)
+        return float(f"{rms:.3g}") if rms > LEAST else None
+
+    def of_means(unit: str) -> float | None:
+        error, scatter, step = (
+            np.concatenate([getattr(t.dwells, f"{what}_{unit}")[t.used] for t in takes])
+            for what in ("error", "scatter", "step")
+        )
+        hidden = _rms(scatter) < _DIGITS * np.min(step, initial=np.inf)
+        return None if hidden else pooled(error)
+
+    pulls = np.concatenate([noise[noise > 0.0] for noise in tensions])
+    return Sigma(of_means("m"), of_means("rad"), pooled(pulls))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
+
+
+def noise_words(measured: Measurements) -> str:
+    """How large the noise of means is, and of which kind it is not stated."""
+    sigma, parts = measured.sigma, []
+    if sigma.position_m:
+        parts.append(f"position {1e3 * sigma.position_m:.2g} mm")
+    if sigma.orientation_rad:
+        parts.append(f"orientation {np.degrees(sigma.orientation_rad):.2g} deg")
+    if sigma.tension_N:
+        parts.append(f"tension {sigma.tension_N:.2g} N")
+    out = (
+        "noise of the means, estimated from the means of parts of each dwell: "
+        f"{', '.join(parts) or 'none'}"
+    )
+    hidden = ["position"] * (sigma.position_m is None)
+    hidden += ["orientation"] * (sigma.orientation_rad is None and measured.quat_wxyz is not None)
+    if not hidden:
+        return out
+    return (
+        f"{out}; {' and '.join(hidden)} not stated: within a dwell only the last digit changes, if "
+        "any, which shows no noise; other commands estimate it"
+    )
 
 
 def repeated(data: Measurements, scatter: Sigma) -> tuple[Sigma, str, str]:
@@ -80,4 +133,4 @@ def _pooled(off: list[Array], visits: list[list[int]]) -> float | None:
         (len(rows) - 1) * int(np.isfinite(one).all(axis=0).sum())
         for one, rows in zip(off, visits, strict=False)
     )
-    return float(f"{np.sqrt(squares / count):.{_DIGITS}g}") if squares > 0.0 else None
+    return float(f"{np.sqrt(squares / count):.{_WRITTEN}g}") if squares > 0.0 else None
