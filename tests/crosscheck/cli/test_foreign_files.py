@@ -9,6 +9,7 @@ import numpy as np
 import openpyxl
 import pytest
 from called import as_json, ran
+from sources import ROOT
 
 from crosscheck.importing.capture import read_motive
 
@@ -115,3 +116,60 @@ def test_motives_angles_are_those_of_its_quaternions(public: Path) -> None:
     (place, quat), (other, right), (third, again) = takes
     assert np.allclose(place, other, atol=1e-6) and np.allclose(third, other, atol=1e-6)
     assert np.allclose(quat, right, atol=1e-6) and np.allclose(again, right, atol=1e-6)
+
+
+LINES = "each of the tendons rope1, rope2, rope3 and rope4"
+
+
+@pytest.mark.parametrize(
+    ("file", "status", "told"),
+    [
+        ("01-position-actuators/robot.xml", 2,
+         [f"{LINES} has stiffness 0 and an actuator alone", "l0 would be 1.50997 m"]),
+        ("02-limited-tendons/robot.xml", 2,
+         [f"{LINES} is a rope that cannot stretch (range up to 1.5133 m)", 'stiffness="E S / l0"']),
+        ("05-child-bodies/tool_on_hinge.xml", 2, ["(ee and tool)", "remove the joints of what is"]),
+        ("07-wrapped-exit/guide_sites.xml", 2, ["winch_side_length", "--fix OUT.xml writes"]),
+        ("07-wrapped-exit/robot.xml", 2, ["pulley_radius", "--fix OUT.xml writes"]),
+        ("10-one-lug/robot.xml", 3, ["give it three slide joints", "free to turn about z"]),
+        ("12-two-bodies/between_bodies.xml", 2,
+         ["2 objections", "(ee and lower)", "hang1 and hang2"]),
+    ],
+)  # fmt: skip
+def test_what_is_no_cable_robot_is_told_with_its_remedy(
+    file: str, status: int, told: list[str], public: Path
+) -> None:
+    said = ran(f"seecr pose {public / file} 0 0 0.8 --alone", status).output
+    assert all(one in said for one in told), said
+
+
+def test_a_link_on_one_hinge_rests_at_two_angles(public: Path) -> None:
+    """Stiffness about the hinge: the second derivative of the energy of two springs and weight."""
+
+    def energy(turn: float) -> float:
+        across, up = np.sin(turn), np.cos(turn)
+        springs = 0.0
+        for side in (-1.0, 1.0):
+            anchor = [0.03 * side * up + 0.3 * across, 0.3 * up - 0.03 * side * across]
+            stretch = np.hypot(anchor[0] - 0.4 * side, anchor[1] - 0.1) - 0.4198
+            springs += 0.5 * 3000.0 * max(stretch, 0.0) ** 2
+        return float(springs + 0.8 * 9.81 * 0.25 * up)
+
+    step = 1e-4
+    expected = (energy(step) - 2.0 * energy(0.0) + energy(-step)) / step**2
+    said = as_json(f"seecr pose {public}/30-hinged-link/robot.xml 0 0 0")
+    assert said["pose"][:4] == pytest.approx([0, 0, 0, 1], abs=1e-9)
+    text = ran(f"seecr pose {public}/30-hinged-link/robot.xml 0 0 0 --alone", 0).output
+    assert f"{expected:.1f} N m/rad" in text
+    turned = [abs(one["pose"][5]) for one in said["equilibria"]]
+    assert sorted(turned) == pytest.approx([0.0, 1.0], abs=1e-9)
+
+
+def test_the_page_of_problems_has_what_is_here(public: Path) -> None:
+    page = (ROOT / "docs" / "published.md").read_text(encoding="utf-8")
+    band = f"{public}/11-passive-springs/band.xml"
+    said = as_json(f"seecr pose {band} 0.6 0 1.5 --alone --passive band")
+    off = 1e3 * np.linalg.norm(said["deviation_m"])
+    assert f"{said['tensions_N'][2]:.1f} N, {off:.2f} mm off" in page
+    motors = as_json(f"seecr pose {public}/01-position-actuators/springs_and_motors.xml 0 0 0.8")
+    assert f"{-1e3 * motors['deviation_m'][2]:.2f} mm low, {motors['tensions_N'][0]:.3f} N" in page
