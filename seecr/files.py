@@ -199,14 +199,20 @@ def _meant(path: Path) -> Path:
     return above.parent / path.name if above.name.startswith(UNFINISHED) else path
 
 
-def write_texts(contents: Mapping[Path, str], failure: str = "cannot be written") -> None:
-    """Write files in UTF-8 together: all of them, in this order, or none."""
+def write_texts(
+    contents: Mapping[Path, str | Iterable[str]], failure: str = "cannot be written"
+) -> None:
+    """Write files in UTF-8 together: all of them, in this order, or none.
+
+    A content may come in pieces, so that a large one is never there as a whole.
+    """
     with written(*contents, failure=failure) as parts:
         for part, text in zip(parts, contents.values(), strict=True):
-            part.write_text(text, encoding="utf-8", newline="\n")
+            with part.open("w", encoding="utf-8", newline="\n") as file:
+                file.writelines([text] if isinstance(text, str) else text)
 
 
-def write_text(path: Path, text: str, failure: str = "cannot be written") -> None:
+def write_text(path: Path, text: str | Iterable[str], failure: str = "cannot be written") -> None:
     """Write one file in UTF-8, or keep the old one on failure."""
     write_texts({path: text}, failure)
 
@@ -233,9 +239,31 @@ def with_toml(path: Path | None) -> list[Path]:
     return [] if path is None else [of_sheet(path)[0], toml_path(path)]
 
 
-def json_text(document: Mapping[str, Any], indent: int | None = 1) -> str:
-    """A document as JSON, without a newline at the end."""
+def json_text(document: Any, indent: int | None = 1) -> str:
+    """A document, or a value of one, as JSON, without a newline at the end."""
     return json.dumps(plain(document), indent=indent, allow_nan=False, ensure_ascii=False)
+
+
+def json_pieces(document: Mapping[str, Any]) -> Iterator[str]:
+    """The same in pieces, with a newline at the end: an iterator's items are written one by one."""
+    opening = "{\n "
+    for key, value in document.items():
+        yield f"{opening}{json.dumps(key, ensure_ascii=False)}: "
+        if isinstance(value, Iterator):
+            before = "["
+            for item in value:
+                yield f"{before}\n  {_indented(item, 2)}"
+                before = ","
+            yield "[]" if before == "[" else "\n ]"
+        else:
+            yield _indented(value, 1)
+        opening = ",\n "
+    yield "\n}\n"
+
+
+def _indented(value: Any, depth: int) -> str:
+    """A value's JSON as it stands within others; no newline of its is one of a text's own."""
+    return json_text(value).replace("\n", "\n" + " " * depth)
 
 
 def plain(value: Any) -> Any:
@@ -243,6 +271,8 @@ def plain(value: Any) -> Any:
 
     Objects with a method ``as_json`` are replaced by its result, other dataclasses by their fields.
     """
+    if type(value) is float:  # as most are
+        return value if math.isfinite(value) else None
     if hasattr(value, "as_json"):
         return plain(value.as_json())
     if is_dataclass(value):

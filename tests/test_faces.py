@@ -111,7 +111,7 @@ seecr.equilibrium.solving: strained_rows
 seecr.equilibrium.strange: strange
 seecr.exported.export: wrote
 seecr.folders: check_ours staged
-seecr.files: Made check_writable json_text with_toml write_text write_texts
+seecr.files: Made check_writable json_pieces json_text with_toml write_text write_texts
 seecr.importing.caspr: read_caspr
 seecr.importing.draft: write_robot
 seecr.importing.firmware: firmware_text read_firmware settings_beside

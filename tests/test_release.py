@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest
 import release
+from packaging.requirements import Requirement
 from sources import ROOT
 
 
@@ -48,3 +50,18 @@ def test_what_is_missing_is_said_all_at_once(copy: Path) -> None:
         "the tree has changes that are not committed", "the tag v0.1.1 is there already"
     ]  # fmt: skip
     assert "expected as 0.2.0" in release.faults("1.0", copy)[0]
+
+
+@pytest.mark.parametrize("python", ["3.11", "3.12", "3.13"])
+def test_what_ci_installs_is_stated_and_within_bounds(python: str) -> None:
+    """Each package of pyproject.toml has one version for each Python, and an allowed one."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    groups = [project["dependencies"], *project["optional-dependencies"].values()]
+    inside = {"python_version": python, "python_full_version": f"{python}.9"}
+    lines = (ROOT / ".ci/constraints.txt").read_text(encoding="utf-8").splitlines()
+    pins = [Requirement(line) for line in lines if not line.lstrip().startswith("#")]
+    chosen = [pin for pin in pins if pin.marker is None or pin.marker.evaluate(inside)]
+    for wanted in (Requirement(text) for group in groups for text in group):
+        (pin,) = [one for one in chosen if one.name == wanted.name]
+        (version,) = pin.specifier
+        assert version.operator == "==" and version.version in wanted.specifier, wanted

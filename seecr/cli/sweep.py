@@ -81,7 +81,7 @@ def command(
     """
     from seecr import midline_points, spread_of
     from seecr.cli.arguments import commands_of, model_at, notes_of, robot_at
-    from seecr.files import json_text, with_toml, write_text
+    from seecr.files import json_pieces, with_toml, write_text
     from seecr.folders import check_ours, staged
     from seecr.show.batch_words import jump_lines, span_lines, sweep_lines
     from seecr.show.files import SweepRows, toml_beside
@@ -115,15 +115,15 @@ def command(
         if rows.aimed:
             said = (*said, _WANTED)
         notes = [*notes_of(own, solution, commands), *said, *gave_up, *why_not, *too_many]
-        text = json_text({
+        document = {
             "made": made, "exit_status": status,
             "robot": machine.name, "cables": machine.cable_names,
             "model": None if own is None else own.names, "notes": notes,
             **({} if search is None else {"search": search}), "zones": spans,
-            "midline_point": None if met is None else met.name, "rows": rows,
-        })  # fmt: skip
-        write_text(folder / "sweep.json", text + "\n")
-        write_text(folder / "sweep.csv", rows.csv_text())
+            "midline_point": None if met is None else met.name, "rows": rows.records(),
+        }  # fmt: skip
+        write_text(folder / "sweep.json", json_pieces(document))
+        write_text(folder / "sweep.csv", rows.csv_lines())
         if beside := toml_beside(commands.told, commands):
             write_text(folder / "sweep.toml", beside)
         if figure != "none":
@@ -141,7 +141,12 @@ def command(
         *(() if bar is None else bar.lines()), *(() if search is None else [search.words]),
         f"Results in {out}/", after_sweep(solution, commands, robot, poses, cable, own),
     ]  # fmt: skip
-    click.echo(text if as_json else "\n".join(lines))
+    if not as_json:
+        click.echo("\n".join(lines))
+        return status
+    with (out / "sweep.json").open(encoding="utf-8") as file:
+        for line in file:
+            click.echo(line, nl=False)
     return status
 
 

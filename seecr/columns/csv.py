@@ -9,7 +9,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -383,9 +383,16 @@ def table_text(columns: Mapping[str, Sequence[Any] | Array], digits: int | None 
 
     Numbers that are missing or not finite are empty cells.
     """
-    rows = zip(*columns.values(), strict=True)
-    lines = [",".join(_cell(value, digits) for value in row) for row in rows]
-    return "\n".join([",".join(columns), *lines]) + "\n"
+    return "".join(table_lines(columns, digits))
+
+
+def table_lines(
+    columns: Mapping[str, Sequence[Any] | Array], digits: int | None = None
+) -> Iterator[str]:
+    """The lines of :func:`table_text`."""
+    yield ",".join(columns) + "\n"
+    for row in zip(*columns.values(), strict=True):
+        yield ",".join(_cell(value, digits) for value in row) + "\n"
 
 
 def _cell(value: object, digits: int | None) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zipfile
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seecr.columns.commands import CommandFile
-from seecr.columns.csv import table_text
+from seecr.columns.csv import table_lines, table_text
 from seecr.commands import Commands, Loads
 from seecr.description.robot import Robot
 from seecr.files import written
@@ -89,6 +89,10 @@ class SweepRows:
 
     def as_json(self) -> list[Record]:
         """``rows`` in ``sweep.json``."""
+        return list(self.records())
+
+    def records(self) -> Iterator[Record]:
+        """The same, one after the other."""
         found, spread = self.solution, self.spread
         commanded, none = self.lengths is None, [None] * len(found)
         aimed = commanded or self.aimed
@@ -120,16 +124,18 @@ class SweepRows:
                 "seen_stderr": spread.seen,
                 "tensions_stderr_N": spread.tensions,
             }
-        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        return (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
 
-    def csv_text(self) -> str:
-        """``sweep.csv``; with ``sweep.toml`` it can be read as the same commands.
+    def csv_lines(self) -> Iterator[str]:
+        """The lines of ``sweep.csv``; with ``sweep.toml`` it can be read as the same commands.
 
         Numbers have all their digits; cells without a number are empty.
         """
         found, spread = self.solution, self.spread
         cables = [str(k + 1) for k in range(found.robot.n_cables)]
-        columns = {k: self.more[k] for k in ("run", "t_s", "temperature_C") if k in self.more}
+        columns: dict[str, Any] = {
+            k: self.more[k] for k in ("run", "t_s", "temperature_C") if k in self.more
+        }
         if self.lengths is None:
             columns |= _named("cmd_{}", COORDINATES, found.command)
         else:
@@ -148,15 +154,15 @@ class SweepRows:
             columns |= _named("tension_{}_stderr_N", cables, spread.tensions)
         columns |= {
             "status": [status.name.lower() for status in found.status],
-            "residual": found.residual.tolist(),
-            "smallest_eigenvalue": found.smallest_eigenvalue.tolist(),
+            "residual": found.residual,
+            "smallest_eigenvalue": found.smallest_eigenvalue,
             "slack": [" ".join(names) for names in self._slack()],
         }
         if (met := midline_points(found)) is not None:
             columns |= _named("midlines_{}_m", "xyz", met.points)
-            columns["beside_weight_m"] = met.beside.tolist()
+            columns["beside_weight_m"] = met.beside
         columns |= self._tilts()
-        return table_text(columns)
+        return table_lines(columns)
 
     def _tilts(self) -> dict[str, list[float]]:
         """Of a bar on two cables, beside those of the manifold."""
@@ -170,13 +176,12 @@ class SweepRows:
         return [names[row].tolist() for row in self.solution.slack]
 
 
-def _named(pattern: str, names: Sequence[str], values: Array) -> dict[str, Sequence[Any]]:
+def _named(pattern: str, names: Sequence[str], values: Array) -> dict[str, Any]:
     """Columns of a table (n, k), with names from the pattern."""
-    columns = zip(names, values.T.tolist(), strict=True)
-    return {pattern.format(name): column for name, column in columns}
+    return {pattern.format(name): column for name, column in zip(names, values.T, strict=True)}
 
 
-def _lengths(robot: Robot, lengths: Array) -> dict[str, Sequence[Any]]:
+def _lengths(robot: Robot, lengths: Array) -> dict[str, Any]:
     """Columns of the commanded lengths (n, m); passive lines have none."""
     driven = np.flatnonzero(robot.driven)
     return _named("length_{}_m", [str(k + 1) for k in driven], lengths[:, driven])
@@ -191,7 +196,7 @@ def corrected_csv(found: Correction, wanted: CommandFile) -> str:
     Runs, times, temperatures and loads are those of the list. Numbers have all their digits: a
     length rounded to a micrometre is off by as much.
     """
-    columns: dict[str, Sequence[object] | Array] = dict(wanted.conditions)
+    columns: dict[str, Any] = dict(wanted.conditions)
     columns |= dict(zip(_WANT, found.wanted.T, strict=True))
     columns |= _lengths(found.robot, found.lengths)
     columns |= load_columns(wanted.commands.loads)
@@ -201,9 +206,7 @@ def corrected_csv(found: Correction, wanted: CommandFile) -> str:
 
 def lookup_csv(found: Correction) -> str:
     """The look-up table of a controller: each position of a grid, and the lengths to command."""
-    columns: dict[str, Sequence[object] | Array] = dict(
-        zip(("x_m", "y_m", "z_m"), found.wanted.T[:3], strict=True)
-    )
+    columns: dict[str, Any] = dict(zip(("x_m", "y_m", "z_m"), found.wanted.T[:3], strict=True))
     driven = np.flatnonzero(found.robot.driven)
     columns |= _named("length_{}_m", [str(k + 1) for k in driven], found.lengths[:, driven])
     columns["reached"] = found.reached.astype(int).tolist()

@@ -174,5 +174,5 @@ def test_it_is_printed_and_written(tmp_path: Path) -> None:
     assert sweep_lines(found, spread=spread)[-1].startswith("uncertain by up to ± 0.")
     rows = SweepRows(found, spread=spread)
     assert rows.as_json()[1]["position_stderr_m"].tolist() == spread.position[1].tolist()
-    assert "pose_z_stderr_m" in rows.csv_text().splitlines()[0]
+    assert "pose_z_stderr_m" in next(rows.csv_lines())
     assert "stderr" not in json_text({"rows": SweepRows(found)})

@@ -16,7 +16,7 @@ from seecr.columns.commands import CommandFile, read_commands
 from seecr.commands import Commands, Loads
 from seecr.description.mjcf import load_robot, model_path
 from seecr.equilibrium.solving import solve
-from seecr.files import json_text
+from seecr.files import json_pieces, json_text, write_text
 from seecr.inverse.correction import correct
 from seecr.show.batch_words import chance_lines, sweep_lines
 from seecr.show.files import SweepRows, corrected_csv, corrected_toml, toml_beside
@@ -43,12 +43,21 @@ def test_rows_are_the_solution(sweep: Solution) -> None:
     assert [row["status"] for row in rows] == ["converged"] * 3
 
 
+def test_rows_are_written_piece_by_piece_as_they_are_whole(sweep: Solution) -> None:
+    rows = SweepRows(sweep)
+    document = {"made": {"on": ["a day"]}, "odd": "two\nlines", "none": [], "rows": rows.as_json()}
+    pieces = list(json_pieces({**document, "rows": rows.records()}))
+    assert "".join(pieces) == json_text(document) + "\n"
+    assert max(map(len, pieces)) < 2 * len(json_text(rows.as_json()[0]))
+    assert "".join(json_pieces({"rows": iter(())})) == json_text({"rows": []}) + "\n"
+
+
 def test_the_csv_is_read_again_as_commands(sweep: Solution, tmp_path: Path) -> None:
     path = tmp_path / "sweep.csv"
-    path.write_text(SweepRows(sweep).csv_text())
+    write_text(path, SweepRows(sweep).csv_lines())
     np.testing.assert_array_equal(read_commands(path, sweep.robot).commands.pose, POSES)
     lengths = sweep.rest_lengths
-    path.write_text(SweepRows(sweep, lengths).csv_text())
+    write_text(path, SweepRows(sweep, lengths).csv_lines())
     again = read_commands(path, sweep.robot).commands.lengths
     np.testing.assert_array_equal(np.asarray(again), lengths)
 
@@ -56,7 +65,7 @@ def test_the_csv_is_read_again_as_commands(sweep: Solution, tmp_path: Path) -> N
 def test_runs_with_odd_names_keep_their_rows(sweep: Solution, tmp_path: Path) -> None:
     """Rows of a run called #1 were comments, so that the file lost them, or had no rows at all."""
     path, runs = tmp_path / "sweep.csv", ["#1", "2, back", 'the "3rd"']
-    path.write_text(SweepRows(sweep, more={"run": runs}).csv_text())
+    write_text(path, SweepRows(sweep, more={"run": runs}).csv_lines())
     assert list(read_commands(path, sweep.robot).run) == runs
 
 
@@ -123,7 +132,7 @@ def test_a_pose_without_rest_has_no_numbers(sweep: Solution) -> None:
     assert list(pose_lines(lost)) == [f"demobot_parallel: {Status.FALLING.value}"]
     assert at_rest(sweep) and not at_rest(lost)
     assert SweepRows(lost).as_json()[0]["status"] is Status.FALLING
-    assert ",,,,,,," in SweepRows(lost).csv_text()
+    assert ",,,,,,," in "".join(SweepRows(lost).csv_lines())
 
 
 @pytest.mark.slow
@@ -183,7 +192,7 @@ def test_loads_are_read_as_they_were(
     wanted = CommandFile(Commands(of_a_correction.wanted, loads=loads), None, ("a",) * 3, ())
     path = tmp_path / "written.csv"
     if kind == "sweep":
-        path.write_text(SweepRows(of_a_correction.solution, loads=loads).csv_text())
+        write_text(path, SweepRows(of_a_correction.solution, loads=loads).csv_lines())
     else:
         path.write_text(corrected_csv(of_a_correction, wanted))
         path.with_suffix(".toml").write_text(corrected_toml(wanted))
@@ -201,7 +210,9 @@ def test_what_lengths_mean_and_where_runs_begin_are_read_as_they_were(
 ) -> None:
     commands = Commands(of_a_correction.wanted, of_a_correction.lengths, told=told, stands=stands)
     path = tmp_path / "written.csv"
-    path.write_text(SweepRows(of_a_correction.solution, of_a_correction.lengths).csv_text())
+    path.write_text(
+        "".join(SweepRows(of_a_correction.solution, of_a_correction.lengths).csv_lines())
+    )
     text = toml_beside(told, commands)
     path.with_suffix(".toml").write_text(text)
     again = read_commands(path, VERTICAL).commands
