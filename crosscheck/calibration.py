@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,12 +28,12 @@ from crosscheck.inference.catalogue import Catalogue
 from crosscheck.inference.fit import Data, Fit
 from crosscheck.inference.held_out import blocks_note, hold_out
 from crosscheck.inference.search import Search
-from crosscheck.measurements.data import GivenSigma
+from crosscheck.measurements.data import GivenSigma, Sigma
 from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import calibrated, provenance_of, renewed
 from crosscheck.preparation.prepare import Prepared, Progress, prepare
-from crosscheck.preparation.thinned import Thinned, thinned
+from crosscheck.preparation.thinned import note_on_others, thinned
 from seecr.arguments import silent
 from seecr.counted import counted, plural, some
 from seecr.effects import Terms, catalogue
@@ -176,24 +177,27 @@ def made_ready(
     model: GivenModel,
     names: frozenset[str],
     sigma: GivenSigma = None,
-) -> tuple[Thinned, Prepared, Model, tuple[str, ...]]:
+) -> tuple[Prepared, Model, tuple[str, ...], Callable[[Terms, Sigma], list[str]]]:
     """What a search begins with.
 
     Args:
         robot, data, model, sigma: as they were given. names: of the effects that may be missing.
 
     Returns:
-        The rows that are searched, these made ready, the model as it stands, and what is said of
-        it. A model given as effects alone becomes a new one of the robot with these.
+        The rows that are searched, made ready; the model as it stands, and what is said of it; what
+        says how well a model predicts the other rows. A model given as effects alone becomes a new
+        one of the robot with these.
     """
     robot = robot_of(robot)
-    thin = thinned(robot, measurements_of(data, robot, sigma))
+    whole = measurements_of(data, robot, sigma)
+    some, others = thinned(robot, whole)
     model = opened(model, robot)
     terms, said = model_of(model, robot)
     basis = basis_of(model, robot)
     if not isinstance(model, Model):
         basis = replace(basis, terms=terms)
-    return thin, prepare(robot, thin.data, terms, names), basis, said
+    untold = partial(note_on_others, robot, whole, others)
+    return prepare(robot, some, terms, names), basis, said, untold
 
 
 def calibrate(
@@ -233,9 +237,10 @@ def calibrate(
     # BLAS on several threads takes longer for matrices as narrow as these
     with threadpool_limits(limits=1, user_api="blas"):
         names = considered(only, exclude)
-        thin, ready, basis, said = made_ready(robot, data, model, names, sigma)
+        ready, basis, said, on_others = made_ready(robot, data, model, names, sigma)
+        searched = ready.problem.data
         if ready.refusal is not None:
-            raise ready.refusal.error(thin.data.path, "nothing was fitted")
+            raise ready.refusal.error(searched.path, "nothing was fitted")
         data_ = Data.of(ready.problem, ready.terms)
         search = Search(data_, Catalogue.of(data_, ready.terms), lambda text: progress(text, 0.4))
         search.begin()
@@ -245,13 +250,13 @@ def calibrate(
         progress("predicting test runs", 0.95)
         before = rms_by_kind(whole.data.problem, search.plain.raw)
         errors = JointErrors.of(before, whole)
-        others = thin.note_on_others(whole.terms, ready.problem.sigma)
+        others = on_others(whole.terms, ready.problem.sigma)
     notes = (*said, *contradictions(whole.terms), *ready.notes, *blocks_note(ready.problem))
     fitted = _fitted(whole, basis.terms)
     kept = {one.term.name for one in fitted}
     own = np.flatnonzero([name in kept for name, _key in whole.terms.labels])
     rows = np.flatnonzero(far).tolist()
-    source = provenance_of(thin.data.name, "crosscheck calibrate")
+    source = provenance_of(searched.name, "crosscheck calibrate")
     covariance = (whole.spread * np.outer(whole.terms.scale, whole.terms.scale))[np.ix_(own, own)]
     kinds = {"before": errors.before, "after": errors.after, "held_out": errors.held_out}
     new = calibrated(basis, fitted, covariance, source, kinds)
@@ -259,12 +264,12 @@ def calibrate(
         fitted=fitted,
         covariance=covariance,
         **vars(errors),
-        outliers=tuple(int(thin.data.line[row]) for row in rows),
-        outlier_places=tuple(thin.data.place(row) for row in rows),
+        outliers=tuple(int(searched.line[row]) for row in rows),
+        outlier_places=tuple(searched.place(row) for row in rows),
         settled=whole.settled,
         notes=(*notes, *others),
         absent=_absent(search.every, kept),
-        model=renewed(new, thin.robot, thin.data),
+        model=renewed(new, ready.problem.robot, searched),
     )
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import browser
 
-from crosscheck.comparison import compare
+from crosscheck.comparison.residuals import compare
 from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.planning.design import make_plan
 from crosscheck.show.pictures import write_page

@@ -46,25 +46,12 @@ class Limits:
         return replace(self, **given)
 
 
-@dataclass(frozen=True)
-class Rule:
-    """What a limit applies to: a kind of reading, over all rows or in the worst row."""
-
-    kind: Kind
-    worst: bool
-
-    @property
-    def words(self) -> str:
-        """What is limited, in words."""
-        return f"worst {self.kind.name} error" if self.worst else f"{self.kind.name} error (rms)"
-
-
 RULES = {
-    f"max_{kind.name}{end}": Rule(kind, worst)
+    f"max_{kind.name}{end}": (kind, worst)
     for end, worst in (("", False), ("_worst", True))
     for kind in KINDS
 }
-"""What each field of :class:`Limits` applies to."""
+"""The kind of reading that each field of :class:`Limits` is on, and whether in the worst row."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +74,7 @@ def parse_limit(name: str, text: str) -> float:
     Raises:
         CrosscheckError: the text is no positive number with a unit of that kind.
     """
-    return parse_quantity(option(name), RULES[name].kind.name, text)
+    return parse_quantity(option(name), RULES[name][0].name, text)
 
 
 def option(name: str) -> str:
@@ -124,7 +111,7 @@ def load_limits(path: str | Path) -> Limits:
                 (f"{key} is not a limit; expected one of, nearest first: {', '.join(near)}"), key
             )
         if not isinstance(value, str):
-            example = EXAMPLE[RULES[name].kind.name]
+            example = EXAMPLE[RULES[name][0].name]
             text = f'{key}: expected a text such as "{example}", got {value!r}'
             raise toml.error(text, key)
         try:
@@ -153,31 +140,31 @@ def exceeded(limits: Limits, found: Comparison) -> list[Exceeded]:
     check_kind(limits, Limits, "limits", "such as Limits(max_position=0.001)")
     check_kind(found, Comparison, "found", "as compare returns it")
     out = []
-    for name, rule in RULES.items():
+    for name, (kind, worst) in RULES.items():
         limit = getattr(limits, name)
         if limit is None:
             continue
         if finite(limit, name).shape:
             raise InputError(f"{name}: expected one number, got {limit!r}")
         data = found.problem.data
-        if not getattr(data, f"has_{rule.kind.name}"):
+        if not getattr(data, f"has_{kind.name}"):
             raise CrosscheckError(
-                f"{option(name)}: {data.path} has no {rule.kind.name} readings; expected limits on "
+                f"{option(name)}: {data.path} has no {kind.name} readings; expected limits on "
                 "what was measured"
             )
-        _check_gate(name, limit, rule, found)
-        sizes = found.errors_of(rule.kind.name)
+        _check_gate(name, limit, kind, found)
+        sizes = found.errors_of(kind.name)
         if not np.isfinite(sizes).any():
             continue
-        value = float(np.nanmax(sizes)) if rule.worst else found.rms[rule.kind.key]
+        value = float(np.nanmax(sizes)) if worst else found.rms[kind.key]
         if value is not None and value > limit:
-            out.append(Exceeded(name, limit, value, _words(found, rule, limit, value)))
+            out.append(Exceeded(name, limit, value, _words(found, kind, worst, limit, value)))
     return out
 
 
-def _check_gate(name: str, limit: float, rule: Rule, found: Comparison) -> None:
+def _check_gate(name: str, limit: float, kind: Kind, found: Comparison) -> None:
     """Check that a limit can be exceeded: with a typing error in its unit it would never fail."""
-    robot, kind = found.problem.robot, rule.kind
+    robot = found.problem.robot
     most = {"position": robot.reach, "orientation": np.pi, "tension": float(np.sum(robot.ea))}
     if limit >= most[kind.name]:
         what = {
@@ -190,13 +177,14 @@ def _check_gate(name: str, limit: float, rule: Rule, found: Comparison) -> None:
         )
 
 
-def _words(found: Comparison, rule: Rule, limit: float, value: float) -> str:
-    factor, unit = rule.kind.factor, rule.kind.unit
-    sizes = found.errors_of(rule.kind.name)
+def _words(found: Comparison, kind: Kind, worst: bool, limit: float, value: float) -> str:
+    factor, unit = kind.factor, kind.unit
+    sizes = found.errors_of(kind.name)
+    what = f"worst {kind.name} error" if worst else f"{kind.name} error (rms)"
     k = int(np.nanargmax(sizes))
     data = found.problem.data
     return (
-        f"{rule.words} {factor * value:.4g} {unit} exceeds {factor * limit:.4g} {unit} by "
+        f"{what} {factor * value:.4g} {unit} exceeds {factor * limit:.4g} {unit} by "
         f"{factor * (value - limit):.4g} {unit}; worst at line {data.place(k)}, run "
         f"{data.run[k]}, {found.place(k)}: {factor * float(sizes[k]):.4g} {unit}"
     )

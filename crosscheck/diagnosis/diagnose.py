@@ -80,7 +80,7 @@ def diagnose(
     # BLAS on several threads takes longer for matrices as narrow as these
     with threadpool_limits(limits=1, user_api="blas"):
         names = considered(only, exclude)
-        thin, ready, basis, said = made_ready(robot, data, model, names, sigma)
+        ready, basis, said, on_others = made_ready(robot, data, model, names, sigma)
         notes = (*said, *ready.notes, *blocks_note(ready.problem))
         found = _diagnosed(ready, notes, progress, tolerance, basis)
         if found.path is None:
@@ -89,7 +89,7 @@ def diagnose(
             rows = Refusal(Unfit.STRUCTURE_OR_NOISE, int(ready.problem.use.sum()))
             none = no_verdict(ready.problem, found.path.first.state, found.notes, rows)
             return replace(none, sight=found.sight)
-        others = thin.note_on_others(found.path.last.fit.terms, ready.problem.sigma)
+        others = on_others(found.path.last.fit.terms, ready.problem.sigma)
         return replace(found, notes=(*found.notes, *others))
 
 

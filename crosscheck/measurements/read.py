@@ -191,6 +191,9 @@ def together(parts: Sequence[Measurements]) -> Measurements:
     }  # fmt: skip
     warmth, lost_warmth = _of_all("temperature_C", [part.temperature_C for part in parts], names)
     quat, angles = _orientations(parts)
+    columns: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in _IN_ALL
+    }
     whole = Measurements(
         path=Path(" + ".join(names)),
         n_cables=first.n_cables,
@@ -217,7 +220,7 @@ def together(parts: Sequence[Measurements]) -> Measurements:
         file=np.repeat(np.arange(len(parts)), [part.n_rows for part in parts]),
         unused_columns=tuple(dict.fromkeys(name for part in parts for name in part.unused_columns)),
         notes=(*notes, *said, *lost_times, *lost_warmth),
-        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in _IN_ALL},
+        **columns,
     )
     said, copied = repetitions(whole, across=True)
     return replace(whole, copied=whole.copied | copied, notes=(*said, *whole.notes))

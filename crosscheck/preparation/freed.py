@@ -8,7 +8,7 @@ if the model has not seen that file or run.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,24 +29,17 @@ from seecr.units import measured, parameter_name
 # the values of files or runs that it has seen; others start from the effect's common values.
 
 
-@dataclass(frozen=True, eq=False)
-class LaidOut:
-    """A model for some data.
+Fresh = Sequence[tuple[str, str]]
+"""Effects, each with a file or run for which the model has no values."""
 
-    Attributes:
-        terms: its effects, those with separate values laid out for the files or runs of the data.
-        fresh: pairs of an effect and a file or run for which the model has no values.
-        notes: which values were taken from the model, and which are new.
+
+def laid_out(data: Measurements, terms: Terms) -> tuple[Terms, Fresh, list[str]]:
+    """The model, with separate values for the files or runs of the data where effects have them.
+
+    Returns:
+        The effects, which values are new, and notes on that.
     """
-
-    terms: Terms
-    fresh: tuple[tuple[str, str], ...]
-    notes: tuple[str, ...]
-
-
-def laid_out(data: Measurements, terms: Terms) -> LaidOut:
-    """The model, with separate values for the files or runs of the data where effects have them."""
-    out, fresh, notes = [], [], []
+    out, fresh, notes = list[Term](), list[tuple[str, str]](), list[str]()
     for term in terms:
         if term.own is None or isinstance(term.layout, ApartLayout):
             out.append(term)
@@ -61,7 +54,7 @@ def laid_out(data: Measurements, terms: Terms) -> LaidOut:
         out.append(Term(layout, vector, knowledge, term.own))
         fresh += [(term.name, name) for name in new]
         notes.append(_said_of_parts(term, term.own.kind, [n for n in names if n not in new], new))
-    return LaidOut(Terms(out), tuple(fresh), tuple(notes))
+    return Terms(out), fresh, notes
 
 
 def groups_of(data: Measurements, terms: Terms) -> NDArray[np.int64] | None:
@@ -102,35 +95,28 @@ def _said_of_parts(term: Term, kind: str, known: Sequence[str], new: Sequence[st
 # The fit of what the data leave free.
 
 
-@dataclass(frozen=True, eq=False)
-class Freed:
-    """A model after the parameters that its data leave free were fitted.
+def freed(
+    problem: Problem, terms: Terms, fresh: Fresh = ()
+) -> tuple[Terms, NDArray[np.bool_], list[str]]:
+    """Fit the parameters that the data leave free, of a model that is laid out; the others stay.
 
-    Attributes:
-        terms: the model with the fitted values. free: (p,) which parameters were fitted.
-        notes: a sentence for each effect that was fitted or that the TOML names.
+    Returns:
+        The model, which of its parameters (p,) were fitted, and a sentence for each effect that was
+        fitted or that the TOML names.
     """
-
-    terms: Terms
-    free: NDArray[np.bool_]
-    notes: tuple[str, ...] = ()
-
-
-def freed(problem: Problem, laid: LaidOut) -> Freed:
-    """Fit the parameters that the data leave free, of a model that is laid out; the others stay."""
-    names, terms = problem.data.free, laid.terms
-    if not (names or laid.fresh) or not problem.n_readings:
-        return Freed(terms, np.zeros(len(terms), dtype=bool))
+    names = problem.data.free
+    if not (names or fresh) or not problem.n_readings:
+        return terms, np.zeros(len(terms), dtype=bool), []
     own = [_new(problem, name) for name in names if name not in terms]
     every = Terms([*terms, *own])
-    free = _free(every, names, laid.fresh)
+    free = _free(every, names, fresh)
     data = Data.of(problem, every)
     state = _registered(problem, every, data.factor, free)
     best = _fitted(data, state, free)
     found = every.with_vector(best.terms.vector)
     moved, error = free & ~found.knowledge.fixed, best.stderr
     told = [_told(found, name, moved, error, problem, name in names) for name in found.names]
-    return Freed(found, moved, tuple(filter(None, told)))
+    return found, moved, list(filter(None, told))
 
 
 def _fitted(data: Data, state: State, free: NDArray[np.bool_]) -> Fit:
@@ -163,9 +149,7 @@ def _new(problem: Problem, name: str) -> Term:
     return Term(layout, layout.null)
 
 
-def _free(
-    terms: Terms, names: Sequence[str], fresh: Sequence[tuple[str, str]]
-) -> NDArray[np.bool_]:
+def _free(terms: Terms, names: Sequence[str], fresh: Fresh) -> NDArray[np.bool_]:
     """(p,) the free parameters: all those of named effects, others only for new files or runs."""
     free = np.array([effect in names for effect, _key in terms.labels], dtype=bool)
     for effect, part in fresh:

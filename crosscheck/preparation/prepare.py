@@ -72,13 +72,12 @@ def prepare(
     if not problem.measured.any():
         none = Refusal(Unfit.NO_READINGS, data.n_rows)
         return Prepared(problem, terms, (*robot.notes, *data.notes), none)
-    laid = laid_out(data, terms)
-    plain = problem.experiment.predict(laid.terms.effects)
+    terms, fresh, laid = laid_out(data, terms)
+    plain = problem.experiment.predict(terms.effects)
     problem, unread = without_unread(_solved_rows(problem, plain), plain)
     problem, estimates = estimate_sigma(problem, plain)
-    found = freed(problem, laid)
-    terms, said = found.terms, (*laid.notes, *found.notes)
-    if found.free.any():
+    terms, free, said = freed(problem, terms, fresh)
+    if free.any():
         plain = problem.experiment.predict(terms.effects)
         if estimates:  # the first residuals also contained the error of the frame
             problem, estimates = estimate_sigma(problem.with_sigma(data.sigma), plain)
@@ -89,11 +88,11 @@ def prepare(
     asked, odd = suspicions(problem, plain)
     notes = (
         *data.notes, *robot.notes, *strange(robot), *locked_note(problem), *unread, *asked,
-        *oversized(problem, plain), *problem.left_out, *estimates, *said,
+        *oversized(problem, plain), *problem.left_out, *estimates, *laid, *said,
     )  # fmt: skip
     problem = problem.with_groups(groups_of(data, terms))
     refusal = refusal_of(problem, plain.pose[:, :3], data.sigma) or odd
-    return Prepared(problem, terms, notes, refusal, int(found.free.sum()), far_off)
+    return Prepared(problem, terms, notes, refusal, int(free.sum()), far_off)
 
 
 def _solved_rows(problem: Problem, plain: Prediction) -> Problem:

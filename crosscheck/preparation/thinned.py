@@ -11,14 +11,11 @@ The rows that were not taken are held out: no fit has seen them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
 from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.words import rms_words
-from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.measurements.data import Mask, Measurements, Sigma
 from crosscheck.preparation.unread import without_unread
 from seecr.counted import counted
 from seecr.description.robot import Robot
@@ -37,50 +34,18 @@ _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 _FAR = 10.0
 
 
-@dataclass(frozen=True, eq=False)
-class Thinned:
-    """Measurements for a search.
-
-    Attributes:
-        robot: the robot that was measured. whole: all measurements.
-        data: the rows that are searched.
-        others: (n,) bool, rows of ``whole`` that were read and are not searched.
-    """
-
-    robot: Robot
-    whole: Measurements
-    data: Measurements
-    others: NDArray[np.bool_]
-
-    def note_on_others(self, terms: Terms, sigma: Sigma) -> tuple[str, ...]:
-        """How well a model predicts the rows that were held out; empty if there are none."""
-        if not self.others.any():
-            return ()
-        problem = Problem(self.robot, self.whole, sigma, self.others)
-        at = problem.experiment.predict(terms.effects)
-        problem = without_unread(problem.only(at.solved), at)[0]
-        raw = problem.residuals(at.readings)
-        squares = np.where(problem.counted, (raw / problem.reading_sigma) ** 2, 0.0).sum(axis=1)
-        size = np.sqrt(squares / np.maximum(problem.counted.sum(axis=1), 1))
-        used = problem.use
-        if not used.any():
-            return ()
-        far = used & (size > _FAR * np.median(size[used]))
-        rms = rms_words(rms_by_kind(problem.with_far_off(far), raw))
-        aside = f", except for {counted(int(far.sum()), 'outlier')}" if far.any() else ""
-        count = counted(int(used.sum()), "other row")
-        return (f"{count}, not used in any fit, predicted to {rms} rms{aside}",)
-
-
-def thinned(robot: Robot, data: Measurements, most: int = MOST) -> Thinned:
+def thinned(robot: Robot, data: Measurements, most: int = MOST) -> tuple[Measurements, Mask]:
     """Choose the rows for a search: all if no more than ``most`` were read.
 
     Otherwise between half as many and so many are taken, and the rows at reversals.
+
+    Returns:
+        The rows that are searched, and which rows (n,) were read and are not.
     """
     read = data.read
     every = -(-int(read.sum()) // most)
     if every <= 1:
-        return Thinned(robot, data, data, np.zeros(data.n_rows, dtype=bool))
+        return data, np.zeros(data.n_rows, dtype=bool)
     turns = _turns(robot, data)
     index = np.arange(data.n_rows)
     begins = np.append(True, data.run[1:] != data.run[:-1])
@@ -104,10 +69,32 @@ def thinned(robot: Robot, data: Measurements, most: int = MOST) -> Thinned:
         f"the search uses {counted(int((kept & read).sum()), 'row')} of {int(read.sum())}: "
         f"{what}; `add` fits all of them"
     )
-    return Thinned(robot, data, data.rows(kept).with_notes([note]), read & ~kept)
+    return data.rows(kept).with_notes([note]), read & ~kept
 
 
-def _turns(robot: Robot, data: Measurements) -> NDArray[np.bool_]:
+def note_on_others(
+    robot: Robot, whole: Measurements, others: Mask, terms: Terms, sigma: Sigma
+) -> list[str]:
+    """How well a model predicts the rows (n,) that were held out; nothing if there are none."""
+    if not others.any():
+        return []
+    problem = Problem(robot, whole, sigma, others)
+    at = problem.experiment.predict(terms.effects)
+    problem = without_unread(problem.only(at.solved), at)[0]
+    raw = problem.residuals(at.readings)
+    squares = np.where(problem.counted, (raw / problem.reading_sigma) ** 2, 0.0).sum(axis=1)
+    size = np.sqrt(squares / np.maximum(problem.counted.sum(axis=1), 1))
+    used = problem.use
+    if not used.any():
+        return []
+    far = used & (size > _FAR * np.median(size[used]))
+    rms = rms_words(rms_by_kind(problem.with_far_off(far), raw))
+    aside = f", except for {counted(int(far.sum()), 'outlier')}" if far.any() else ""
+    count = counted(int(used.sum()), "other row")
+    return [f"{count}, not used in any fit, predicted to {rms} rms{aside}"]
+
+
+def _turns(robot: Robot, data: Measurements) -> Mask:
     """(n,) rows at which a cable reverses or the load changes, and the row before such a change."""
     from scipy import signal  # takes half a second to import, and few logs are this long
 

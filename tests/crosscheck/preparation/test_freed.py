@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured, soft_cogiro, term
 from made_diagnoses import SLOW
+from numpy.typing import NDArray
 
 import crosscheck
 from crosscheck.fit.problem import Problem
@@ -17,7 +19,7 @@ from crosscheck.fit.state import known_left, known_readings
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import together
 from crosscheck.measurements.write import write_measurements
-from crosscheck.preparation.freed import Freed, LaidOut, freed, groups_of, laid_out
+from crosscheck.preparation.freed import freed, groups_of, laid_out
 from crosscheck.preparation.prepare import prepare
 from seecr.description.mjcf import load_robot
 from seecr.effects import ApartLayout, Own, Term, Terms, Values, apart, effect_named, layout_of
@@ -139,8 +141,16 @@ def problem_of(data: Measurements) -> Problem:
     return Problem(STIFF, data, SIGMA, np.ones(data.n_rows, dtype=bool))
 
 
-def found_in(data: Measurements, *terms: Term, fresh: tuple[tuple[str, str], ...] = ()) -> Freed:
-    return freed(problem_of(data), LaidOut(Terms(terms), fresh, ()))
+class Freed(NamedTuple):
+    """A model after what its data leave free was fitted."""
+
+    terms: Terms
+    free: NDArray[np.bool_]
+    notes: list[str]
+
+
+def found_in(data: Measurements, *terms: Term) -> Freed:
+    return Freed(*freed(problem_of(data), Terms(terms)))
 
 
 def positions(data: Measurements) -> Array:
@@ -162,13 +172,13 @@ def test_nothing_is_fitted_if_nothing_is_free() -> None:
     held = term(STIFF, "tracker_scale", factor=1.002)
     found = found_in(data_of(), held)
     assert found.terms["tracker_scale"].vector.tolist() == [1.002]
-    assert found.free.tolist() == [False] and found.notes == ()
+    assert found.free.tolist() == [False] and found.notes == []
 
 
 def test_without_readings_nothing_is_fitted() -> None:
     data = replace(data_of(), free=("tracker_scale",))
     nothing = Problem(STIFF, data, SIGMA, np.zeros(data.n_rows, dtype=bool))
-    found = freed(nothing, LaidOut(Terms(), (), ()))
+    found = Freed(*freed(nothing, Terms()))
     assert found.terms.names == () and found.free.tolist() == []
 
 
@@ -194,10 +204,10 @@ def test_a_free_effect_of_the_model_is_fitted_from_where_it_stands_and_a_fixed_o
     fixed = found_in(data, start.fixed())
     assert fixed.terms["tracker_scale"].vector.tolist() == [0.99]
     assert fixed.free.tolist() == [False]
-    assert fixed.notes == (
+    assert fixed.notes == [
         "tracker_scale is free, as stated in the TOML beside measured.csv, and was fitted to these "
-        "data first: factor 0.99 (fixed)",
-    )
+        "data first: factor 0.99 (fixed)"
+    ]
 
 
 def test_errors_that_are_told_are_those_of_what_the_model_leaves() -> None:
@@ -230,7 +240,7 @@ def test_only_runs_that_the_model_has_not_seen_are_fitted() -> None:
     seen, new = (str(data.parts["run"][k]) for k in (0, -1))
     layout = apart(SCALE, "run", (seen, new), SCALE.null)
     model = Terms([Term(layout, np.array([1.0, 1.0]))])
-    found = freed(problem_of(data), LaidOut(model, (("tracker_scale", new),), ()))
+    found = Freed(*freed(problem_of(data), model, [("tracker_scale", new)]))
     assert found.free.tolist() == [False, True]
     told = positions(data)[half:]
     seen_before, fresh = found.terms["tracker_scale"].vector
@@ -248,7 +258,7 @@ def test_of_several_files_each_that_says_so_has_its_own() -> None:
         file=np.arange(data_of().n_rows) % 3,
     )  # fmt: skip
     problem = problem_of(data).with_groups(np.asarray(data.file))
-    found = freed(problem, LaidOut(Terms(), (), ()))
+    found = Freed(*freed(problem, Terms()))
     layout = found.terms["tracker_scale"].layout
     assert isinstance(layout, ApartLayout) and layout.parts == ("x/b.csv", "x/c.csv")
     told = positions(data)
@@ -291,22 +301,22 @@ def test_values_of_a_file_are_found_by_its_name_and_new_files_start_at_the_commo
     plain = term(STIFF, "tracker_frame", shift_x_m=0.5)
     there = Values(plain.layout.null + 0.25, np.zeros(6), plain.knowledge)
     own = Own("file", {"monday.csv": there})
-    found = laid_out(days(), Terms([replace(plain, own=own), term(STIFF, "stiffness", factor=1.1)]))
-    frame = found.terms["tracker_frame"]
-    assert isinstance(frame.layout, ApartLayout) and found.fresh == (
-        ("tracker_frame", "case/tuesday.csv"),
-    )
+    model = Terms([replace(plain, own=own), term(STIFF, "stiffness", factor=1.1)])
+    terms, fresh, notes = laid_out(days(), model)
+    frame = terms["tracker_frame"]
+    assert isinstance(frame.layout, ApartLayout)
+    assert fresh == [("tracker_frame", "case/tuesday.csv")]
     assert frame.vector == pytest.approx(np.concatenate([there.vector, plain.vector]))
-    assert found.notes == (
+    assert notes == [
         "tracker_frame has separate values for each file: case/monday.csv as in the model; "
-        "case/tuesday.csv not in the model, so fitted to these data first",
-    )
-    assert found.terms["stiffness"].vector.tolist() == [1.1]
+        "case/tuesday.csv not in the model, so fitted to these data first"
+    ]
+    assert terms["stiffness"].vector.tolist() == [1.1]
 
 
 def test_rows_are_grouped_where_an_effect_has_values_apart() -> None:
     plain = term(STIFF, "tracker_frame")
-    apart = laid_out(days(), Terms([replace(plain, own=Own("file", {}))])).terms
+    apart = laid_out(days(), Terms([replace(plain, own=Own("file", {}))]))[0]
     groups = groups_of(days(), apart)
     assert groups is not None and groups.tolist() == days().file.tolist()
     assert groups_of(days(), Terms([plain])) is None

@@ -1,5 +1,7 @@
 """Of long logs a search takes some rows, the way to them as it was, and tells of the others."""
 
+from __future__ import annotations
+
 import functools
 import re
 from dataclasses import replace
@@ -11,7 +13,7 @@ import pytest
 import crosscheck
 import seecr
 from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.preparation.thinned import thinned
+from crosscheck.preparation.thinned import note_on_others, thinned
 from seecr.effects import Term, Terms
 from seecr.pose import quat_from_rotvec
 from seecr.prediction.experiment import Experiment
@@ -42,32 +44,32 @@ def stream(terms: Terms = PLAIN) -> Measurements:
 
 def test_few_rows_are_all_taken() -> None:
     data = stream()
-    found = thinned(ROBOT, data, ROWS)
-    assert found.data is data
-    assert not found.others.any() and found.note_on_others(PLAIN, NOISE) == ()
+    some, others = thinned(ROBOT, data, ROWS)
+    assert some is data
+    assert not others.any() and note_on_others(ROBOT, data, others, PLAIN, NOISE) == []
 
 
 def test_rows_are_taken_evenly_in_each_run_and_the_others_are_those_left() -> None:
     data = stream()
-    found = thinned(ROBOT, data, 120)
-    taken = ~found.others
+    some, others = thinned(ROBOT, data, 120)
+    taken = ~others
     assert taken[::10].all() and taken[np.flatnonzero(np.diff(data.run_index))].all() and taken[-1]
-    assert 120 <= found.data.n_rows < 200  # and where a cable turns round
-    assert found.data.line.tolist() == data.line[taken].tolist()
-    assert "one in 10" in found.data.notes[-1] and " rows of 1200: " in found.data.notes[-1]
+    assert 120 <= some.n_rows < 200  # and where a cable turns round
+    assert some.line.tolist() == data.line[taken].tolist()
+    assert "one in 10" in some.notes[-1] and " rows of 1200: " in some.notes[-1]
 
 
 def test_lengths_turn_round_at_rows_that_are_taken() -> None:
     """Play in the winches is the same at the rows that are left, but for the smallest turns."""
     backlash = Terms([Term.of(ROBOT, "backlash", gap_m=2e-3)])
     data = stream(backlash)
-    found = thinned(ROBOT, data, 60)
+    some, others = thinned(ROBOT, data, 60)
     whole, some = (
         Experiment(ROBOT, one.as_commands(ROBOT)).predict(backlash.effects).pose[:, :3]
-        for one in (data, found.data)
+        for one in (data, some)
     )
     plain = Experiment(ROBOT, data.as_commands(ROBOT)).predict().pose[:, :3]
-    taken = ~found.others
+    taken = ~others
     off = np.abs(some - whole[taken]).max(axis=1)
     assert np.median(np.abs(whole - plain).max(axis=1)) > 5e-4
     assert off.max() < 1e-4 and np.mean(off > 1e-6) < 0.02
@@ -77,10 +79,10 @@ def test_of_poses_in_no_order_the_first_of_each_run_are_taken() -> None:
     data = stream()
     mixed = np.random.default_rng(2).permutation(ROWS)
     data = replace(data, command_pose=data.command_pose[mixed], position=data.position[mixed])
-    found = thinned(ROBOT, data, 120)
+    some, others = thinned(ROBOT, data, 120)
     place = np.arange(ROWS) % (ROWS // RUNS)
-    assert found.others.tolist() == (place >= ROWS // RUNS // 10).tolist()
-    assert "in no order" in found.data.notes[-1]
+    assert others.tolist() == (place >= ROWS // RUNS // 10).tolist()
+    assert "in no order" in some.notes[-1]
 
 
 @pytest.mark.parametrize("most", [100, 150, 300])
@@ -88,11 +90,11 @@ def test_of_runs_that_alternate_some_of_each_kind_are_taken(most: int) -> None:
     """Each place was gone to from two sides; every second run came from one of them."""
     data = stream()
     to_and_fro = replace(data, run=np.char.add("run ", (np.arange(ROWS) // 2).astype(str)))
-    found = thinned(ROBOT, to_and_fro, most)
-    taken = np.char.replace(np.unique(found.data.run), "run ", "").astype(int)
-    assert most / 2 < len(found.data.run) < 1.1 * most
-    assert re.search(r"of one run in \d+; `add`", found.data.notes[-1])
-    assert found.others.sum() + found.data.n_rows == ROWS
+    some, others = thinned(ROBOT, to_and_fro, most)
+    taken = np.char.replace(np.unique(some.run), "run ", "").astype(int)
+    assert most / 2 < len(some.run) < 1.1 * most
+    assert re.search(r"of one run in \d+; `add`", some.notes[-1])
+    assert others.sum() + some.n_rows == ROWS
     for period in (2, 3, 4, 6):
         counts = np.bincount(taken % period, minlength=period)
         assert counts.min() > 0.7 * counts.mean(), period
@@ -102,16 +104,17 @@ def test_of_fewer_runs_all_are_kept_though_more_rows_are_left() -> None:
     """Half of 760 runs tell as much as all, in half of the time; of forty each may be a place."""
     data = stream()
     fewer = replace(data, run=np.char.add("run ", (np.arange(ROWS) // 30).astype(str)))
-    found = thinned(ROBOT, fewer, 120)
-    assert 120 < found.data.n_rows <= 240
-    assert len(np.unique(found.data.run)) == 40
+    some, _others = thinned(ROBOT, fewer, 120)
+    assert 120 < some.n_rows <= 240
+    assert len(np.unique(some.run)) == 40
 
 
 def test_the_others_are_predicted_to_the_noise_by_the_model_that_is_there_alone() -> None:
     terms = Terms([Term.of(ROBOT, "pulley_radius", radius_m=0.02)])
-    found = thinned(ROBOT, stream(terms), 120)
-    (well,) = found.note_on_others(terms, NOISE)
-    (badly,) = found.note_on_others(PLAIN, NOISE)
+    data = stream(terms)
+    _some, others = thinned(ROBOT, data, 120)
+    (well,) = note_on_others(ROBOT, data, others, terms, NOISE)
+    (badly,) = note_on_others(ROBOT, data, others, PLAIN, NOISE)
     assert "not used in any fit, predicted to 0.1" in well and "outlier" not in well
     assert well != badly
 
@@ -119,9 +122,9 @@ def test_the_others_are_predicted_to_the_noise_by_the_model_that_is_there_alone(
 def test_rows_far_off_are_no_part_of_what_is_told_of_the_others() -> None:
     data = stream()
     data.position[1::100] += 0.05
-    found = thinned(ROBOT, data, 120)
-    (said,) = found.note_on_others(PLAIN, NOISE)
-    far = found.others[1::100].sum()
+    _some, others = thinned(ROBOT, data, 120)
+    (said,) = note_on_others(ROBOT, data, others, PLAIN, NOISE)
+    far = others[1::100].sum()
     assert far > 8 and "predicted to 0.1" in said
     assert said.endswith(f", except for {far} outliers")
 
@@ -132,7 +135,10 @@ def test_what_was_filled_in_is_no_part_of_what_is_told_of_the_others() -> None:
     tilted[:, 3:] = quat_from_rotvec(np.outer(np.sin(np.arange(ROWS) / 20.0), [0.05, 0.03, 0.02]))
     plain = replace(plain, command_pose=tilted)
     level = replace(plain, quat_wxyz=np.tile([1.0, 0.0, 0.0, 0.0], (ROWS, 1)))
-    said = [thinned(ROBOT, one, 120).note_on_others(PLAIN, NOISE) for one in (plain, level)]
+    said = [
+        note_on_others(ROBOT, one, thinned(ROBOT, one, 120)[1], PLAIN, NOISE)
+        for one in (plain, level)
+    ]
     assert said[0] == said[1] and "deg" not in said[0][0]
 
 
