@@ -51,7 +51,8 @@ if TYPE_CHECKING:
         SeecrError,
     )
     from seecr.exported.export import Export, export
-    from seecr.inverse.correction import Correction, correct
+    from seecr.inverse.correction import correct
+    from seecr.inverse.result import Correction
     from seecr.prediction.experiment import Experiment, Prediction, placed, predict, tracked
     from seecr.prediction.model import Model, load_model, new_model
     from seecr.prediction.sensitivity import sensitivities
@@ -101,7 +102,8 @@ _MODULES = {
     ),
     "prediction.experiment": ("Experiment", "Prediction", "predict", "placed", "tracked"),
     "exported.export": ("Export", "export"),
-    "inverse.correction": ("Correction", "correct"),
+    "inverse.correction": ("correct",),
+    "inverse.result": ("Correction",),
     "workspace.grid": ("Workspace",),
     "workspace.maps": ("default_axes", "with_history", "workspace_map"),
     "workspace.stored": ("StoredMap", "store_map"),

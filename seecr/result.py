@@ -92,8 +92,7 @@ class Result(ABC):
             InputError: it has no page, or the file's name does not end in .html.
             InputFileError: the file cannot be written.
         """
-        page = _picture(self, "page")
-        page(self, _named_as(path, ".html"))
+        self._save("page", path, ".html")
 
     def save_recording(self, path: str | Path) -> None:
         """Write its recording for the Rerun viewer, as the command does.
@@ -102,8 +101,13 @@ class Result(ABC):
             InputError: it has no recording, or the file's name does not end in .rrd.
             InputFileError: the file cannot be written.
         """
-        recording = _picture(self, "recording")
-        recording(self, _named_as(path, ".rrd"))
+        self._save("recording", path, ".rrd")
+
+    def _save(self, what: str, path: str | Path, suffix: str) -> None:
+        draw, named = _picture(self, what), path_of(path, f"the {suffix} file to write")
+        if named.suffix.lower() != suffix:
+            raise InputError(f"{named}: expected a name that ends in {suffix}")
+        draw(self, named)
 
     def to_frame(self) -> Any:
         """All rows as a ``pyarrow.Table``; without pyarrow as a ``pandas.DataFrame``.
@@ -143,14 +147,6 @@ def _picture(result: Result, what: str) -> Any:
         others = f"; it has a {' and a '.join(has)}" if has else ""
         raise InputError(f"{type(result).__name__} has no {_PICTURES[what]}{others}")
     return getattr(pictures, what)
-
-
-def _named_as(path: str | Path, suffix: str) -> Path:
-    """A path with the suffix of what will be written there."""
-    named = path_of(path, f"the {suffix} file to write")
-    if named.suffix.lower() != suffix:
-        raise InputError(f"{named}: expected a name that ends in {suffix}")
-    return named
 
 
 def _table(records: Sequence[Record]) -> str:

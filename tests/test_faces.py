@@ -105,10 +105,9 @@ seecr.description.mjcf: CABLES
 seecr.description.robot: ITS_A_POINT
 seecr.effects.base: unfed
 seecr.errors: printable
-seecr.effects.loaded: load_effect
+seecr.effects.registry: load_effect
 seecr.equilibrium.search: elsewhere on_their_way
-seecr.equilibrium.solving: strained_rows
-seecr.equilibrium.strange: strange
+seecr.equilibrium.strange: strained_rows strange
 seecr.exported.export: wrote
 seecr.folders: check_ours staged
 seecr.files: Made check_writable json_pieces json_text with_toml write_text write_texts

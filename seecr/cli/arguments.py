@@ -32,8 +32,7 @@ from seecr.counted import counted
 from seecr.description.cables import ea_of
 from seecr.description.mjcf import CABLES
 from seecr.effects.base import unfed
-from seecr.equilibrium.solving import strained_rows
-from seecr.equilibrium.strange import strange
+from seecr.equilibrium.strange import strained_rows, strange
 from seecr.pose import NORM_TOLERANCE
 from seecr.statics.starts import commanded_poses
 from seecr.workspace.maps import MOST_POSES, axis_of

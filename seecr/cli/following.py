@@ -43,7 +43,7 @@ def introduce_all(texts: Sequence[str]) -> list[str]:
         InputError: one that cannot be had, or two of one name.
     """
     from seecr import InputError, introduce
-    from seecr.effects.loaded import load_effect
+    from seecr.effects.registry import load_effect
 
     found: dict[str, str] = {}
     for text in texts:

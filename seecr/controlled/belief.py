@@ -17,7 +17,8 @@ from seecr.description.joints import motion_columns, values_of_pose
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.effects.edits import setup_with
-from seecr.inverse.correction import Correction, correct
+from seecr.inverse.correction import correct
+from seecr.inverse.result import Correction
 from seecr.pose import Array, changes_between, moved_by
 from seecr.prediction.experiment import Experiment, Prediction, read, sensors_among
 from seecr.prediction.sensitivity import rates_of_reading, read_by_length

@@ -21,9 +21,15 @@ from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.statics import batch
 from seecr.statics.tables import Tables, assemble, take
-from seecr.tensions.balance import balance_of, here, rest_for, with_rest
+from seecr.tensions.balance import (
+    balance_of,
+    driven_tables,
+    here,
+    rest_for,
+    with_passive,
+    with_rest,
+)
 from seecr.tensions.distribution import tension_limits
-from seecr.tensions.passive import driven_tables, with_passive
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 """Directions of a force or moment, base frame; "least" is that of the least stiffness."""

@@ -229,13 +229,17 @@ class Effect:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A field of an effect: the places (k,) that are parameters, of ``width`` with null values."""
+    """A field of an effect: the places (k,) that are parameters, of ``width`` with null values.
+
+    ``where`` they stand among all parameters.
+    """
 
     name: str
     size: str
     places: NDArray[np.intp]
     width: int
     null: float
+    where: slice
 
     @property
     def count(self) -> int:
@@ -288,8 +292,9 @@ class Layout:
             if meta["shape"]:
                 numbers[0] = min(max(numbers[0], numbers[1]), numbers[2])
             own = (meta["unit"], *numbers, meta["shape"])
+            where = slice(len(rows), len(rows) + len(endings))
             rows += [(f"{item.name}{ending}{suffix}", *own) for ending in endings]
-            parts.append(_Part(item.name, meta["size"], places, len(every), numbers[0]))
+            parts.append(_Part(item.name, meta["size"], places, len(every), numbers[0], where))
         columns: list[Any] = list(zip(*rows, strict=True)) or [()] * 7
         names, units, *values, shape = columns
         null, lower, upper, scale = (np.array(value, float) for value in values)
@@ -314,34 +319,31 @@ class Layout:
     @property
     def cable_by_cable(self) -> list[NDArray[np.intp]]:
         """Parameters that every cable has one of, in their order: one (m,) index array each."""
-        out, first = [], 0
-        for part in self._parts:
-            apart = {"cable": 1, "spring": 1, "point": len(_AXES)}.get(part.size, 0)
-            if part.count == part.width:
-                out += [np.arange(first + k, first + part.count, apart) for k in range(apart)]
-            first += part.count
-        return out
+        apart = {"cable": 1, "spring": 1, "point": len(_AXES)}
+        return [
+            np.arange(part.where.start + k, part.where.stop, apart[part.size])
+            for part in self._parts
+            for k in range(apart.get(part.size, 0))
+            if part.count == part.width
+        ]
 
     @property
     def groups(self) -> dict[str, tuple[str, ...]]:
         """Names of the components of each parameter that has several, by its own: ``shift_m``."""
-        out, first = {}, 0
+        out = {}
         for part in self._parts:
             if part.size != "one" and part.count:
-                unit = self.units[first]
+                unit = self.units[part.where.start]
                 key = f"{part.name}_{unit}" if unit else part.name
-                out[key] = self.names[first : first + part.count]
-            first += part.count
+                out[key] = self.names[part.where]
         return out
 
     def build(self, vector: Array) -> Effect:
         """The effect with these parameters."""
         values: dict[str, Any] = {}
-        first = 0
         for part in self._parts:
-            own = np.asarray(vector[first : first + part.count], float)
+            own = np.asarray(vector[part.where], float)
             values[part.name] = float(own[0]) if part.size == "one" else part.whole(own)
-            first += part.count
         return self.effect(**values)
 
     def vector_of(self, effect: Effect) -> Array:
@@ -350,7 +352,7 @@ class Layout:
         Raises:
             InputError: something else than numbers, or another number of them.
         """
-        vector, first = self.null.copy(), 0
+        vector = self.null.copy()
         for part in self._parts:
             value = getattr(effect, part.name)
             if value is not None:
@@ -362,18 +364,15 @@ class Layout:
                         f"effect {self.name}: {part.name}: expected "
                         f"{counted(part.count, 'number')}, got {len(array)}"
                     )
-                vector[first : first + part.count] = array
-            first += part.count
+                vector[part.where] = array
         return vector
 
     def start(self, shape: dict[str, float]) -> Array:
         """Null values, with the shape parameters set."""
         vector = self.null.copy()
-        first = 0
         for part in self._parts:
             if part.name in shape:
-                vector[first : first + part.count] = shape[part.name]
-            first += part.count
+                vector[part.where] = shape[part.name]
         return vector
 
 

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 from seecr.lazy import lazily
 
 if TYPE_CHECKING:
-    from seecr.inverse.correction import Correction, correct
+    from seecr.inverse.correction import correct
+    from seecr.inverse.result import Correction
 
 __all__ = ["Correction", "correct"]
 
-__getattr__ = lazily(__name__, dict.fromkeys(__all__, "correction"))
+__getattr__ = lazily(__name__, {"Correction": "result", "correct": "correction"})

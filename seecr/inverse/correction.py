@@ -5,36 +5,38 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr.commands import Commands
-from seecr.compiled.columns import RADIUS, STRAIN
-from seecr.counted import between, counted, rows_words
-from seecr.description.cables import NONE_BREAKS, breaking_words
+from seecr.compiled.columns import HYSTERESIS, RADIUS
+from seecr.counted import counted
 from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.errors import InputError
 from seecr.inverse.in_place import poses_in_place
-from seecr.inverse.lengths import REACHED, commanded_lengths, lengths_with_history
+from seecr.inverse.lengths import commanded_lengths, lengths_with_history
 from seecr.inverse.nearest import Nearest, nearest
 from seecr.inverse.nearest_problem import NearestProblem
-from seecr.inverse.safe import narrowed, safe_margins
-from seecr.pose import Array, changes_between
+from seecr.inverse.result import Correction, rests_at
+from seecr.pose import Array
 from seecr.prediction.experiment import Experiment, Prediction, effects_of
 from seecr.prediction.model import GivenEffects, Model, model_given
-from seecr.result import COORDINATES, MOTION, Record, Result, named, rows_of
+from seecr.prediction.uncertainty import spread_of
 from seecr.statics.solution import Solution
 from seecr.statics.starts import Commanded, commands_from
 from seecr.statics.tables import Tables, assemble, spanless, take
 from seecr.tensions.balance import (
     bends,
     bridged_lengths,
+    driven_tables,
     is_straight,
     least_of_heavy,
+    with_passive,
     with_rest,
 )
 from seecr.tensions.distribution import (
@@ -46,9 +48,7 @@ from seecr.tensions.distribution import (
     without_span,
 )
 from seecr.tensions.max_margin import balances, counted_balance, holds_tightly
-from seecr.tensions.passive import driven_tables, with_passive
 from seecr.tensions.rest_lengths import Held, hold, holds_stably
-from seecr.units import millimetres, newtons, without_rounding
 
 PREFERENCES = ("pose", "position")
 """What may change at a pose that cannot be held: position and orientation, or the orientation
@@ -60,199 +60,6 @@ alone.
 _STRAIN = 0.05
 # The nearest pose leaves no cable shorter than this part of the shortest at the reference pose.
 _SHORT = 1e-2
-# Rotations below this [deg] are rounding, and displacements of nearest poses below this [m].
-_TURNED, _MOVED = 1e-9, 1e-9
-# Number of poses whose reason is printed.
-_NAMED = 5
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Correction(Result):
-    """Lengths to command for n wanted poses.
-
-    Attributes:
-        wanted: (n, 7).
-        aimed: (n, 7) the wanted poses if they can be held, else the nearest that can.
-        lengths: (n, m) [m] to command, as told lengths: at the reference pose they are the rest
-            lengths of the description, and for passive lines everywhere.
-        held: (n,) bool, tensions within the limits can hold the wanted pose.
-        found: (n,) bool, there are lengths for the wanted pose or for the nearest that can be held.
-        settled: (n,) bool, ``aimed`` is the wanted pose itself, or meets the first-order conditions
-            of a local minimum (Karush, Kuhn and Tucker) and the platform stays there. Of the local
-            minima of many searches the nearest is taken.
-        why_not: (n,) sentences, why a wanted pose cannot be held; "" if it can.
-        solution: the certified equilibrium with these lengths.
-        commands: the lengths as commands that every function accepts, with the runs, times,
-            temperatures and loads that they are for.
-        strain_limit: strain of each cable up to which the nearest poses were sought, because no
-            highest tension was given; None if all cables had one.
-    """
-
-    robot: Robot
-    wanted: Array
-    aimed: Array
-    lengths: Array
-    held: NDArray[np.bool_]
-    found: NDArray[np.bool_]
-    settled: NDArray[np.bool_]
-    solution: Solution
-    commands: Commands
-    why_not: tuple[str, ...]
-    strain_limit: float | None = None
-
-    def in_any_orientation(self) -> Correction:
-        """The same if positions alone are wanted, which other orientations may hold as well."""
-        off = np.linalg.norm(self.aimed[:, :3] - self.wanted[:, :3], axis=1)
-        kept = self.found & (off <= _MOVED)
-        said = zip(kept, self.why_not, strict=True)
-        return replace(
-            self,
-            wanted=np.where(kept[:, None], self.aimed, self.wanted),
-            held=self.held | kept,
-            why_not=tuple("" if one else why for one, why in said),
-        )
-
-    @property
-    def left(self) -> Array:
-        """(n, 6) [m, rad] from the wanted pose to the platform's equilibrium."""
-        return changes_between(self.solution.pose, self.wanted)
-
-    @property
-    def stays(self) -> NDArray[np.bool_]:
-        """(n,) bool, the platform is at rest within a micrometre of ``aimed``, and stable."""
-        return self.found & _rests_at(self.aimed, self.solution)
-
-    @property
-    def reached(self) -> NDArray[np.bool_]:
-        """(n,) bool, the platform is at rest within a micrometre of the wanted pose, and stable."""
-        return self.held & self.stays
-
-    def lines(self) -> list[str]:
-        """How many poses are reached, the remaining errors, and which poses cannot be held."""
-        n, left = len(self.wanted), self.left
-        at, lost = self.reached, ~self.held
-        out = [f"{self.robot.name}: {int(at.sum())} of {counted(n, 'pose')} reached"]
-        if np.any(at):
-            out.append(
-                f"remaining error: at most {millimetres(_largest(left[at, :3]), 2)} and "
-                f"{without_rounding(_degrees(left[at, 3:])):.2g} deg"
-            )
-            out.append(self._tensions(at))
-        near, leaves = lost & self.found, self.found & ~self.stays
-        if np.any(lost):
-            out.append(f"{int(lost.sum())} cannot be held with tensions within the limits:")
-            out += self._reasons()
-        if np.any(near):
-            out.append(
-                f"the nearest poses that can be held are up to "
-                f"{millimetres(_largest(left[near, :3]))} and "
-                f"{_degrees(left[near, 3:]):.4g} deg away"
-            )
-            out.append(self._tensions(near))
-        out += self._strain_lines(lost)
-        for rows, text in (
-            (lost & ~self.found, "of them: no pose nearby was found that can be held"),
-            (self.held & ~self.found, "can be held, but a cable would have no length to pay out"),
-            (near & ~self.settled, "of them: a nearer pose that can be held may exist"),
-            (leaves, "where forces balance but the platform does not come to rest"),
-        ):
-            if np.any(rows):
-                places = rows_words(np.flatnonzero(rows).tolist(), self.commands.line)
-                out.append(f"{int(rows.sum())} {text}: {places}")
-        if self.robot.weight == 0.0 and self.solution.slack[leaves].any():
-            out[-1] += (
-                ": without gravity, slack cables leave it free; give a lowest tension above 0"
-            )
-        return out
-
-    def _tensions(self, rows: NDArray[np.bool_]) -> str:
-        """The least and the largest tension of some poses."""
-        pulls = self.solution.tensions[rows][:, self.robot.driven]
-        return f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N"
-
-    def place(self, row: int) -> str:
-        """The name of a row: "line 24" of its file, or "pose 3", counted from 0, without a file."""
-        return rows_words([row], self.commands.line)
-
-    def _strain_lines(self, lost: NDArray[np.bool_]) -> list[str]:
-        """How much cables are strained if nothing limits that, and which ropes this breaks."""
-        driven = self.robot.driven
-        every = np.where(self.found[:, None], self.solution.evaluation.states[..., STRAIN], 0.0)
-        strains = every[:, driven]
-        if not strains.any():
-            return []
-        row, k = np.unravel_index(int(np.argmax(strains)), strains.shape)
-        strain, pull = float(strains[row, k]), float(self.solution.tensions[row][driven][k])
-        endless, broken = self.strain_limit is not None, breaking_words(strain)
-        out = []
-        if endless or broken:
-            name = self.robot.cable_names[int(np.flatnonzero(driven)[k])]
-            given = "no highest tension was given" if endless else "cables may break"
-            out.append(
-                f"{given}: {name} pulls {newtons(pull)} at {self.place(int(row))}, which strains "
-                f"it by {100.0 * strain:.3g} %, {broken or NONE_BREAKS}"
-            )
-        if endless and np.any(lost):
-            out.append(
-                "nearest poses are sought with cables strained by at most "
-                f"{100.0 * _STRAIN:g} %; give a highest tension"
-            )
-        return out
-
-    def _reasons(self) -> list[str]:
-        """The first poses that cannot be held, each with the reason."""
-        rows = np.flatnonzero(~self.held)
-        named_rows = [f"  {self.place(i)}: {self.why_not[i]}" for i in rows[:_NAMED]]
-        more = len(rows) - _NAMED
-        return [*named_rows, f"  and {more} more, see why_not"] if more > 0 else named_rows
-
-    def records(self) -> list[Record]:
-        """One row per pose: wanted pose, lengths, remaining error, tensions."""
-        cables, driven = self.robot.cable_names, np.flatnonzero(self.robot.driven)
-        return rows_of(
-            {
-                **named("want_{}", COORDINATES, self.wanted),
-                **named("length_{}_m", [str(k + 1) for k in driven], self.lengths[:, driven]),
-                "held": self.held,
-                "reached": self.reached,
-                "why_not": self.why_not,
-                **named("left_{}", MOTION, self.left),
-                **named("tension_{}_N", cables, self.solution.tensions),
-            }
-        )
-
-    def as_json(self, kept: Array | None = None) -> Record:
-        """``correction.json``.
-
-        Args:
-            kept: (n,) probability that tensions stay within their limits, :func:`kept_chance`.
-        """
-        left, line, there = self.left, self.commands.line, self.solution
-        return {
-            "robot": self.robot.name,
-            "cables": self.robot.cable_names,
-            "poses": len(self.wanted),
-            "reached": int(self.reached.sum()),
-            "not_held": int((~self.held).sum()),
-            "without_answer": int((~(self.found & there.converged)).sum()),
-            "rows": [
-                {
-                    **({} if line is None else {"line": line[i]}),
-                    "wanted": self.wanted[i],
-                    "aimed": self.aimed[i] if self.found[i] else None,
-                    "lengths_m": self.lengths[i],
-                    "held": self.held[i],
-                    "why_not": self.why_not[i] or None,
-                    "reached": reached,
-                    "left_m": left[i, :3],
-                    "left_rad": left[i, 3:],
-                    "within_limits_probability": None if kept is None else kept[i],
-                    "tensions_N": there.tensions[i],
-                    "status": there.status[i] if self.found[i] else "no_answer",
-                }
-                for i, reached in enumerate(self.reached)
-            ],
-        }
 
 
 def correct(
@@ -403,7 +210,7 @@ class _Search:
         lengths, prediction = mixed._lengths(commands, there)
         if self.safe is not None:
             told = replace(commands, lengths=lengths, told=True)
-            margins = safe_margins(self.robot, told, self.safe, prediction)
+            margins = _safe_margins(self.robot, told, self.safe, prediction)
             if margins is not None:
                 mixed = mixed._within(commands, margins, held.fine & found)
                 there = mixed._held(commands)[0]
@@ -422,7 +229,7 @@ class _Search:
     def _within(self, commands: Commands, margins: Array, rows: NDArray[np.bool_]) -> _Search:
         """The same with limits that are narrower by margins (n, m) [N], at some rows (n,)."""
         now, tables = self.limits, self._tables(commands)
-        low, high = narrowed(tables, now.aim, (now.low, now.high), margins, rows)
+        low, high = _narrowed(tables, now.aim, (now.low, now.high), margins, rows)
         return replace(self, limits=replace(now, low=low, high=high))
 
     def margins_in_place(self, thorough: bool) -> Array:
@@ -438,7 +245,7 @@ class _Search:
         there = own._held(commands)[0]
         solution = own._lengths(commands, there)[1].solution()
         inside = np.minimum(there.tensions - self.limits.low, self.limits.high - there.tensions)
-        fine = there.fine & _rests_at(aimed[rows], solution)
+        fine = there.fine & rests_at(aimed[rows], solution)
         margins[rows[fine]] = np.maximum(inside[fine].min(axis=1), 0.0)
         return margins
 
@@ -533,24 +340,6 @@ class _Search:
         return lengths_with_history(self.robot, commands, self.effects, held, limits)
 
 
-def _largest(vectors: Array, rounding: float = _MOVED) -> float:
-    """The longest of vectors (n, 3), displacements [m] or rotations [deg]; 0 for rounding."""
-    longest = float(np.linalg.norm(vectors, axis=1).max())
-    return 0.0 if longest < rounding else longest
-
-
-def _degrees(turned: Array) -> float:
-    """The largest of rotations (n, 3) [rad] in degrees; 0 where that is rounding."""
-    return _largest(np.degrees(turned), _TURNED)
-
-
-def _rests_at(poses: Array, solution: Solution) -> NDArray[np.bool_]:
-    """(n,) whether the platform is at rest at poses (n, 7), to within a micrometre."""
-    size = np.where(np.arange(6) < 3, 1.0, solution.robot.length)
-    off = np.abs(changes_between(solution.pose, poses) * size).max(axis=1)
-    return np.asarray(solution.converged & (off < REACHED))
-
-
 def _without(solution: Solution, rows: NDArray[np.bool_]) -> Solution:
     """The solution with NaN in rows for which there are no lengths."""
     names = ("pose", "deviation", "tensions", "rest_lengths")
@@ -558,3 +347,58 @@ def _without(solution: Solution, rows: NDArray[np.bool_]) -> Solution:
         name: np.where(rows[:, None], np.nan, getattr(solution, name)) for name in names
     }
     return replace(solution, **kept) if np.any(rows) else solution
+
+
+# How far inside their limits tensions should be, given what is not known of a model.
+
+# Probability that all tensions of a pose stay within limits, if these are as far away as is safe:
+# one pose in a hundred may still touch one.
+_SAFE = 0.99
+# Where no tensions are so far inside, they are as far as the first of these parts that holds.
+_PARTS = np.linspace(1.0, 0.1, 10)
+
+
+def _safe_margins(
+    robot: Robot, commands: Commands, model: Model, prediction: Prediction
+) -> Array | None:
+    """Margins (n, k) [N] that keep tensions within limits; None if the model has no covariance.
+
+    They are of the k driven cables, with all falls of their lines.
+
+    Each is so many standard errors of the tension that by Bonferroni's inequality all cables stay
+    inside with the probability above, and what hysteresis may add if a pose is reached another way.
+    NaN for a row without an answer.
+    """
+    assert commands.lengths is not None
+    lost = np.asarray(np.isnan(commands.lengths).any(axis=1))
+    lengths = np.where(lost[:, None], robot.rest_lengths, commands.lengths)
+    spread = spread_of(robot, replace(commands, lengths=lengths), model)
+    if spread is None:
+        return None
+    times = NormalDist().inv_cdf(1.0 - (1.0 - _SAFE) / robot.n_driven)
+    margins = times * robot.falls * spread.tensions + prediction.tables.cables[..., HYSTERESIS]
+    margins = margins[:, robot.driven]
+    margins[lost] = np.nan
+    return margins
+
+
+def _narrowed(
+    tables: Tables, aim: Array, limits: tuple[Array, Array], margins: Array, rows: NDArray[np.bool_]
+) -> tuple[Array, Array]:
+    """Limits (n, k) [N] that are narrower by these margins, or the largest part of them that holds.
+
+    Args:
+        tables: of n poses, of the driven cables. aim: (n, k) tensions. limits: (k,) or (n, k).
+        margins: (n, k). rows: (n,) which poses can be held.
+    """
+    low, high = (np.array(np.broadcast_to(one, margins.shape)) for one in limits)
+    left = np.flatnonzero(rows & np.isfinite(margins).all(axis=1) & margins.any(axis=1))
+    for part in _PARTS:
+        least, most = low[left] + part * margins[left], high[left] - part * margins[left]
+        wide = (least <= most).all(axis=1)
+        tried = np.flatnonzero(wide)
+        held = hold(take(tables, left[wide]), aim[left[wide]], least[wide], most[wide]).fine
+        fine = tried[held]
+        low[left[fine]], high[left[fine]] = least[fine], most[fine]
+        left = np.delete(left, fine)
+    return low, high

@@ -19,7 +19,7 @@ from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.pose import Array, changes_between
 from seecr.prediction.experiment import Experiment, Prediction
-from seecr.tensions.passive import driven_tables, with_passive
+from seecr.tensions.balance import driven_tables, with_passive
 from seecr.tensions.rest_lengths import Held, hold_again
 
 REACHED = 1e-6

@@ -194,14 +194,6 @@ def _tables(parts: Sequence[Tables], order: NDArray[np.intp]) -> Tables:
     )  # fmt: skip
 
 
-def forget(at: Prediction) -> None:
-    """Drop what a prediction computes again if asked; it takes more memory than all else."""
-    for part in at.parts if isinstance(at, PartedPrediction) else ():
-        forget(part)
-    at.walk = None
-    at.kept.clear()
-
-
 def rates_by_length(at: Prediction) -> Array:
     """Like :func:`.sensitivity.read_by_length`, but part by part if the prediction has parts."""
     if not isinstance(at, PartedPrediction):

@@ -21,7 +21,6 @@ from seecr.arguments import check_kind, numbers
 from seecr.compiled.columns import RADIUS, STRAIN, WEIGHT
 from seecr.compiled.rates import wrench_by_ends_batch
 from seecr.counted import counted
-from seecr.description.joints import motion_columns
 from seecr.effects.base import Effect, Layout, Readings
 from seecr.effects.edits import is_built_in
 from seecr.effects.setup import QUANTITIES, History, Setup
@@ -504,12 +503,8 @@ def _moved(at: Prediction, step: Array) -> Array:
 
 
 def _motion_at(tables: Tables, found: batch.Evaluation) -> Array:
-    if tables.screws.shape[1] == 0:
-        return np.diag(1.0 / np.repeat([1.0, tables.length], 3))[None]
-    screws = batch.joints_at_rest(tables, found)
-    per = np.where(screws[..., 0] == 1.0, 1.0 / tables.length, 1.0)
-    origin = batch.platform_poses(tables, found.deviation)[:, :3]
-    return motion_columns(screws, origin) * per[:, None, :]
+    size = np.repeat([1.0, tables.length], 3)
+    return np.asarray(batch.motions(tables, found).swapaxes(1, 2) / size[:, None])
 
 
 def _inverse_stiffness(at: Prediction) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from seecr.counted import counted
 from seecr.description.cables import rope_of
 from seecr.description.mjcf import CABLES
-from seecr.inverse.correction import Correction
+from seecr.inverse.result import Correction
 from seecr.pose import Array, pose_difference, rotvec_from_quat
 from seecr.prediction.model import DataReach
 from seecr.prediction.uncertainty import Spread

@@ -17,7 +17,7 @@ from seecr.columns.csv import table_lines, table_text
 from seecr.commands import Commands, Loads
 from seecr.description.robot import Robot
 from seecr.files import written
-from seecr.inverse.correction import Correction
+from seecr.inverse.result import Correction
 from seecr.pose import Array
 from seecr.prediction.uncertainty import Spread
 from seecr.result import COORDINATES, Record

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from seecr.inverse.correction import Correction
+from seecr.inverse.result import Correction
 from seecr.show.map_figure import map_figure
 from seecr.show.sweep_figure import sweep_figure
 from seecr.statics.solution import Solution

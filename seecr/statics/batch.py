@@ -284,13 +284,13 @@ def _refuse_no_length(tables: Tables, found: Evaluation) -> None:
 
 
 def motions(tables: Tables, at: Evaluation) -> Array:
-    """The platform's motion (n, d, 6) per step along each coordinate, at the states of ``at``.
+    """The platform's motion (n or 1, d, 6) per step along each coordinate, where ``at`` is.
 
     Translation of its origin, and rotation vector times the robot's length, base axes.
     """
     n = len(tables)
     if tables.screws.shape[1] == 0:
-        return np.broadcast_to(np.eye(6), (n, 6, 6))
+        return np.eye(6)[None]
     from seecr.compiled.joint_kinematics import apart_batch  # takes a while to import
 
     out, given, length = (

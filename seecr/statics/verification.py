@@ -1,4 +1,4 @@
-"""Residual and stability of a solution, computed again with plain NumPy.
+"""Residual and stability of a solution, computed again with plain NumPy and SciPy.
 
 This shares no code with the solver: forces from the points and rest lengths of straight cables, the
 stiffness by differences of them, joints as a product of their motions. Points, lengths and loads
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from seecr.compiled import columns as at
 from seecr.counted import counted, rows_words
@@ -125,9 +126,7 @@ def _checked(robot: Robot, cables: Array, load: Array, pose: Array) -> tuple[flo
         out = []
         for k in range(d):
             ends = [frame_at(q + sign * step[k] * np.eye(d)[k]) for sign in (1.0, -1.0)]
-            turn = ends[0][0] @ ends[1][0].T
-            spin = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0],
-                                   turn[1, 0] - turn[0, 1]])  # fmt: skip
+            spin = Rotation.from_matrix(ends[0][0] @ ends[1][0].T).as_rotvec()
             out.append(np.append(ends[0][1] - ends[1][1], spin) / (2.0 * step[k]))
         return np.array(out)
 
@@ -164,10 +163,12 @@ def _wrench(turn: Array, place: Array, cables: Array, load: Array) -> tuple[Arra
 
 def _motion_of(robot: Robot, pose: Array) -> Callable[[Array], tuple[Array, Array]]:
     """Orientation (3, 3) and position (3,) as a function of coordinates (d,), zero at the pose."""
-    home = _frame(robot.reference_pose)
-    turn, place = _frame(pose)
+    home, (turn, place) = (
+        (Rotation.from_quat(one[[4, 5, 6, 3]]).as_matrix(), one[:3])
+        for one in (robot.reference_pose, pose)
+    )
     if not robot.joints:
-        return lambda q: (_turned(q[3:]) @ turn, place + q[:3])
+        return lambda q: (Rotation.from_rotvec(q[3:]).as_matrix() @ turn, place + q[:3])
 
     def chain(q: Array) -> tuple[Array, Array]:
         """The motions of the joints one after the other, the last one first (Brockett 1984)."""
@@ -176,7 +177,7 @@ def _motion_of(robot: Robot, pose: Array) -> Callable[[Array], tuple[Array, Arra
             if joint.kind == "slide":
                 origin = origin + value * joint.axis
             else:
-                about = _turned(value * joint.axis)
+                about = Rotation.from_rotvec(value * joint.axis).as_matrix()
                 frame, origin = about @ frame, joint.point + about @ (origin - joint.point)
         return frame, origin
 
@@ -191,23 +192,3 @@ def _motion_of(robot: Robot, pose: Array) -> Callable[[Array], tuple[Array, Arra
     if np.abs(off(values)).max() > 1e-9 * robot.reach:
         raise InputError("no joint values lead to its pose")
     return lambda q: chain(values + q)
-
-
-def _frame(pose: Array) -> tuple[Array, Array]:
-    """Orientation (3, 3) and position (3,) of a pose (7,)."""
-    w, v = pose[3], pose[4:]
-    cross = _cross(v)
-    return np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross, pose[:3]
-
-
-def _turned(rotvec: Array) -> Array:
-    """Rodrigues' formula."""
-    angle = float(np.linalg.norm(rotvec))
-    cross = _cross(rotvec)
-    half = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
-    return np.eye(3) + np.sinc(angle / np.pi) * cross + half * cross @ cross
-
-
-def _cross(v: Array) -> Array:
-    """The matrix of a cross product."""
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

@@ -13,11 +13,15 @@ from numpy.typing import NDArray
 
 from seecr.compiled.columns import (
     ANCHOR,
+    ARM,
     COMPLIANCE,
     CREEP,
     CREEP_RATE,
     EA,
     EXIT,
+    EXTERNAL_FORCE,
+    EXTERNAL_MOMENT,
+    FORCE,
     FRICTION,
     GAP,
     LIFT,
@@ -28,7 +32,8 @@ from seecr.compiled.columns import (
     WEIGHT,
     WINCH_SIDE,
 )
-from seecr.pose import Array
+from seecr.description.robot import Robot
+from seecr.pose import Array, cross
 from seecr.statics import batch
 from seecr.statics.tables import ByRow, Tables, by_row, rest_lengths_of, take, told_apart, ways
 
@@ -330,3 +335,34 @@ def _rises(tables: Tables) -> Array:
     spans = np.linalg.norm(way, axis=2)
     # a cable without a span, its anchor point at its exit point, has no direction: it hangs level
     return np.asarray(-(way * up).sum(axis=2) / np.where(spans > 0.0, spans, 1.0))
+
+
+# The balance of the driven cables alone: what passive lines pull is part of the load.
+#
+# At a given pose their wrench is known, since their rest lengths are. Winches balance what is left.
+
+
+def driven_tables(tables: Tables, robot: Robot) -> Tables:
+    """The tables of the k driven cables, with the passive lines' wrench among the external ones.
+
+    They hold at the poses of the tables alone, (n, k) cables. A robot without passive lines has
+    the same tables.
+    """
+    if robot.all_driven:
+        return tables
+    others = replace(tables, cables=np.ascontiguousarray(tables.cables[:, ~robot.driven]))
+    each = batch.rates_of_cables(others, batch.Evaluation.at_commands(others))
+    force, arm = each[..., FORCE : FORCE + 3], each[..., ARM : ARM + 3]
+    load = tables.load.copy()
+    load[:, EXTERNAL_FORCE : EXTERNAL_FORCE + 3] += force.sum(axis=1)
+    load[:, EXTERNAL_MOMENT : EXTERNAL_MOMENT + 3] += cross(arm, force).sum(axis=1)
+    return replace(tables, cables=np.ascontiguousarray(tables.cables[:, robot.driven]), load=load)
+
+
+def with_passive(robot: Robot, lengths: Array) -> Array:
+    """Lengths (n, m) [m] of all lines, from those (n, k) of the driven ones."""
+    if robot.all_driven:
+        return lengths
+    out = np.tile(robot.rest_lengths, (len(lengths), 1))
+    out[:, robot.driven] = lengths
+    return out

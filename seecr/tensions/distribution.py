@@ -22,7 +22,7 @@ _PART = 1e-2
 AIMS = ("minimum", "middle")
 """Names of wanted tensions: as small as possible, or the middle of the limits."""
 SAFE = "safe"
-"""The smallest ones that an uncertain model keeps within limits; see :mod:`seecr.inverse.safe`."""
+"""The smallest ones that an uncertain model keeps within limits."""
 
 
 def tension_limits(robot: Robot, lowest: ArrayLike, highest: ArrayLike) -> tuple[Array, Array]:

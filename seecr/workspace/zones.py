@@ -31,10 +31,9 @@ from seecr.result import Record, Result
 from seecr.statics.solution import Solution, check_solution
 from seecr.statics.starts import commanded_poses
 from seecr.statics.tables import Tables, assemble
-from seecr.tensions.balance import balance_of, bends
+from seecr.tensions.balance import balance_of, bends, driven_tables
 from seecr.tensions.distribution import tension_limits
 from seecr.tensions.max_margin import margins_inside
-from seecr.tensions.passive import driven_tables
 
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects

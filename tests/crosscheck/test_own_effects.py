@@ -254,7 +254,7 @@ def test_two_of_one_name_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_other_processes_find_the_class_of_a_file(tmp_path: Path) -> None:
-    from seecr.effects.loaded import load_effect
+    from seecr.effects.registry import load_effect
     from seecr.parallel import processes
 
     file = tmp_path / "hoses_of_a_test.py"

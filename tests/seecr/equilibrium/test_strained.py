@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from crosscheck.planning.design import make_plan
 from seecr import Commands, load_robot, model_names, model_path, solve
 from seecr.cli import main
-from seecr.equilibrium.solving import strained, strained_rows
+from seecr.equilibrium.strange import strained, strained_rows
 
 
 def test_what_a_rest_length_or_a_stiffness_too_small_does_is_told() -> None:

@@ -13,7 +13,6 @@ import seecr
 from seecr.compiled.columns import ARM, FORCE, REST, STRAIN
 from seecr.pose import Array, pose_difference
 from seecr.prediction import sensitivity
-from seecr.prediction.parted import forget
 from seecr.prediction.sensitivity import (
     are_by_point,
     cable_rates,
@@ -245,18 +244,6 @@ def test_the_stiffness_of_heavy_cables_over_pulleys_is_no_derivative() -> None:
     """It is the symmetric part of one: differences are taken."""
     at, _terms, _found = predicted("demobot_cogiro", ("cable_weight", "pulley_radius"))
     assert not are_by_point(at.tables)
-
-
-@pytest.mark.parametrize("frozen", [True, False])
-@pytest.mark.parametrize("names", [("pulley_radius",), LIGHT])
-def test_what_a_prediction_forgot_is_computed_again(names: tuple[str, ...], frozen: bool) -> None:
-    at, terms, _found = predicted("demobot_cogiro", names)
-    experiment = experiment_of("demobot_cogiro", seed=5, reach=0.4)
-    before, pose = seecr.sensitivities(experiment, terms, at, frozen=frozen), at.pose
-    forget(at)
-    assert at.walk is None and not at.kept
-    assert np.array_equal(at.pose, pose)
-    assert np.array_equal(seecr.sensitivities(experiment, terms, at, frozen=frozen), before)
 
 
 def test_the_force_is_what_the_platform_is_held_with() -> None:
