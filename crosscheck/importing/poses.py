@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +11,22 @@ from scipy.spatial.transform import Rotation
 
 from crosscheck.importing.logs import Logged, Stream, unit_quaternions
 from crosscheck.measurements.plausible import is_nines
-from seecr.columns.commands import began, times_of_day
+from seecr.columns.commands import began, times
 from seecr.columns.csv import Table, read_table, show
-from seecr.columns.headers import foreign
+from seecr.columns.headers import columns_said, renamed
+from seecr.columns.known import (
+    ANGLES,
+    POSITION,
+    QUATERNION,
+    Columns,
+    know_columns,
+    other_rotations,
+    unused_note,
+)
 from seecr.counted import counted, some
 from seecr.errors import InputError, InputFileError
 from seecr.pose import Array, quat_from_rxyz
-from seecr.units import UNITS, Unit, of_columns
+from seecr.units import of_columns
 
 _TIMES = re.compile(r"(t|time|timestamp)(?:_(\w+)|\s*\[(\w+)\])?", re.IGNORECASE)
 # A number of nines in so many rows stands for "not seen".
@@ -35,8 +42,8 @@ def read_poses(path: Path, unit: str | None = None) -> Logged:
     """Read a log with columns t, x, y, z and qw, qx, qy, qz or rx, ry, rz with their units.
 
     Args:
-        path: the file; names may have our prefix ``meas_``, and units as ours, ``x_mm`` or
-            ``x [mm]``. R = Rx(rx) Ry(ry) Rz(rz), as for all our columns.
+        path: the file; its columns are those of measurements, whose prefix ``meas_`` may be missing
+            or another word, and quaternions are taken before angles.
         unit: of lengths, if the names have none.
 
     Raises:
@@ -47,134 +54,104 @@ def read_poses(path: Path, unit: str | None = None) -> Logged:
     if unit is not None and unit not in lengths:
         raise InputError(f"--unit: expected one of {', '.join(lengths)}, got {unit!r}")
     table = read_table(path)
-    names = foreign(table)
-    found = _columns(table, names)
-    t_s, first = _times(table, names)
-    lacking = [axis for axis in "xyz" if axis not in found]
-    if lacking:
-        raise table.error(
-            f"expected columns of a pose such as x_mm y_mm z_mm, got no {', '.join(lacking)} among "
-            f"{some(table.names, 8)}; rename them, or say --columns THEIRS=meas_x_mm,..."
-        )
-    if unit is not None and all(found[axis][1] for axis in "xyz"):
-        raise InputError(f"--unit {unit}: the columns of {path.name} state their own; leave it out")
-    _refuse_nines(table, [found[axis][0] for axis in "xyz"])
-    position = np.stack([_length(table, *found[axis], unit) for axis in "xyz"], axis=1)
-    bodies = {path.stem: (position, _turns(table, found))}
+    if len(table.names) == 1:
+        text = "expected a row of names, and cells separated by commas, semicolons or tabs"
+        raise table.error(f"{text}, got {show(table.names[0])}; export it like this")
+    with renamed({**_ours(table, unit), **columns_said()}):
+        columns = know_columns(table, 0)
+    _check_parts(columns)
+    turned = other_rotations(columns.unused)
+    others = [name for name in columns.unused if name not in turned]
+    columns.notes[:] = [*table.notes, *unused_note(others, turned)]
+    position = columns.readings("meas", POSITION)
+    _refuse_nines(columns, position)
+    t_s = times(columns, np.arange(columns.n_rows).astype(str))  # their order is checked here
+    assert t_s is not None
+    stands = np.append(False, np.diff(t_s) <= 0.0)
+    text = "expected times that increase after {:.9g} s, got {:.9g} s; are two recordings in one "
+    columns.refuse(
+        stands, "t",
+        lambda k: f"{text.format(t_s[k - 1], t_s[k])}file? Import them one at a time",
+    )  # fmt: skip
+    bodies, first = {path.stem: (position, _turns(columns))}, columns.known["t"].index
     return Logged(
-        path, t_s, table.line, bodies, {}, notes=_unread(table, names, found), began=first
+        path, t_s, table.line, bodies, {}, notes=tuple(columns.notes), began=began(table, first)
     )
 
 
-def _refuse_nines(table: Table, columns: Sequence[int]) -> None:
+def _ours(table: Table, unit: str | None) -> dict[str, str]:
+    """The names of a log's columns with ours for measurements.
+
+    Raises:
+        InputError: ``unit`` is given though the names of positions have their own.
+        InputFileError: neither has one.
+    """
+    found = dict[str, str]()
+    for name in table.names:
+        if match := _TIMES.fullmatch(name):
+            found[name] = f"t_{match[2] or match[3] or 's'}"
+        elif match := _LABEL.fullmatch(name):
+            suffix = match[2] or match[3] or match[4] or ""
+            part = match[1].lower().removeprefix("t")
+            own = suffix or (unit if part in POSITION and unit else "")
+            found[name] = f"meas_{part}_{own}" if own else f"meas_{part}"
+            if part in POSITION and unit and suffix:
+                text = f"--unit {unit}: the columns of {table.path.name} state their own"
+                raise InputError(f"{text}; leave it out")
+            if part in POSITION and not own and name not in columns_said():
+                text = (
+                    f"expected a unit in the name of column {name} ({', '.join(of_columns('m'))})"
+                )
+                raise table.error(f"{text}, got none; add it or --unit", column=name)
+    turned = any(ours.startswith("meas_q") for ours in found.values())
+    return {
+        theirs: ours for theirs, ours in found.items() if not (turned and ours.startswith("meas_r"))
+    }
+
+
+def _check_parts(columns: Columns) -> None:
+    """Refuse a log without times or positions, or with a part of an orientation."""
+    table, present = columns.table, columns.present
+    lacking = [axis for axis in POSITION if not present("meas", (axis,))]
+    names, near = some(table.names, 8), columns.near_misses()
+    if "t" not in columns.known or lacking:
+        what = "times such as t_s" if "t" not in columns.known else "a pose such as x_mm y_mm z_mm"
+        lost = f"no {', '.join(lacking)} among " if lacking and "t" in columns.known else ""
+        raise table.error(
+            f"expected columns of {what}, got {lost}{names}{near}; rename them, or say --columns "
+            "THEIRS=meas_x_m,THEIRS=t_s,..."
+        )
+    for parts in (QUATERNION, ANGLES):
+        given = present("meas", parts)
+        if 0 < len(given) < len(parts):
+            lost = ", ".join(part for part in parts if part not in given)
+            raise table.error(f"expected all of {', '.join(parts)} or none, got no {lost}")
+
+
+def _refuse_nines(columns: Columns, position: Array) -> None:
     """Refuse what programs write where nothing is seen: the same nines in all three coordinates."""
-    given = np.stack([table.numbers(column, blank_is_nan=True) for column in columns], axis=1)
-    alike = (given == given[:, :1]).all(axis=1)
+    table, column = columns.table, columns.known["meas_x"]
+    given = position / column.unit.to_si(1.0)
+    alike = np.ptp(given, axis=1) <= 1e-9 * np.abs(given[:, 0])
     rows = [int(row) for row in np.flatnonzero(alike) if is_nines(float(given[row, 0]))]
     if len(rows) >= _ROWS:
         text = (
             f"expected a position, got {given[rows[0], 0]:.10g} for all of it, as in "
             f"{counted(len(rows), 'row')}; leave the cells empty where the body was not seen"
         )
-        raise table.error(text, row=rows[0], column=table.names[columns[0]])
+        raise table.error(text, row=rows[0], column=column.name)
 
 
-def _unread(
-    table: Table, names: Sequence[str], found: Mapping[str, tuple[int, str]]
-) -> tuple[str, ...]:
-    """A note on columns that are not read, if there are any."""
-    read = {column for column, _unit in found.values()}
-    others = [
-        name
-        for c, name in enumerate(table.names)
-        if name and c not in read and not _TIMES.fullmatch(names[c])
-    ]
-    if not others:
-        return ()
-    turned = any(name[0] in "qr" for name in found)
-    hint = "" if turned else "; rotations are read from qw qx qy qz or rx_deg ry_deg rz_deg"
-    return (f"columns not read: {some(others, 6)}{hint}",)
-
-
-def _columns(table: Table, names: Sequence[str]) -> dict[str, tuple[int, str]]:
-    """For each quantity, the column and the unit in its name, as the user calls it."""
-    out: dict[str, tuple[int, str]] = {}
-    for c, name in enumerate(names):
-        match = _LABEL.fullmatch(name)
-        if match:
-            quantity = match.group(1).lower().removeprefix("t")
-            if quantity in out:
-                first = table.names[out[quantity][0]]
-                text = f"expected one column for {quantity}, got {first} and {name}; rename one"
-                raise table.error(text)
-            out[quantity] = (c, match.group(2) or match.group(3) or match.group(4) or "")
-    return out
-
-
-def _times(table: Table, names: Sequence[str]) -> tuple[Array, datetime | None]:
-    if len(table.names) == 1:
-        text = "expected a row of names, and cells separated by commas, semicolons or tabs"
-        raise table.error(f"{text}, got {show(table.names[0])}; export it like this")
-    found = [(c, m) for c, name in enumerate(names) if (m := _TIMES.fullmatch(name))]
-    if len(found) != 1:
-        got = ", ".join(table.names[c] for c, _m in found)
-        todo = (
-            f"got {got}; rename the others"
-            if got
-            else "got none; add or rename it, or say --columns THEIRS=t_s"
+def _turns(columns: Columns) -> Array | None:
+    """Quaternions (n, 4); R = Rx(rx) Ry(ry) Rz(rz), as for all our columns."""
+    if columns.present("meas", QUATERNION):
+        return unit_quaternions(
+            columns.readings("meas", QUATERNION),
+            lambda text, row: columns.table.error(text, row=row, column="qw"),
         )
-        raise table.error(f"expected one column of times such as t_s, {todo}")
-    column, match = found[0]
-    first = began(table, column)
-    if first is None:
-        unit = _unit(table, column, "s", match.group(2) or match.group(3) or "s")
-        t_s = unit.to_si(table.numbers(column, blank_is_nan=False))
-    else:
-        t_s = times_of_day(table, column)
-    falls = np.flatnonzero(np.diff(t_s) <= 0.0)
-    if len(falls):
-        k = int(falls[0]) + 1
-        text = (
-            f"expected times that increase after {t_s[k - 1]:.9g} s, got {t_s[k]:.9g} s; are two "
-            "recordings in one file? Import them one at a time"
-        )
-        raise table.error(text, row=k, column=table.names[column])
-    return t_s, first
-
-
-def _unit(table: Table, column: int, si: str, suffix: str) -> Unit:
-    known = {unit.suffix: unit for unit in UNITS if unit.si == si}
-    if suffix not in known:
-        got, todo = (repr(suffix), "convert it") if suffix else ("none", "add it")
-        text = f"expected a unit in the name of column {table.names[column]} ({', '.join(known)})"
-        more = " or --unit" if si == "m" else ""
-        raise table.error(f"{text}, got {got}; {todo}{more}", column=table.names[column])
-    return known[suffix]
-
-
-def _length(table: Table, column: int, suffix: str, unit: str | None) -> Array:
-    found = _unit(table, column, "m", suffix or unit or "")
-    return found.to_si(table.numbers(column, blank_is_nan=True))
-
-
-def _turns(table: Table, found: dict[str, tuple[int, str]]) -> Array | None:
-    quat, angles = ("qw", "qx", "qy", "qz"), ("rx", "ry", "rz")
-    for names in (quat, angles):
-        lacking = [name for name in names if name not in found]
-        if 0 < len(lacking) < len(names):
-            text = f"expected all of {', '.join(names)} or none, got no {', '.join(lacking)}"
-            raise table.error(text)
-    if "qw" in found:
-        values = np.stack([table.numbers(found[n][0], blank_is_nan=True) for n in quat], axis=1)
-        return unit_quaternions(values, lambda text, row: table.error(text, row=row, column="qw"))
-    if "rx" not in found:
-        return None
-    columns = []
-    for name in angles:
-        column, suffix = found[name]
-        unit = _unit(table, column, "rad", suffix)
-        columns.append(unit.to_si(table.numbers(column, blank_is_nan=True)))
-    return quat_from_rxyz(np.stack(columns, axis=1))
+    if columns.present("meas", ANGLES):
+        return quat_from_rxyz(columns.readings("meas", ANGLES))
+    return None
 
 
 # A rigid body from three or more markers, frame by frame.

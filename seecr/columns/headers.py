@@ -62,14 +62,17 @@ _elsewhere: ContextVar[Collection[str]] = ContextVar("elsewhere", default=())
 
 
 @contextmanager
-def renamed(columns: Mapping[str, str] | None, elsewhere: Collection[str] = ()) -> Iterator[None]:
+def renamed(
+    columns: Mapping[str, str] | None, elsewhere: Collection[str] | None = None
+) -> Iterator[None]:
     """Files that are read meanwhile may have these foreign headers: theirs by ours.
 
     Args:
-        columns: theirs with ours. elsewhere: those of them that a file need not have.
+        columns: theirs with ours; None for those that were said before.
+        elsewhere: those of them that a file need not have; None for those that were said before.
     """
     said = _said.set(_said.get() if columns is None else columns)
-    others = _elsewhere.set(elsewhere)
+    others = _elsewhere.set(_elsewhere.get() if elsewhere is None else elsewhere)
     try:
         yield
     finally:

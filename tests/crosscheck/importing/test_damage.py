@@ -127,7 +127,7 @@ DAMAGE = {
     ),
     "nanoseconds": (
         "poses", lambda x: [x[0].replace("time_s", "time_ns"), *x[1:]],
-        r"line 1, column time_ns: expected a unit .* \(s, ms\), got 'ns'; convert it"
+        "line 1, column time_ns: unknown unit 'ns'; expected t_s or t_ms"
     ),
     "spaces between numbers without names": (
         "poses", lambda x: ["# t x y z qw qx qy qz", *(y.replace(",", " ") for y in x[1:])],

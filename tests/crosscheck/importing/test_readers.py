@@ -76,9 +76,11 @@ def test_columns_that_are_not_read_are_said(tmp_path: Path) -> None:
     """All orientations were lost without a word."""
     path = log(tmp_path, "t_s,x_mm,y_mm,z_mm,Roll [deg],Yaw [deg]", "0,1,2,3,4,5")
     (note,) = read_poses(path).notes
-    assert note.startswith("columns not read: Roll [deg], Yaw [deg]; rotations are read from")
+    assert note.startswith("Columns Roll [deg] Yaw [deg] are not used, because roll, pitch and")
     turned = log(tmp_path, "t_s,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg,frame", "0,1,2,3,4,5,6,7")
-    assert read_poses(turned).notes == ("columns not read: frame",)
+    assert read_poses(turned).notes == ("Not used: frame.",)
+    both = log(tmp_path, "t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz,rx_deg", "0,1,2,3,1,0,0,0,9")
+    assert read_poses(both).notes == ("Not used: rx_deg.",)
     assert read_poses(log(tmp_path, "t_s,x_mm,y_mm,z_mm", "0,1,2,3")).notes == ()
     with pytest.raises(InputFileError, match="got no x, y, z among t_s, North, East; rename them"):
         read_poses(log(tmp_path, "t_s,North,East", "0,1,2"))
@@ -107,8 +109,8 @@ def test_three_angles_turn_about_moving_axes(tmp_path: Path) -> None:
     ("head", "said"),
     [
         ("t_s,x_m,y_m", "got no z"),
-        ("t_s,x_m,y_m,z_m,x_mm", "expected one column for x, got x_m and x_mm"),
-        ("x_m,y_m,z_m", "expected one column of times such as t_s, got none"),
+        ("t_s,x_m,y_m,z_m,x_mm", "column x_mm: says the same as x_m; expected only one of the two"),
+        ("x_m,y_m,z_m", "expected columns of times such as t_s, got x_m, y_m, z_m; rename"),
         ("t_s,x_m,y_m,z_m,qw,qx,qy", "expected all of qw, qx, qy, qz or none, got no qz"),
     ],
 )
@@ -241,8 +243,10 @@ def test_orders_of_angles_take_each_from_its_own_axis() -> None:
     ]
     x, y, z = about
     for order, expected in {"xyz": z * y * x, "XYZ": x * y * z, "zxy": y * x * z}.items():
-        assert (rotations(angles, order)[0] * expected.inv()).magnitude() < 1e-12
-    assert rotations(angles, "vector").as_rotvec() == pytest.approx(angles)
+        found = Rotation.from_quat(rotations(angles, order)[0], scalar_first=True)
+        assert (found * expected.inv()).magnitude() < 1e-12
+    turn = Rotation.from_quat(rotations(angles, "vector"), scalar_first=True)
+    assert turn.as_rotvec() == pytest.approx(angles)
 
 
 EULER = """Format Version,1.23,Take Name,a,Export Frame Rate,20.0,Rotation Type,{order},Length Units,Meters,Coordinate Space,Global
