@@ -109,6 +109,11 @@ class TextTable:
     styles: Sequence[str] = ()
     kind: str = ""
 
+    @property
+    def wordy(self) -> bool:
+        """Whether it is mostly words: on a narrow page each row is then a few lines."""
+        return sum(not head.startswith("#") for head in self.heads) > 3
+
 
 @dataclass(frozen=True)
 class Figure:
@@ -171,7 +176,8 @@ class Page:
         title: in the browser's tab. heading: at the top.
         verdict: as programs know it, which sets its colour. name, meaning: in words.
         sentence: the verdict in full. lead: what it means for the robot, in a few lines, which
-            come first. picture: beside them. blocks: what follows. notes: at the end.
+            come first. then: what to do about it, after the sentence. picture: beside them.
+            blocks: what follows. notes: at the end.
         footer: how to read it.
     """
 
@@ -185,6 +191,7 @@ class Page:
     footer: str
     meaning: str = ""
     lead: Sequence[Words] = ()
+    then: Sequence[Words] = ()
     picture: Figure | None = None
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from rich.console import Console
-
 from crosscheck.comparison.limits import Exceeded
 from crosscheck.comparison.quantities import QuantityKind, channels
 from crosscheck.comparison.result import Comparison, WorstRow
@@ -37,7 +35,7 @@ from crosscheck.show.residuals import (
     title_of,
     wall_section,
 )
-from crosscheck.show.texts import kinds_table, markdown, row_heading, show, unused
+from crosscheck.show.texts import kinds_table, markdown, printed, row_heading, unused
 from seecr.counted import counted
 from seecr.show.colours import BEFORE, CALM
 from seecr.units import in_unit, short
@@ -49,17 +47,11 @@ _MOST_ASSOCIATIONS, _MOST_ON_PAGE = 4, 5
 _MOST_POSES, _MOST_NOTES = 6, 5
 
 
+@printed
 def print_comparison(
-    found: Comparison, exceeded: Sequence[Exceeded], limited: bool, out: Path,
-    console: Console | None = None,
-) -> None:  # fmt: skip
-    """Print the verdict, what exceeds its limit, the tables, and where the files are."""
-    show(_on_terminal(found, exceeded, limited, out), console)
-
-
-def _on_terminal(
     found: Comparison, exceeded: Sequence[Exceeded], limited: bool, out: Path
 ) -> Iterator[Block]:
+    """Print the verdict, what exceeds its limit, the tables, and where the files are."""
     yield Line(found.sentence, "green" if found.is_noise else "bold yellow")
     yield Items([item.words for item in exceeded], style="bold red")
     if limited and not exceeded:

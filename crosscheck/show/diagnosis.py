@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 
 from crosscheck.diagnosis.path import ModelPath, Stage
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
@@ -50,7 +49,7 @@ from crosscheck.show.residuals import (
     title_of,
     wall_section,
 )
-from crosscheck.show.texts import kinds_table, markdown, row_heading, show, unused
+from crosscheck.show.texts import kinds_table, markdown, printed, row_heading, unused
 from seecr.show.colours import AFTER, BEFORE, CALM, TINT
 from seecr.units import short
 
@@ -71,12 +70,9 @@ _AS_STATED = 1.25
 # --- terminal -------------------------------------------------------------------------------------
 
 
-def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None) -> None:
+@printed
+def print_diagnosis(found: Diagnosis, out: Path) -> Iterator[Block]:
     """Print the verdict, the errors on the way, the parameters, and what to measure next."""
-    show(_on_terminal(found, out), console)
-
-
-def _on_terminal(found: Diagnosis, out: Path) -> Iterator[Block]:
     yield Line(f"{found.verdict}: {found.reason}", _STYLE[found.verdict])
     yield Items(found.notes, "note: ", "dim")
     if found.verdict is not DiagnosisVerdict.NO_VERDICT:
@@ -123,7 +119,9 @@ def page_of_diagnosis(found: Diagnosis) -> Page:
     path = found.path
     sight = [] if found.sight is None else [Line(" ".join(found.sight.lines()), "dim")]
     tests = [Checks(some)] if (some := checks(found)) else []
-    next_steps = [Items(found.measure_further)] if found.measure_further else []
+    # beside a drawing with no effect in it there is room for what to do
+    steps = found.measure_further
+    next_steps = [Items(steps)] if steps and found.missing else []
     blocks = present(
         None if path is None else _waterfall(found, path),
         _no_search(found),
@@ -148,6 +146,7 @@ def page_of_diagnosis(found: Diagnosis) -> Page:
         lead=[in_brief(one, path.problem.robot.cable_names) for one in found.missing]
         if path is not None
         else [],
+        then=() if found.missing else steps,
         picture=_robot(found),
         blocks=blocks,
         notes=found.notes,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from crosscheck.fit.words import belongs
 from crosscheck.show.blocks import Block, Items, Line, TextTable
-from crosscheck.show.texts import show
+from crosscheck.show.texts import printed
 from seecr.description.robot import Robot
 from seecr.effects import BUILT_IN, PLACES, Effect, known, layout_of
 from seecr.result import Record
@@ -90,7 +90,8 @@ def parameter_lines(name: str, values: Mapping[str, float]) -> list[str]:
     return out
 
 
-def print_effects(effects: list[type[Effect]]) -> None:
+@printed
+def print_effects(effects: list[type[Effect]]) -> Iterator[Block]:
     """A table of effects: name, place, what each is."""
     rows = [
         [effect.name, place, effect.title + ("" if effect in BUILT_IN else " (own)")]
@@ -98,28 +99,24 @@ def print_effects(effects: list[type[Effect]]) -> None:
         for effect in effects
         if effect.place == place
     ]
-    show([TextTable(["effect", "where", "what it is"], rows)])
+    yield TextTable(["effect", "where", "what it is"], rows)
 
 
-def print_effect(effect: type[Effect], robot: Robot | None) -> None:
+@printed
+def print_effect(effect: type[Effect], robot: Robot | None) -> Iterator[Block]:
     """One effect: formula, parameters, what it needs, how to check it by hand."""
     own = "" if effect in BUILT_IN else ", your own"
     record = effect_record(effect, robot)
     rows = record["parameters"]
-    blocks: list[Block] = [
-        Line(f"{effect.name}: {effect.title} ({effect.place}{own})", "bold"),
-        Items(record["formula"].splitlines()),
-        Items([_parameter_words(row) for row in rows], "  "),
-    ]
+    yield Line(f"{effect.name}: {effect.title} ({effect.place}{own})", "bold")
+    yield Items(record["formula"].splitlines())
+    yield Items([_parameter_words(row) for row in rows], "  ")
     sizes = [row["plausible_size"] for row in rows if not row["shapes_the_others"]]
     if None in sizes:
-        blocks.append(Line(f"  {_OF_ROBOT}"))
+        yield Line("  expected sizes depend on the robot: --robot ROBOT.xml gives their numbers")
     if effect.needs:
-        blocks.append(Line(f"needs: {', '.join(effect.needs)}"))
-    show([*blocks, Line(f"check by hand: {effect.by_hand()}")])
-
-
-_OF_ROBOT = "expected sizes depend on the robot: --robot ROBOT.xml gives their numbers"
+        yield Line(f"needs: {', '.join(effect.needs)}")
+    yield Line(f"check by hand: {effect.by_hand()}")
 
 
 def _parameter_words(row: Record) -> str:

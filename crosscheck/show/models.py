@@ -6,14 +6,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 
 from crosscheck.add import Addition
 from crosscheck.calibration import Calibrated
 from crosscheck.comparison.models import ModelComparison
 from crosscheck.model.fitted import Fitted
 from crosscheck.show.blocks import Block, Items, Line, TextTable, cut, rms_table
-from crosscheck.show.texts import show
+from crosscheck.show.texts import printed
 from seecr.counted import counted
 
 _MOST = 12
@@ -21,14 +20,9 @@ _MOST = 12
 _SURE = 3.0
 
 
-def print_addition(
-    found: Addition, model: Path, written: bool, console: Console | None = None
-) -> None:
+@printed
+def print_addition(found: Addition, model: Path, written: bool) -> Iterator[Block]:
     """Print values, errors before and after, warnings, and what was written."""
-    show(_addition(found, model, written), console)
-
-
-def _addition(found: Addition, model: Path, written: bool) -> Iterator[Block]:
     yield Items(found.notes, "note: ", "dim")
     for one in found.fitted:
         term = one.term
@@ -66,14 +60,9 @@ def _left(found: Addition) -> str:
     )
 
 
-def print_calibration(
-    found: Calibrated, model: Path, written: bool, console: Console | None = None
-) -> None:
+@printed
+def print_calibration(found: Calibrated, model: Path, written: bool) -> Iterator[Block]:
     """Print the errors, how far each effect is from nothing, the noise, and what was written."""
-    show(_calibration(found, model, written), console)
-
-
-def _calibration(found: Calibrated, model: Path, written: bool) -> Iterator[Block]:
     yield Items(found.notes, "note: ", "dim")
     yield rms_table([
         ("before", found.before, ""),
@@ -113,14 +102,9 @@ def _largest(one: Fitted) -> float | None:
     return float(np.max(away[seen] / one.stderr[seen])) if seen.any() else None
 
 
-def print_models(
-    found: ModelComparison, pooled: Path | None, console: Console | None = None
-) -> None:
+@printed
+def print_models(found: ModelComparison, pooled: Path | None) -> Iterator[Block]:
     """Print what moved, what neither settles, what one has alone, and where the pooled model is."""
-    show(_two_models(found, pooled), console)
-
-
-def _two_models(found: ModelComparison, pooled: Path | None) -> Iterator[Block]:
     yield Line(f"{found.before} → {found.now}", "bold")
     yield Line(found.sentence, "bold yellow" if found.differs else "green" if found.values else "")
     yield Items(found.details, "  ")

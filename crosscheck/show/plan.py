@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 
 from crosscheck.planning.proposer import Suggestion
 from crosscheck.planning.result import Plan, Visible, alike, gain_words
@@ -28,7 +27,7 @@ from crosscheck.show.blocks import (
     section,
 )
 from crosscheck.show.residuals import facts_of, title_of
-from crosscheck.show.texts import show
+from crosscheck.show.texts import printed
 from seecr.counted import some
 from seecr.pose import rotvec_from_quat
 from seecr.units import short
@@ -36,14 +35,9 @@ from seecr.units import short
 _MOST_GAINS, _MOST_SLACK, _MOST_IN_BRIEF = 3, 5, 3
 
 
-def print_plan(
-    plan: Plan, out: Path, files: Sequence[str] = (), console: Console | None = None
-) -> None:
+@printed
+def print_plan(plan: Plan, out: Path, files: Sequence[str] = ()) -> Iterator[Block]:
     """Print what will show, what cannot be told apart, what to add, and the files of commands."""
-    show(_on_terminal(plan, out, files), console)
-
-
-def _on_terminal(plan: Plan, out: Path, files: Sequence[str]) -> Iterator[Block]:
     yield Items(plan.notes, "note: ", "dim")
     if plan.effects:
         rows = [[found.name, *_sizes(found)] for found in plan.effects]

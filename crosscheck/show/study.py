@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from rich.console import Console
 
-from crosscheck.show.blocks import Cell, Items, TextTable
-from crosscheck.show.texts import show
+from crosscheck.show.blocks import Block, Cell, Items, TextTable
+from crosscheck.show.texts import printed
 from crosscheck.studies.study import Study
 from seecr.counted import counted
 from seecr.show.colours import AFTER, GREY
@@ -30,7 +30,8 @@ _NAMED = 12
 _ROOM = 2.0
 
 
-def print_study(found: Study, console: Console | None = None) -> None:
+@printed
+def print_study(found: Study) -> Iterator[Block]:
     """Print the table of a study, as far as cases differ, and what it says.
 
     What was changed is shown where cases have no names of their own.
@@ -45,13 +46,14 @@ def print_study(found: Study, console: Console | None = None) -> None:
     ]
     table = [[_cell(key, row[key]) for key in keys] for row in rows[:_MOST]]
     heads = [_head(key, rows) for key in keys]
-    blocks: list[Any] = [TextTable(heads, table, kind="whole")]
-    if len(rows) > _MOST:
-        blocks.append(Items([f"and {counted(len(rows) - _MOST, 'more row')}, in study.csv"]))
     if len(rows) == 1:  # there is none that it could differ from
         told = {key: _cell(key, value) for key, value in rows[0].items() if value is not None}
-        blocks = [Items([f"{_head(key, rows)}: {cell}".lstrip("#") for key, cell in told.items()])]
-    show([*blocks, Items(found.lines())], console)
+        yield Items([f"{_head(key, rows)}: {cell}".lstrip("#") for key, cell in told.items()])
+    else:
+        yield TextTable(heads, table, kind="whole")
+    if len(rows) > _MOST:
+        yield Items([f"and {counted(len(rows) - _MOST, 'more row')}, in study.csv"])
+    yield Items(found.lines())
 
 
 def _unit(key: str) -> tuple[float, str]:

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from crosscheck.show.blocks import Block, Bold, Cell, Code, Items, Line, Styled, TextTable, section
-from crosscheck.show.texts import console_for, markdown, pose_heading, show
+from crosscheck.show.texts import markdown, pose_heading, printed, terminal
 from crosscheck.suite.effects import effect_failures, effects_line
 from crosscheck.suite.results import (
     QUANTITY_HEADS,
@@ -66,15 +65,11 @@ _LOGARITHM = (
 # --- terminal -------------------------------------------------------------------------------------
 
 
-def print_run(run: Run, out: Path, console: Console | None = None) -> None:
+@printed
+def print_run(run: Run, out: Path) -> Iterator[Block]:
     """Print the table, what needs a look, the verdict, and where the files are."""
-    console = console_for(console)
-    show(_on_terminal(run, out, console.width), console)
-
-
-def _on_terminal(run: Run, out: Path, width: int) -> Iterator[Block]:
     if run.results:
-        yield _table(run, width)
+        yield _table(run, terminal().width)
     for result in run.results:
         name = result.case.name
         yield from _first([f"{name}, {line}" for line in _notes(result)], name)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import wraps
+from typing import ParamSpec
 
 from rich.console import Console, JustifyMethod
 from rich.table import Table as RichTable
@@ -33,9 +35,22 @@ from seecr.units import short
 _WIDE = 160
 
 
-def show(blocks: Iterable[Block], console: Console | None = None) -> None:
-    """Print blocks, by default on the standard output."""
-    console = console_for(console)
+P = ParamSpec("P")
+
+
+def printed(blocks_of: Callable[P, Iterable[Block]]) -> Callable[P, None]:
+    """A function that prints the blocks that ``blocks_of`` makes."""
+
+    @wraps(blocks_of)
+    def show(*given: P.args, **named: P.kwargs) -> None:
+        print_blocks(blocks_of(*given, **named))
+
+    return show
+
+
+def print_blocks(blocks: Iterable[Block]) -> None:
+    """Print blocks on the standard output."""
+    console = terminal()
     for block in blocks:
         if isinstance(block, TextTable):
             console.print(_rich_table(block))
@@ -45,9 +60,9 @@ def show(blocks: Iterable[Block], console: Console | None = None) -> None:
                 console.print(Text(line, style=style), soft_wrap=True)
 
 
-def console_for(console: Console | None = None) -> Console:
-    """The console to print on; wide where nobody's screen is the limit."""
-    console = console or Console(highlight=False)
+def terminal() -> Console:
+    """The standard output; wide where nobody's screen is the limit."""
+    console = Console(highlight=False)
     if not console.is_terminal:
         console.width = max(console.width, _WIDE)
     return console

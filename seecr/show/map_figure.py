@@ -238,6 +238,41 @@ def _dots(axes: Any, cut: _Cut, edge: Array, at_least: float | None) -> None:
 
 
 @dataclass(frozen=True, eq=False)
+class Layer:
+    """One quantity of the elastic map.
+
+    Attributes:
+        name: of its entity in a recording. title: in words. unit: "" for a count.
+        values: (nx, ny, nz), NaN where the platform is not at rest. top: end of its colours.
+    """
+
+    name: str
+    title: str
+    unit: str
+    values: Array
+    top: float
+
+    @property
+    def label(self) -> str:
+        """The title with the unit."""
+        return f"{self.title} [{self.unit}]" if self.unit else self.title
+
+
+def elastic_layers(found: Workspace) -> tuple[Layer, ...]:
+    """How many cables are slack, how far off its command the platform rests, and how turned."""
+    slack = np.where(found.rests, found.slack, np.nan).astype(float)
+    away = 1e3 * np.linalg.norm(found.deviation, axis=-1).astype(float)
+    out = [
+        Layer("slack", "slack cables", "", slack, float(found.robot.n_cables)),
+        Layer("away", "off the command", "mm", away, colour_end(found, away)),
+    ]
+    if found.robot.turns:
+        turn = np.degrees(np.linalg.norm(found.rotation, axis=-1).astype(float))
+        out.append(Layer("turn", "turned", "°", turn, colour_end(found, turn)))
+    return tuple(out)
+
+
+@dataclass(frozen=True, eq=False)
 class _Panel:
     """A quantity with its colours.
 
@@ -261,10 +296,7 @@ def _panels(found: Workspace) -> list[_Panel]:
         how = {"vmin": 0.0, "vmax": 1.0, "cmap": "cividis"}
         panels.append(_Panel("probability", found.chance.astype(float), how, {}, False))
     if np.any(found.rests):
-        panels += [_slack(found), _deviation(found, "off the command [mm]", 1e3, found.deviation)]
-        if found.robot.turns:
-            panels.append(_deviation(found, "turned [°]", np.degrees(1.0), found.rotation))
-        panels.append(_softest(found))
+        panels += [*map(_elastic, elastic_layers(found)), _softest(found)]
     return panels
 
 
@@ -286,61 +318,52 @@ def _held(found: Workspace) -> _Panel:
     return _Panel("tension margin [N]", held, how, {"extend": "max"}, False)
 
 
-def _slack(found: Workspace) -> _Panel:
+def _elastic(layer: Layer) -> _Panel:
+    """A quantity from 0 on: in shades, or in steps if it is a count."""
+    if layer.unit:
+        how: dict[str, Any] = {"vmin": 0.0, "vmax": layer.top}
+        return _Panel(layer.label, layer.values, how, {"extend": "max"})
     import matplotlib
 
-    m = found.robot.n_cables
-    shades = matplotlib.colormaps["viridis"].resampled(m + 1)
-    how = {"vmin": -0.5, "vmax": m + 0.5, "cmap": shades}
-    count = np.where(found.rests, found.slack, np.nan)
-    return _Panel("slack cables", count, how, {"ticks": np.arange(m + 1)})
-
-
-def _deviation(
-    found: Workspace, label: str, factor: float, vectors: NDArray[np.floating[Any]]
-) -> _Panel:
-    """Lengths of vectors (nx, ny, nz, 3) in units of people."""
-    values = factor * np.linalg.norm(vectors, axis=-1)
-    how = {"vmin": 0.0, "vmax": colour_end(found, values)}
-    return _Panel(label, values, how, {"extend": "max"})
+    steps = np.arange(layer.top + 1.0)
+    shades = matplotlib.colormaps["viridis"].resampled(len(steps))
+    how = {"vmin": -0.5, "vmax": layer.top + 0.5, "cmap": shades}
+    return _Panel(layer.label, layer.values, how, {"ticks": steps.astype(int)})
 
 
 def _softest(found: Workspace) -> _Panel:
-    """The smallest stiffness, on a logarithmic scale: towards the edge it falls by decades."""
+    """The smallest stiffness, on a logarithmic scale: towards the edge it falls by decades.
+
+    It is in N/m, on hinges alone in N m/rad (:func:`seecr.show.pose_words.stiffness_words`).
+    """
     from matplotlib.colors import LogNorm
     from matplotlib.ticker import FuncFormatter
 
-    ends = _soft_ends(found)
+    stiffness = np.where(found.rests & (found.stiffness > 0.0), found.stiffness, np.nan)
+    unit = "N/m"
+    if on_hinges(found.robot):
+        stiffness = stiffness / np.sum(np.asarray(found.softest)[..., 3:] ** 2, axis=-1)
+        unit = "N m/rad"
+    ends = _soft_ends(stiffness, found.feasible)
     numbers = FuncFormatter(lambda value, _: f"{value:.12g}")
     bar = {"extend": "both", "ticks": _ticks(*ends), "format": numbers}
-    unit = "N m/rad" if on_hinges(found.robot) else "N/m"
     label = f"stiffness of the\nsoftest direction [{unit}]"
-    return _Panel(label, _stiffness(found), {"norm": LogNorm(*ends)}, bar)
+    return _Panel(label, stiffness.astype(float), {"norm": LogNorm(*ends)}, bar)
 
 
 def _top_margin(found: Workspace) -> float:
     """Upper end of the colour bar of margins."""
     held = found.margin[found.feasible]
     finite = held[np.isfinite(held)]
-    half = float(np.median(finite)) if len(finite) else 0.0
-    return min(_top(finite), _OUTSTANDING * half) or 1.0
+    if len(finite) == 0:
+        return 1.0
+    top = float(np.quantile(finite, 0.95)) or 1.0
+    return min(top, _OUTSTANDING * float(np.median(finite))) or 1.0
 
 
-def _stiffness(found: Workspace) -> Array:
-    """The stiffness of the softest direction (nx, ny, nz), NaN where it is not positive.
-
-    It is in N/m, on hinges alone in N m/rad (:func:`seecr.show.pose_words.stiffness_words`).
-    """
-    stiffness = np.where(found.rests & (found.stiffness > 0.0), found.stiffness, np.nan)
-    if on_hinges(found.robot):
-        stiffness = stiffness / np.sum(np.asarray(found.softest)[..., 3:] ** 2, axis=-1)
-    return stiffness.astype(float)
-
-
-def _soft_ends(found: Workspace) -> tuple[float, float]:
-    """Ends of the colours of that stiffness, from poses that can be held, if there are any."""
-    stiffness = _stiffness(found)
-    for some in (stiffness[found.feasible], stiffness):
+def _soft_ends(stiffness: Array, held: NDArray[np.bool_]) -> tuple[float, float]:
+    """Ends of the colours of a stiffness, from poses that can be held, if there are any."""
+    for some in (stiffness[held], stiffness):
         known = some[np.isfinite(some)]
         if len(known):
             low, high = (float(np.quantile(known, part)) for part in _ENDS)
@@ -360,11 +383,6 @@ def _ticks(low: float, high: float) -> Array:
     )  # fmt: skip
     ticks = np.asarray(some.tick_values(low, high))
     return ticks[(ticks >= low) & (ticks <= high)]
-
-
-def _top(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.quantile(known, 0.95)) or 1.0 if len(known) else 1.0
 
 
 def _colours(cut: _Cut, row: Any, panel: _Panel) -> Any:

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from seecr.counted import counted
 from seecr.pose import Array
 from seecr.show import colours, layout
+from seecr.show.map_figure import Layer, elastic_layers
 from seecr.show.scene import LEGEND, ROOT, Scene, extent, write_scale
 from seecr.show.stream import POSE, Recording, opening, place_index, recording_file
-from seecr.workspace.grid import Workspace, across_of, colour_end, directions_words, evenly_picked
+from seecr.workspace.grid import Workspace, across_of, directions_words, evenly_picked
 
 # Viewers do not turn more points than these smoothly.
 _MOST_POINTS = 200_000
@@ -100,33 +101,6 @@ _LONG, _WIDE = 0.9, 0.45
 
 
 @dataclass(frozen=True, eq=False)
-class Layer:
-    """One quantity of the elastic map.
-
-    Attributes:
-        name: of its entity. title: of its view. unit: "" for a count.
-        values: (nx, ny, nz), NaN where the platform is not at rest. top: end of its colours.
-    """
-
-    name: str
-    title: str
-    unit: str
-    values: Array
-    top: float
-
-    @property
-    def end(self) -> str:
-        """The end of its colours, with the unit."""
-        return f"{self.top:.4g}{'' if self.unit == '°' else ' '}{self.unit}"
-
-    @property
-    def words(self) -> str:
-        """On its scale."""
-        beyond = self.unit and np.nanmax(self.values, initial=0.0) > self.top
-        return f"{self.title}{'; the last colour: or more' if beyond else ''}"
-
-
-@dataclass(frozen=True, eq=False)
 class Elastic:
     """The elastic map of a workspace, as it is recorded."""
 
@@ -134,17 +108,8 @@ class Elastic:
 
     @cached_property
     def layers(self) -> tuple[Layer, ...]:
-        """How far off its command, how tilted if it can turn, with how many slack cables."""
-        found = self.found
-        away = 1e3 * np.linalg.norm(found.deviation, axis=-1).astype(float)
-        turn = np.degrees(np.linalg.norm(found.rotation, axis=-1).astype(float))
-        slack = np.where(found.rests, found.slack, np.nan).astype(float)
-        tilted = Layer("turn", "turned", "°", turn, colour_end(found, turn))
-        return (
-            Layer("away", "off the command", "mm", away, colour_end(found, away)),
-            *((tilted,) if found.robot.turns else ()),
-            Layer("slack", "slack cables", "", slack, float(found.robot.n_cables)),
-        )
+        """The quantities that are shown beside each other."""
+        return elastic_layers(self.found)
 
     @property
     def across(self) -> int:
@@ -198,7 +163,7 @@ class Elastic:
             yield "The timeline goes from slice to slice."
         if lost := _lost_words(found):
             yield f"Without a point: {lost}."
-        ends = [layer.end for layer in self.layers if layer.unit]
+        ends = [_end_words(layer) for layer in self.layers if layer.unit]
         yield (
             f"Colours end at {' and '.join(ends)}, as in the figure: 95 % of the "
             "poses that can be held are below. Points are at the commands; white arrows lead from "
@@ -220,7 +185,7 @@ class Elastic:
                 radii=np.full(sum(map(len, rows)), radius),
             )
             self._log(recording, f"{_ELASTIC}/{layer.name}/points", points, rows)
-            write_scale(recording, layer.top, layer.words, layer.unit, _legend_of(layer))
+            write_scale(recording, layer.top, _scale_words(layer), layer.unit, _legend_of(layer))
         few = [own[evenly_picked(len(own), _MOST_ARROWS)] if len(own) else own for own in rows]
         away = self.found.deviation.reshape(-1, 3).astype(float)
         white = f"{_ELASTIC}/away/arrows", away, colours.COMMAND
@@ -267,7 +232,7 @@ class Elastic:
         aspect = 3.0 * _ASPECT / len(self.layers)
         views = [
             rrb.Vertical(
-                self._view(low, high, layer.name, self._title(layer), aspect),
+                self._view(low, high, layer.name, layer.label[0].upper() + layer.label[1:], aspect),
                 layout.legend(_legend_of(layer)),
                 row_shares=[0.9, 0.1],
             )
@@ -287,10 +252,6 @@ class Elastic:
                 row_shares=[0.88, 0.12], name="Softest direction",
             ),
         ]  # fmt: skip
-
-    def _title(self, layer: Layer) -> str:
-        unit = f" [{layer.unit}]" if layer.unit else ""
-        return f"{layer.title[0].upper()}{layer.title[1:]}{unit}"
 
     def _view(
         self, low: Array, high: Array, name: str, title: str, aspect: float
@@ -314,3 +275,14 @@ def _lost_words(found: Workspace) -> str:
 
 def _legend_of(layer: Layer) -> str:
     return f"{LEGEND}_{layer.name}"
+
+
+def _end_words(layer: Layer) -> str:
+    """The end of its colours, with the unit."""
+    return f"{layer.top:.4g}{'' if layer.unit == '°' else ' '}{layer.unit}"
+
+
+def _scale_words(layer: Layer) -> str:
+    """What its scale shows, and that it ends before the largest values do."""
+    beyond = layer.unit and np.nanmax(layer.values, initial=0.0) > layer.top
+    return f"{layer.title}{'; the last colour: or more' if beyond else ''}"

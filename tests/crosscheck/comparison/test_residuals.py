@@ -232,19 +232,14 @@ def test_a_pose_error_is_that_of_its_cables(robot, off):
     assert errors == pytest.approx(longer, abs=1e-10)
 
 
-def test_tables_name_their_units() -> None:
+def test_tables_name_their_units(capsys: pytest.CaptureFixture[str]) -> None:
     """A bare "[mm]" is a style to the terminal's library, and vanishes."""
-    from io import StringIO
-
-    from rich.console import Console
-
     from crosscheck.show.blocks import rms_table
-    from crosscheck.show.texts import show
+    from crosscheck.show.texts import print_blocks
 
-    out = StringIO()
     rms = {"position_rms_m": 1e-3, "orientation_rms_rad": 1e-3, "tension_rms_N": 2.0}
-    show([rms_table([("[all] rows", rms, "")])], Console(file=out, width=100))
-    heads, row = out.getvalue().splitlines()[1:]
+    print_blocks([rms_table([("[all] rows", rms, "")])])
+    heads, row = capsys.readouterr().out.splitlines()[1:]
     assert heads.split() == ["rms", "error", "[mm]", "[deg]", "[N]"]
     assert row.split() == ["[all]", "rows", "1", "0.0573", "2"]
 

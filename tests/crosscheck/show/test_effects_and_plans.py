@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import redirect_stdout
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -9,7 +10,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
 from crosscheck.fit.reasons import Reason, Why
 from crosscheck.planning.planned import Adding
@@ -37,8 +37,8 @@ def plan(**changes: Any) -> Plan:
 
 
 def printed(found: Plan, files: tuple[str, ...] = ()) -> list[str]:
-    out = StringIO()
-    print_plan(found, Path("here"), files, Console(file=out, highlight=False, width=400))
+    with redirect_stdout(StringIO()) as out:
+        print_plan(found, Path("here"), files)
     return out.getvalue().splitlines()
 
 

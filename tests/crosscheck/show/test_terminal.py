@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -12,7 +13,6 @@ from typing import Any
 import made_diagnoses as made
 import pytest
 from made_data import measured, soft_cogiro, term
-from rich.console import Console
 
 from crosscheck.add import add_effect
 from crosscheck.calibration import calibrate
@@ -30,8 +30,8 @@ from seecr.prediction.experiment import predict
 
 
 def printed(show: Callable[..., None], *what: Any) -> str:
-    out = StringIO()
-    show(*what, Console(file=out, highlight=False))
+    with redirect_stdout(StringIO()) as out:
+        show(*what)
     return out.getvalue()
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from rich.console import Console
 
 from crosscheck.show.suite import print_run
 from crosscheck.suite.agreement import load_thresholds
@@ -185,10 +184,11 @@ def test_terminal_table_shows_units_thresholds_and_failures(good, capsys):
     assert out.endswith("results in here/\n")
 
 
-def test_a_narrow_terminal_gets_fewer_columns_and_whole_numbers(good, capsys):
+def test_a_narrow_terminal_gets_fewer_columns_and_whole_numbers(good, capsys, monkeypatch):
     result = replace(good, case=replace(good.case, name="parallel-vectran-random"))
-    console = Console(width=80, force_terminal=True, color_system=None)
-    print_run(run_of(result), Path("here"), console)
+    for name, value in {"FORCE_COLOR": "1", "TERM": "dumb", "COLUMNS": "80"}.items():
+        monkeypatch.setenv(name, value)
+    print_run(run_of(result), Path("here"))
     table = capsys.readouterr().out.splitlines()[:4]
     assert max(map(len, table)) <= 80
     assert "…" not in "".join(table)
