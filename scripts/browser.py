@@ -34,19 +34,25 @@ frame.onload = () => {
   const inside = (e) => e !== page.body && (scrolls(e) || inside(e.parentElement));
   const wide = [...page.body.querySelectorAll("*")].filter(
     (e) => e.getBoundingClientRect().right > root.clientWidth + 1 && !inside(e.parentElement));
-  const said = wide.map((e) => e.outerHTML.slice(0, 80));
-  document.title = JSON.stringify({width: root.scrollWidth, height: root.scrollHeight, wide: said});
+  const moved = [...page.querySelectorAll(".scrolls")].filter((e) => e.scrollWidth > e.clientWidth);
+  const said = (some) => some.map((e) => e.outerHTML.slice(0, 80));
+  document.title = JSON.stringify({width: root.scrollWidth, height: root.scrollHeight,
+    wide: said(wide), moved: said(moved)});
 };
 """
 
 
 @dataclass(frozen=True)
 class Size:
-    """What a page takes [pixels], and the beginnings of elements that reach beyond its width."""
+    """What a page takes [pixels], and the beginnings of elements that reach beyond its width.
+
+    Tables in a box of their own can be ``moved`` sideways if they do not fit into it.
+    """
 
     width: int
     height: int
     wide: list[str]
+    moved: list[str]
 
 
 def browser() -> str | None:

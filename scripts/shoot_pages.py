@@ -89,7 +89,8 @@ def photograph(page: Path) -> list[str]:
     for width in WIDTHS:
         size = browser.measure(page, width)
         too_wide = f", too wide: {' '.join(size.wide)}" if size.width > width else ""
-        out.append(f"{page.name} at {width}: {size.width} x {size.height}{too_wide}")
+        moved = f", to be moved sideways: {' '.join(size.moved)}" if size.moved else ""
+        out.append(f"{page.name} at {width}: {size.width} x {size.height}{too_wide}{moved}")
         for dark in (False, True):
             path = page.with_name(f"{page.stem}-{width}-{'dark' if dark else 'light'}.png")
             browser.shoot(page, path, width, dark=dark, height=size.height)

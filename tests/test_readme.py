@@ -40,7 +40,7 @@ def test_the_examples_print_what_is_shown(tmp_path: Path) -> None:
 
 
 def test_each_example_shows_what_it_prints() -> None:
-    assert README.count("```python\n") == len(re.findall(r"```\n\n```text\n", README)) == 3
+    assert README.count("```python\n") == len(re.findall(r"```\n\n```text\n", README)) == 2
 
 
 @pytest.mark.sweep

@@ -39,6 +39,7 @@ def pages(tmp_path_factory):
 def test_nothing_reaches_beyond_a_telephone(pages: Path, name: str) -> None:
     size = browser.measure(pages / f"{name}.html", PHONE)
     assert size.wide == [] and size.width == PHONE
+    assert size.moved == [], "tables end beyond the screen"
     assert size.height > 1000, "the page is not there"
 
 

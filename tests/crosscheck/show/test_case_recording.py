@@ -163,6 +163,9 @@ def test_the_text_has_the_guide_and_the_numbers(back: Readback, result: CaseResu
     assert len(now) == POSES
     assert "Pose 0 (of 0 to 5)" in now[0] and "x 170.00, y 250.00, z 100.00 mm" in now[0]
     assert "26.5" in now[0] and "| slack | cable2, cable4, cable5, cable7 |" in now[0]
+    x, y, z = 1e3 * (result.solution.pose[0, :3] - result.case.poses[0, :3])
+    assert f"| SEECR moves by | dx {x:+.2f}, dy {y:+.2f}, dz {z:+.2f} mm |" in now[0]
+    assert f"| MuJoCo differs by | {result.difference.position_m[0]:.3g} m |" in now[0]
     assert "Settling, " in back.column(f"/{NOW}", "TextDocument:text", "settling_time")[0][0]
 
 
@@ -216,7 +219,8 @@ def test_a_pose_without_an_answer_is_not_drawn(failed: CaseResult, tmp_path: Pat
     words = [row[0] for row in back.column("/lanes/cable1", "StateChange:state")]
     assert words[1:3] == ["no answer"] * 2
     assert np.isnan(back.scalars("/plot/deviation/seecr/dx")[1])
-    assert "SEECR moves by | no answer" in back.column(f"/{NOW}", "TextDocument:text")[1][0]
+    words = back.column(f"/{NOW}", "TextDocument:text")[1][0]
+    assert "SEECR moves by | no answer" in words and "SEECR turns by | no answer" in words
     guide = back.static(f"/{READ_ME}", "TextDocument:text")[0]
     assert f"- pose 1: {Verdict.SEECR_UNSOLVED.value}" in guide
 

@@ -39,11 +39,10 @@ from crosscheck.show.error_figures import Wall, draw_wall, failure_map, length_c
 from crosscheck.show.figures import WIDTH, collecting, keeping
 from crosscheck.show.findings import correlations, in_brief, parameter_table
 from crosscheck.show.misfit import Misfit, views_of
-from crosscheck.show.pictures import render, write_page
+from crosscheck.show.pictures import render
 from crosscheck.show.robot_figure import cables_of, projection
 from seecr import load_robot
 from seecr.effects import Term, Terms, layout_of
-from seecr.errors import InputFileError
 from seecr.pose import transform_points
 from seecr.show.colours import AFTER, BEFORE, CALM
 from seecr.units import short, with_error
@@ -449,16 +448,6 @@ def test_arrows_fit_the_region() -> None:
 
 
 @pytest.mark.parametrize(
-    ("magnify", "words"),
-    [(1.0, "to scale"), (50.0, "at 50 times their length"), (0.5, "at 0.5 times their length")],
-)
-def test_arrows_say_how_long_they_are(magnify: float, words: str) -> None:
-    shown = Misfit(path_of(diagnosis("pulleys")).problem, ends_of(diagnosis("pulleys"))[0].state)
-    vars(shown)["magnify"] = magnify
-    assert shown.scale == words
-
-
-@pytest.mark.parametrize(
     ("spans", "views"),
     [
         ((1.0, 0.6, 0.3), [(0, 1), (0, 2)]),
@@ -492,16 +481,6 @@ def test_many_rows_stay_small() -> None:
     for image in images:
         drawn = np.asarray(Image.open(io.BytesIO(base64.b64decode(image))).convert("RGBA"))
         assert np.mean(drawn[..., 3] > 128) > 0.02, "dots that nobody sees"
-
-
-def test_few_dots_are_drawn_as_what_they_are() -> None:
-    values = np.linspace(-1.0, 1.0, 7)[:, None]
-    wall = Wall("few", ["a"], values, 0.5 * values, np.ones(1), "mm", [("t", np.arange(7) * 1.0)])
-    (text,) = figures_of(draw_wall(wall))
-    dots = re.findall(r'd="((?:M [\d.]+ [\d.]+\s*L [\d.]+ [\d.]+\s*){7})"', text)
-    assert len(dots) == 2
-    assert "stroke-linecap: round" in text
-    assert "image/png" not in text
 
 
 @pytest.mark.parametrize(
@@ -560,20 +539,6 @@ def test_names_of_cables_stay_on_the_page_and_numbers_of_panels_apart(
         if label.get_text() and axes.get_xlim()[0] <= label.get_position()[0] <= axes.get_xlim()[1]
     ]
     assert all(one.x1 + 3.0 < other.x0 for one, other in itertools.pairwise(numbers))
-
-
-@pytest.mark.usefixtures("words_alone")
-def test_written_whole_or_not_at_all(tmp_path: Path) -> None:
-    path = tmp_path / "diagnosis.html"
-    write_page(diagnosis("none"), path)
-    assert path.read_text(encoding="utf-8") == render(diagnosis("none"))
-    assert list(tmp_path.iterdir()) == [path]
-    with pytest.raises(InputFileError, match=r"gone/d.html: cannot write the page: No such"):
-        write_page(diagnosis("none"), tmp_path / "gone" / "d.html")
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(InputFileError, match="folder: cannot write the page"):
-        write_page(diagnosis("none"), tmp_path / "folder")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["diagnosis.html", "folder"]
 
 
 def test_pages_are_small() -> None:

@@ -71,16 +71,6 @@ def test_a_plan_has_its_page(plan, pages):
         assert not item.reached or item.words in seen
 
 
-@pytest.mark.parametrize("which", ["comparison", "plan"])
-def test_pages_are_dark_and_narrow_where_the_reader_is(which, pages):
-    page = pages[which]
-    assert "prefers-color-scheme: dark" in page and "max-width: 640px" in page
-    style = page[page.index("<style>") : page.index("</style>")]
-    # nothing is wider than a telephone, but what can be moved sideways
-    assert not re.search(r"minmax\(\d", style)
-    assert style.count("{") == style.count("}")
-
-
 def test_printed_tables_have_their_heads_on_every_page(pages):
     style = pages["plan"].split("<style>")[1].split("</style>")[0]
     printed = style[style.index("@media print") :]

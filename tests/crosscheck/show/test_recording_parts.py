@@ -16,24 +16,12 @@ from crosscheck.show.error_recordings import draw_axes
 from seecr.errors import InputFileError
 from seecr.show import layout, plots
 from seecr.show.map_recording import write_map_recording
-from seecr.show.scene import Scene, States, write_legend
-from seecr.show.stream import opening, pose_index, recording_file, settling_index, sweep_index
+from seecr.show.stream import opening, pose_index, recording_file, sweep_index
 from seecr.workspace.maps import workspace_map
 
 
 def blueprint() -> rrb.Blueprint:
     return layout.blueprint(layout.text("Now", "text/now"))
-
-
-def test_rows_stand_over_their_timelines(tmp_path: Path) -> None:
-    path = tmp_path / "a.rrd"
-    with recording_file(path, "a name: with signs", blueprint()) as recording:
-        recording.scalars("plot/a", pose_index(3), [1.0, 2.5, -1.0])
-        recording.scalars("plot/b", settling_index(np.array([0.0, 0.25])), [4.0, 5.0])
-    back = Readback(path)
-    assert back.scalars("/plot/a").tolist() == [1.0, 2.5, -1.0]
-    assert back.scalars("/plot/b", "settling_time").tolist() == [4.0, 5.0]
-    assert back.seconds("/plot/b").tolist() == [0.0, 0.25]
 
 
 def test_a_recording_that_fails_leaves_nothing(tmp_path: Path) -> None:
@@ -51,29 +39,6 @@ def test_a_recording_that_fails_leaves_nothing(tmp_path: Path) -> None:
         raise AssertionError("nothing may be drawn into a folder that is not there")
 
 
-def test_taut_cables_are_lines_and_slack_ones_dashes(tmp_path: Path) -> None:
-    robot, path = soft_cogiro(), tmp_path / "a.rrd"
-    pose = np.stack([robot.reference_pose, robot.reference_pose])
-    m = robot.n_cables
-    slack = np.zeros((2, m), dtype=bool)
-    slack[1, :2] = True
-    lengths = np.tile(robot.reference_lengths, (2, 1))
-    with recording_file(path, "a", blueprint()) as recording:
-        scene = Scene(recording, robot, pose, 10.0)
-        scene.cables("model", pose_index(2), States(pose, np.ones((2, m)), lengths, slack))
-        write_legend(recording, 20.0)
-    back = Readback(path)
-    taut = back.column("/scene/model/cables/taut", "LineStrips3D:strips")
-    assert [len(strips) for strips in taut] == [m, m - 2]
-    assert np.array(taut[0][0]) == pytest.approx(
-        np.stack([robot.exit_points[0], robot.reference_pose[:3] + robot.anchor_points[0]]),
-        abs=1e-6,
-    )
-    loose = back.column("/scene/model/cables/slack", "LineStrips3D:strips")
-    assert len(loose[0] or []) == 0 and len(loose[1]) > 2
-    assert back.static("/legend/ticks", "Points2D:labels") == ["0 N", "10 N", "20 N"]
-
-
 def test_lanes_tell_apart_slack_differing_and_unknown() -> None:
     slack = np.array([[True, False], [True, False], [True, True]])
     differs = np.array([[False, False], [True, False], [True, True]])
@@ -81,15 +46,6 @@ def test_lanes_tell_apart_slack_differing_and_unknown() -> None:
     assert words.tolist() == [
         [plots.SLACK, plots.TAUT], [plots.DIFFER, plots.TAUT], [plots.NONE, plots.NONE],
     ]  # fmt: skip
-
-
-def test_deviations_are_in_millimetres_and_degrees() -> None:
-    command = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
-    turned = np.array([[0.001, 0.0, 1.0, np.cos(np.pi / 12), 0.0, np.sin(np.pi / 12), 0.0]])
-    parts = plots.deviation(turned, command)
-    assert parts["dx"] == pytest.approx(1.0) and parts["dz"] == pytest.approx(0.0)
-    assert parts["about y"] == pytest.approx(30.0) and parts["tilt"] == pytest.approx(30.0)
-    assert plots.log10(np.array([-1e-3, 0.0])).tolist() == pytest.approx([-3.0, -18.0])
 
 
 def test_axes_have_round_numbers_and_zero_has_no_sign(tmp_path: Path) -> None:
@@ -124,20 +80,6 @@ def test_a_line_along_an_axis_is_drawn_over_the_place(
     assert name == timeline and step == abs(places[-1] - places[0] or 1)
     assert index[0].timeline_name() == "pose"
     assert index[-1].as_arrow_array().to_pylist()[: len(places)] == places
-
-
-def test_several_timelines_and_lines_cut_by_runs(tmp_path: Path) -> None:
-    path, starts = tmp_path / "a.rrd", np.array([True, False, True, True])
-    index = sweep_index(line([0.0, 0.0, 0.0], [0.3, 0.0, 0.0], 4))
-    values = np.array([1.0, 2.0, 3.0, 4.0])
-    with recording_file(path, "a", blueprint()) as recording:
-        plots.line_by_runs(recording, "plot/a", index, values, starts, "a", (1, 2, 3, 255), 1.0)
-    back = Readback(path)
-    assert back.timelines == {"pose", "x_mm"}
-    assert back.column("/plot/a", "x_mm", "x_mm") == [0, 100, 200, 300]
-    lines = np.array(back.column("/plot/a", "Scalars:scalars"))
-    np.testing.assert_array_equal(lines, [[1, np.nan], [2, np.nan], [np.nan, 3], [4, np.nan]])
-    assert back.scalars("/plot/a").tolist() == values.tolist()
 
 
 def test_a_workspace_has_numbers_at_its_edges_and_the_scale_of_its_margins(tmp_path: Path) -> None:

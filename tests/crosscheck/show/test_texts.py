@@ -6,7 +6,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
 
 from crosscheck.show import suite
@@ -20,33 +19,6 @@ TURN = Rotation.from_euler("XYZ", [10.0, -20.0, 30.0], degrees=True)  # about mo
 
 def posed(turn: Rotation, by: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> np.ndarray:
     return np.concatenate([HOME[:3] + by, turn.as_quat(scalar_first=True)])
-
-
-def test_places_are_millimetres_and_angles_degrees_about_moving_axes() -> None:
-    assert suite.position(HOME) == "x 100.00, y -200.00, z 300.00 mm"
-    assert suite.orientation(posed(TURN)) == "rx 10.00, ry -20.00, rz 30.00°"
-    assert suite.orientation(np.array([*HOME[:3], 1.0, -0.0, -0.0, -0.0])) == (
-        "rx 0.00, ry 0.00, rz 0.00°"
-    )
-
-
-def test_from_its_command_a_pose_is_displaced_with_a_sign_and_turned_without() -> None:
-    moved = posed(TURN, (0.001, -0.002, 0.0))
-    assert suite.shift(moved, HOME) == "dx +1.00, dy -2.00, dz +0.00 mm"
-    far = posed(TURN, (3.0, 0.0, 0.0))
-    assert suite.turn(moved, HOME) == suite.turn(far, HOME)
-    assert suite.turn(far, HOME) == f"{np.degrees(TURN.magnitude()):.2f}°"
-    assert suite.turn(posed(TURN * TURN), posed(TURN)) == suite.turn(moved, HOME)
-
-
-@pytest.mark.parametrize("say", [suite.shift, suite.turn])
-def test_without_a_pose_there_is_no_answer(say) -> None:  # type: ignore[no-untyped-def]
-    assert say(np.full(7, np.nan), HOME) == "no answer"
-
-
-def test_a_number_that_there_is_not_is_a_dash() -> None:
-    assert suite.number(0.0012345, "J") == "0.00123 J" and suite.number(np.nan, "J") == "–"
-    assert suite.number(np.inf, "J") == "–" and suite.number(1.23456, "N", 5) == "1.2346 N"
 
 
 def test_a_table_has_heads_of_its_own_or_its_first_row() -> None:
