@@ -168,10 +168,6 @@ def _unsolved(found: Comparison) -> list[str]:
 # --- tables ---------------------------------------------------------------------------------------
 
 
-def _kinds(found: Comparison) -> list[Kind]:
-    return kinds_with([found.rms])
-
-
 def _coordinates(found: Comparison) -> TextTable:
     """Of each reading: bias, rms and largest error."""
     data = found.problem.data
@@ -205,7 +201,7 @@ def _errors(found: Comparison, most: int | None = None) -> TextTable:
     Args:
         found: the comparison. most: groups of one kind that are listed; all by default.
     """
-    kinds, problem = _kinds(found), found.problem
+    kinds, problem = kinds_with([found.rms]), found.problem
     rows: list[Sequence[Cell]] = [
         ["all rows", *rms_cells(kinds, found.rms), str(int(problem.use.sum()))]
     ]
@@ -237,7 +233,7 @@ def _largest(groups: Sequence[Rows], most: int | None) -> Sequence[Rows]:
 
 
 def _worst(found: Comparison) -> TextTable:
-    kinds = _kinds(found)
+    kinds = kinds_with([found.rms])
     return TextTable(
         ["#line", "run", "place", *heads_of(kinds), "#times the noise"],
         [
@@ -255,7 +251,7 @@ def _worst(found: Comparison) -> TextTable:
 
 
 def _worst_words(found: Comparison, row: WorstRow) -> str:
-    kinds = _kinds(found)
+    kinds = kinds_with([found.rms])
     cells = size_cells(kinds, (found.errors_of(kind.name)[row.row] for kind in kinds))
     sizes = [
         f"{cell} {kind.unit}" for kind, cell in zip(kinds, cells, strict=True) if cell is not None

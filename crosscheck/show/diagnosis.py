@@ -40,8 +40,7 @@ from crosscheck.show.blocks import (
     rms_table,
     section,
 )
-from crosscheck.show.candidates import candidate_blocks, candidate_lines
-from crosscheck.show.findings import PLAUSIBLE, card, in_brief
+from crosscheck.show.findings import PLAUSIBLE, candidate_blocks, candidate_lines, card, in_brief
 from crosscheck.show.residuals import (
     association_section,
     facts_of,
@@ -50,6 +49,7 @@ from crosscheck.show.residuals import (
     wall_section,
 )
 from crosscheck.show.texts import kinds_table, markdown, printed, row_heading, unused
+from seecr.description.robot import Robot
 from seecr.show.colours import AFTER, BEFORE, CALM, TINT
 from seecr.units import short
 
@@ -147,7 +147,7 @@ def page_of_diagnosis(found: Diagnosis) -> Page:
         if path is not None
         else [],
         then=() if found.missing else steps,
-        picture=_robot(found),
+        picture=None if path is None else _robot(path.problem.robot, found.missing),
         blocks=blocks,
         notes=found.notes,
         footer="A named effect is the best explanation of those tried, not a proven cause: carry "
@@ -156,12 +156,10 @@ def page_of_diagnosis(found: Diagnosis) -> Page:
     )
 
 
-def _robot(found: Diagnosis) -> Figure | None:
-    from crosscheck.show.robot_figure import robot_figure
+def _robot(robot: Robot, missing: Sequence[MissingEffect]) -> Figure:
+    from crosscheck.show.effect_figures import robot_figure
 
-    if found.path is None:
-        return None
-    return Figure(robot_figure(found.path.problem.robot, found.missing), wide=False)
+    return Figure(robot_figure(robot, missing), wide=False)
 
 
 def _facts(found: Diagnosis, problem: Problem) -> Block:
@@ -283,7 +281,9 @@ def checks(found: Diagnosis) -> list[Check]:
         for stage in listed
         if stage.added
     )
-    bound = _at_bounds(listed[-1])
+    fit = listed[-1].fit
+    labels = np.array(fit.terms.labels)[fit.at_bound].tolist()
+    bound = list(dict.fromkeys(effect for effect, _name in labels))
     return [
         *out,
         Check("test runs", better == blocks, "each added effect improves the prediction of "
@@ -302,12 +302,6 @@ def _better_runs(stages: Sequence[Stage]) -> tuple[int, int]:
     falls = [a - b for a, b in pairs if len(a) == len(b)]
     least = np.min(falls, axis=0) if falls else np.zeros(0)
     return int(np.sum(least > 0)), len(least)
-
-
-def _at_bounds(stage: Stage) -> list[str]:
-    """The effects of a model that have a parameter at its bound."""
-    labels = np.array(stage.fit.terms.labels)[stage.fit.at_bound]
-    return list(dict.fromkeys(effect for effect, _name in labels.tolist()))
 
 
 # --- texts of a recording -------------------------------------------------------------------------

@@ -127,22 +127,19 @@ def _figure_of(found: Comparison | Diagnosis | Plan, name: str) -> Any:
     return drawn[name or next(iter(drawn))]
 
 
-def _record_comparison(found: Comparison, path: Any) -> None:
-    from crosscheck.show.error_recordings import write_comparison_recording
-
-    write_comparison_recording(found, path)
-
-
-def _record_diagnosis(found: Diagnosis, path: Any) -> None:
-    from crosscheck.show.error_recordings import write_diagnosis_recording
-
-    write_diagnosis_recording(found, path)
-
-
-def _record_case(found: CaseResult, path: Any) -> None:
+def _record(found: Comparison | Diagnosis | CaseResult, path: Any) -> None:
     from crosscheck.show.case_recording import write_case_recording
+    from crosscheck.show.error_recordings import (
+        write_comparison_recording,
+        write_diagnosis_recording,
+    )
 
-    write_case_recording(found, path)
+    if isinstance(found, Comparison):
+        write_comparison_recording(found, path)
+    elif isinstance(found, Diagnosis):
+        write_diagnosis_recording(found, path)
+    else:
+        write_case_recording(found, path)
 
 
 def _record_run(found: Run, path: Any) -> None:
@@ -151,15 +148,15 @@ def _record_run(found: Run, path: Any) -> None:
             f"a recording is of one case, and this run has {counted(len(found.results), 'case')}; "
             "run.results[0].save_recording(path) writes that of the first"
         )
-    _record_case(found.results[0], path)
+    _record(found.results[0], path)
 
 
 PICTURES: Mapping[type, Pictures] = {
-    Comparison: Pictures(_figure_of, write_page, _record_comparison),
-    Diagnosis: Pictures(_figure_of, write_page, _record_diagnosis),
+    Comparison: Pictures(_figure_of, write_page, _record),
+    Diagnosis: Pictures(_figure_of, write_page, _record),
     Plan: Pictures(_figure_of, write_page),
     Study: Pictures(plot=lambda found, _name: study_figure(found, None)),
-    CaseResult: Pictures(recording=_record_case),
+    CaseResult: Pictures(recording=_record),
     Run: Pictures(recording=_record_run),
 }
 """By the class of result."""

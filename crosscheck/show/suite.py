@@ -135,8 +135,8 @@ def guide_text(result: CaseResult, along: str, watched: int | None) -> str:
     )  # fmt: skip
     more = [" The timeline ", Code("settling_time"), settling] if settling else []
     worst = [
-        [_TITLES[name], number(one.value, name.rsplit("_", 1)[1]), str(one.pose),
-         number(one.allowed, name.rsplit("_", 1)[1])]
+        [_TITLES[name], _number(one.value, name.rsplit("_", 1)[1]), str(one.pose),
+         _number(one.allowed, name.rsplit("_", 1)[1])]
         for name, one in result.worst.items()
     ]  # fmt: skip
     findings = _findings(result)
@@ -173,15 +173,23 @@ def pose_numbers_text(result: CaseResult, i: int, pose: Array) -> str:
         result: the case's. i: the pose, counted from 0. pose: (7,) SEECR's answer, NaN for none.
     """
     command, gap = result.case.poses[i], result.difference
+    x, y, z = 1e3 * command[:3]
+    rx, ry, rz = np.degrees(rxyz_from_quat(command[3:])) + 0.0
+    moves = turns = "no answer"
+    if np.isfinite(pose).all():
+        dx, dy, dz = 1e3 * (pose[:3] - command[:3])
+        angle = np.degrees(np.linalg.norm(pose_difference(pose, command)[3:]))
+        moves, turns = f"dx {dx:+.2f}, dy {dy:+.2f}, dz {dz:+.2f} mm", f"{angle:.2f}°"
     rows = [
-        ("command", position(command)),
-        ("turned", orientation(command)),
-        ("SEECR moves by", shift(pose, command)),
-        ("SEECR turns by", turn(pose, command)),
+        ("command", f"x {x:.2f}, y {y:.2f}, z {z:.2f} mm"),
+        # R = Rx(rx) Ry(ry) Rz(rz)
+        ("turned", f"rx {rx:.2f}, ry {ry:.2f}, rz {rz:.2f}°"),
+        ("SEECR moves by", moves),
+        ("SEECR turns by", turns),
         ("slack", slack_names(result.robot, result.solution.slack[i])),
-        ("MuJoCo differs by", number(gap.position_m[i], "m")),
-        ("in orientation by", number(gap.orientation_rad[i], "rad")),
-        ("in tension by", number(gap.tension_N[i], "N")),
+        ("MuJoCo differs by", _number(gap.position_m[i], "m")),
+        ("in orientation by", _number(gap.orientation_rad[i], "rad")),
+        ("in tension by", _number(gap.tension_N[i], "N")),
     ]
     more = [Line(f.text) for f in result.findings if f.pose == i]
     blocks: list[Block] = [*(more or [Line(result.verdict[i].value)]), TextTable([], rows)]
@@ -193,9 +201,9 @@ def instant_text(t_s: float, kinetic: float, distance: Array, slack: str) -> str
     [m, rad] from SEECR's answer.
     """
     rows = [
-        ("from SEECR's answer", number(1e3 * distance[0], "mm")),
-        ("rotation from it", number(np.degrees(distance[1]), "°")),
-        ("kinetic energy", number(kinetic, "J")),
+        ("from SEECR's answer", _number(1e3 * distance[0], "mm")),
+        ("rotation from it", _number(np.degrees(distance[1]), "°")),
+        ("kinetic energy", _number(kinetic, "J")),
         ("slack cables", slack),
     ]
     return f"## Settling, {t_s:.3f} s\n{markdown([TextTable([], rows)])}"
@@ -206,33 +214,6 @@ def slack_names(robot: Robot, slack: NDArray[np.bool_]) -> str:
     return ", ".join(n for n, yes in zip(robot.cable_names, slack, strict=True) if yes) or "none"
 
 
-def number(value: float, unit: str, digits: int = 3) -> str:
+def _number(value: float, unit: str) -> str:
     """A number with its unit, or a dash if there is none."""
-    return f"{value:.{digits}g} {unit}" if np.isfinite(value) else "–"
-
-
-def position(pose: Array) -> str:
-    """Position of a pose (7,) in millimetres."""
-    x, y, z = 1e3 * pose[:3]
-    return f"x {x:.2f}, y {y:.2f}, z {z:.2f} mm"
-
-
-def orientation(pose: Array) -> str:
-    """Angles of a pose (7,) in degrees, R = Rx(rx) Ry(ry) Rz(rz)."""
-    rx, ry, rz = np.degrees(rxyz_from_quat(pose[3:])) + 0.0
-    return f"rx {rx:.2f}, ry {ry:.2f}, rz {rz:.2f}°"
-
-
-def shift(pose: Array, command: Array) -> str:
-    """Displacement of a pose (7,) from its command."""
-    if not np.isfinite(pose).all():
-        return "no answer"
-    x, y, z = 1e3 * (pose[:3] - command[:3])
-    return f"dx {x:+.2f}, dy {y:+.2f}, dz {z:+.2f} mm"
-
-
-def turn(pose: Array, command: Array) -> str:
-    """Angle between a pose (7,) and its command."""
-    if not np.isfinite(pose).all():
-        return "no answer"
-    return f"{np.degrees(np.linalg.norm(pose_difference(pose, command)[3:])):.2f}°"
+    return f"{value:.3g} {unit}" if np.isfinite(value) else "–"

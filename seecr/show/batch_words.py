@@ -79,7 +79,8 @@ def jump_lines(solution: Solution) -> Iterator[str]:
         return
     if not any(solution.jumps):
         yield "followed from the reference pose: the platform does not jump on the path"
-    turns = _turns(solution)
+    away = pose_difference(solution.command, solution.robot.reference_pose)[:, 3:]
+    turns = bool(np.any(np.linalg.norm(away, axis=1) > NO_TURN))
     for i, jumps in enumerate(solution.jumps):
         for jump in jumps:
             command = f"{three_figures(1e3 * jump.command[:3], '.1f')} mm"
@@ -92,12 +93,6 @@ def jump_lines(solution: Solution) -> Iterator[str]:
             )
             landed = np.isfinite(jump.after).all()
             yield f"  from {last} to {then}" if landed else f"  it was last at {last}"
-
-
-def _turns(solution: Solution) -> bool:
-    """Whether the path of commands from the reference pose on turns."""
-    away = pose_difference(solution.command, solution.robot.reference_pose)[:, 3:]
-    return bool(np.any(np.linalg.norm(away, axis=1) > NO_TURN))
 
 
 def sweep_lines(

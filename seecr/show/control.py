@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,22 +21,20 @@ LEAST = 1e-5
 """What is nearer to a wanted pose than this [mm, deg] is there: it has no place on an axis of
 decades.
 """
-_NO_COMMAND = "no_command"
 _STYLES = ("-", "--", ":", "-.")
 
 
 def schemes_json(result: Control) -> dict[str, Record]:
     """``schemes`` in ``control.json``: of each the rows as in ``sweep.json``, and what it did."""
-    return {name: _scheme_json(one) for name, one in result.schemes.items()}
-
-
-def _scheme_json(one: Controlled) -> Record:
-    rows = SweepRows(one.solution, one.told, wanted=one.solution.command).as_json()
-    for row, told in zip(rows, one.told, strict=True):
-        row["command"] = row["wanted"]
-        if not np.isfinite(told).all():
-            row["status"] = _NO_COMMAND
-    return {"rows": rows, **one.head_json()}
+    out: dict[str, Record] = {}
+    for name, one in result.schemes.items():
+        rows = SweepRows(one.solution, one.told, wanted=one.solution.command).as_json()
+        for row, told in zip(rows, one.told, strict=True):
+            row["command"] = row["wanted"]
+            if not np.isfinite(told).all():
+                row["status"] = "no_command"
+        out[name] = {"rows": rows, **one.head_json()}
+    return out
 
 
 def control_csv(result: Control) -> str:
@@ -50,16 +48,25 @@ def control_figure(path: Path, result: Control) -> None:
     first = next(iter(result.schemes.values()))
     at, label = along(first.solution, True, "wanted")
     loops = any(one.radius is not None for one in result.schemes.values())
-    panels = [_position, *([_orientation] if result.robot.turns else []), _tensions]
-    count = len(panels) + loops
+    panels: dict[str, Callable[[Controlled], Array]] = {"position error [mm]": _away_mm}
+    if result.robot.turns:
+        panels["rotation error [°]"] = _turned_deg
+    count = len(panels) + 1 + loops
     with figure(path, count, 1, figsize=(7.4, 2.1 * count)) as axes:
-        for k, panel in enumerate(panels):
-            ax = axes[k, 0]
-            for number, one in enumerate(result.schemes.values()):
-                panel(ax, at, one, _style(number))
-            if panel is not _tensions:
-                _decades(ax)
-            ax.set_xlabel(label if k == len(panels) - 1 else "")
+        pull = axes[len(panels), 0]
+        for number, one in enumerate(result.schemes.values()):
+            style = _style(number)
+            for ax, off in zip(axes[:, 0], panels.values(), strict=False):
+                shown = np.where(one.rests, np.maximum(off(one), LEAST), np.nan)
+                ax.plot(at, shown, label=one.scheme, **style)
+            tensions = np.where(one.rests[:, None], one.solution.tensions, np.nan)
+            pull.plot(at, tensions.min(axis=1), **style)
+            pull.plot(at, tensions.max(axis=1), **style)
+        for ax, name in zip(axes[:, 0], panels, strict=False):
+            _decades(ax)
+            ax.set_ylabel(name)
+        pull.set_ylabel("least and largest\ntension [N]")
+        pull.set_xlabel(label)
         handles = axes[0, 0].get_legend_handles_labels()
         axes[0, 0].legend(*handles, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
         axes[0, 0].set_title(result.robot.name)
@@ -74,28 +81,13 @@ def _style(number: int) -> dict[str, Any]:
             "markersize": 2.5, "linewidth": 1.2}  # fmt: skip
 
 
-def _position(ax: Any, at: Array, one: Controlled, how: Mapping[str, Any]) -> None:
-    off = 1e3 * np.linalg.norm(one.solution.deviation[:, :3], axis=1)
-    _errors(ax, at, off, one, how)
-    ax.set_ylabel("position error [mm]")
+def _away_mm(one: Controlled) -> Array:
+    """(n,) distances from the wanted positions."""
+    return np.asarray(1e3 * np.linalg.norm(one.solution.deviation[:, :3], axis=1))
 
 
-def _orientation(ax: Any, at: Array, one: Controlled, how: Mapping[str, Any]) -> None:
-    off = np.degrees(np.linalg.norm(one.solution.deviation[:, 3:], axis=1))
-    _errors(ax, at, off, one, how)
-    ax.set_ylabel("rotation error [°]")
-
-
-def _tensions(ax: Any, at: Array, one: Controlled, how: Mapping[str, Any]) -> None:
-    pulls = np.where(one.rests[:, None], one.solution.tensions, np.nan)
-    for values in (pulls.min(axis=1), pulls.max(axis=1)):
-        ax.plot(at, values, **how)
-    ax.set_ylabel("least and largest\ntension [N]")
-
-
-def _errors(ax: Any, at: Array, values: Array, one: Controlled, how: Mapping[str, Any]) -> None:
-    shown = np.where(one.rests, np.maximum(values, LEAST), np.nan)
-    ax.plot(at, shown, label=one.scheme, **how)
+def _turned_deg(one: Controlled) -> Array:
+    return np.asarray(np.degrees(np.linalg.norm(one.solution.deviation[:, 3:], axis=1)))
 
 
 def _decades(ax: Any) -> None:
@@ -153,16 +145,9 @@ def write_control_recording(result: Control, path: str | Path) -> None:
                 MovingPlatform("read", last.read, SERIES[4])]  # fmt: skip
         shown += more
         who = {one.name: one.colour for one in (shown[0], *more)}
-    errors = Curves(
-        "plot/error", "Position error, 10^… mm", {one.scheme: _decade(one) for one in every}
-    )
+    off = {one.scheme: np.log10(np.maximum(_away_mm(one), LEAST)) for one in every}
+    errors = Curves("plot/error", "Position error, 10^… mm", off)
     write_platforms(
         path, f"{result.robot.name} control", result.robot, sweep_index(wanted), shown,
         (last.scheme, states_of_solution(last.solution)), [errors], who, last.rests,
     )  # fmt: skip
-
-
-def _decade(one: Controlled) -> Array:
-    """Decimal logarithms (n,) of the distances [mm] from the wanted positions."""
-    off = 1e3 * np.linalg.norm(one.solution.deviation[:, :3], axis=1)
-    return np.asarray(np.log10(np.maximum(off, LEAST)))

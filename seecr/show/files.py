@@ -207,8 +207,7 @@ def corrected_csv(found: Correction, wanted: CommandFile) -> str:
 def lookup_csv(found: Correction) -> str:
     """The look-up table of a controller: each position of a grid, and the lengths to command."""
     columns: dict[str, Any] = dict(zip(("x_m", "y_m", "z_m"), found.wanted.T[:3], strict=True))
-    driven = np.flatnonzero(found.robot.driven)
-    columns |= _named("length_{}_m", [str(k + 1) for k in driven], found.lengths[:, driven])
+    columns |= _lengths(found.robot, found.lengths)
     columns["reached"] = found.reached.astype(int).tolist()
     return table_text(columns)
 

@@ -66,7 +66,10 @@ def map_figure(
     """
     cut = _cut(found, most, edge is None or at_least is not None)
     panels, n = _panels(found), len(cut.picked)
-    size = (0.9 + 2.9 * n, 0.7 + _height(cut) * len(panels))
+    wide, high = (float(np.ptp(found.axes[k])) for k in (cut.wide, cut.high))
+    # of flat slices, and of the bar beside them
+    height = float(np.clip(_ROOM + _PANEL * high / wide, _LOWEST, _HIGHEST))
+    size = (0.9 + 2.9 * n, 0.7 + height * len(panels))
     with figure(path, len(panels), n, sharex=True, sharey=True, figsize=size) as axes:
         for row, panel in zip(axes, panels, strict=True):
             shown = _colours(cut, row, panel)
@@ -79,7 +82,11 @@ def map_figure(
             if panel.elastic:
                 _stripes(cut, row)
         if edge is not None:
-            _dots(axes, cut, edge, at_least)
+            look = {"color": _EDGE, "markersize": 2.5} if at_least is None else _LIKELY
+            places = cut.per_metre * found.along_axes(edge[:, :3])[:, [cut.wide, cut.high]]
+            for column, own in zip(axes.T, cut.with_dots(edge), strict=True):
+                for ax in column:
+                    ax.plot(*places[own].T, ".", **look)
         for k, ax in zip(cut.picked, axes[0], strict=True):
             at = cut.per_metre * found.axes[cut.across][k]
             ax.set_title(f"{found.axis_names[cut.across]} = {at:.4g} {cut.unit}")
@@ -167,12 +174,6 @@ def _cut(found: Workspace, most: int, outlined: bool) -> _Cut:
     return _Cut(found, across, wide, high, picked, slices, *unit, outlined)
 
 
-def _height(cut: _Cut) -> float:
-    """Height of a row of panels [inch]: that of flat slices, and of the bar beside them."""
-    wide, high = (float(np.ptp(cut.found.axes[k])) for k in (cut.wide, cut.high))
-    return float(np.clip(_ROOM + _PANEL * high / wide, _LOWEST, _HIGHEST))
-
-
 def _words(cut: _Cut, edge: Array | None, at_least: float | None) -> Iterator[str]:
     """What is not drawn, and the colours and dots that no colour bar explains."""
     shown, whole = len(cut.picked), len(cut.found.axes[cut.across])
@@ -226,15 +227,6 @@ def _yes_or_no(found: Workspace) -> bool:
     held = found.margin[found.feasible]
     few = found.robot.n_driven < found.robot.n_dof
     return few or (len(held) > 0 and bool(np.isposinf(held).all()))
-
-
-def _dots(axes: Any, cut: _Cut, edge: Array, at_least: float | None) -> None:
-    """Draw the edge's poses (k, 7) on every panel of their slice."""
-    look = {"color": _EDGE, "markersize": 2.5} if at_least is None else _LIKELY
-    places = cut.per_metre * cut.found.along_axes(edge[:, :3])[:, [cut.wide, cut.high]]
-    for row in axes:
-        for ax, own in zip(row, cut.with_dots(edge), strict=True):
-            ax.plot(*places[own].T, ".", **look)
 
 
 @dataclass(frozen=True, eq=False)

@@ -68,22 +68,17 @@ def write_map_recording(found: Workspace, path: str | Path, edge: Array | None =
         )
         recording.always(f"{ROOT}/held", points)
         if found.chance is not None:
-            recording.always(f"{ROOT}/unsure", _unsure(found, 0.004 * scene.size))
+            # the model leaves open whether these can be held
+            open_ = found.places[(found.chance > _SURELY_NOT) & (found.chance < _SURELY)]
+            some = open_[:: 1 + len(open_) // _MOST_POINTS]
+            red = rr.Points3D(some, radii=0.006 * scene.size, colors=colours.VERMILION)
+            recording.always(f"{ROOT}/unsure", red)
         if edge is not None:
             some = edge[:: 1 + len(edge) // _MOST_POINTS, :3]
             dots = rr.Points3D(some, radii=0.002 * scene.size, colors=colours.VERMILION)
             recording.always(f"{ROOT}/edge", dots)
         if elastic is not None:
             elastic.write(recording, scene)
-
-
-def _unsure(found: Workspace, radius: float) -> rr.Points3D:
-    """Positions for which the model leaves open whether they can be held."""
-    assert found.chance is not None
-    unsure = (found.chance > _SURELY_NOT) & (found.chance < _SURELY)
-    places = found.places[unsure]
-    every = 1 + len(places) // _MOST_POINTS
-    return rr.Points3D(places[::every], radii=1.5 * radius, colors=colours.VERMILION)
 
 
 # Most positions of each quantity, in all slices, and most arrows of one slice.

@@ -64,7 +64,10 @@ def pose_lines(solution: Solution, spread: Spread | None = None) -> Iterator[str
         turned = _known(angles, errors if len(angles) == 3 else [float(np.linalg.norm(errors))])
     yield f"rests at x y z {at} mm, turned {about} {turned} deg"
     if spread is not None:
-        yield from _spread_lines(spread)
+        seen, own = spread.seen[0], np.concatenate([spread.position[0], spread.rotation[0]])
+        yield f"  {_off(own)}: one standard deviation, from the uncertainty of the model"
+        if not np.allclose(seen, own, rtol=0.01):
+            yield f"  {_off(seen)} as the calibration's tracker would read it"
     yield "  quaternion " + " ".join(figures(q, ".7f") for q in np.round(pose[3:], 9))
     yield (
         f"off its command by {three_figures(1e3 * away[:3], '+.4f')} mm "
@@ -79,14 +82,6 @@ def pose_lines(solution: Solution, spread: Spread | None = None) -> Iterator[str
         )
     yield from stiffness_lines(solution)
     yield f"forces balance to {solution.balance[0]:.1g} of the load, rounding included"
-
-
-def _spread_lines(spread: Spread) -> Iterator[str]:
-    seen = spread.seen[0]
-    own = np.concatenate([spread.position[0], spread.rotation[0]])
-    yield f"  {_off(own)}: one standard deviation, from the uncertainty of the model"
-    if not np.allclose(seen, own, rtol=0.01):
-        yield f"  {_off(seen)} as the calibration's tracker would read it"
 
 
 def _off(values: Array) -> str:
@@ -123,24 +118,19 @@ def cable_lines(solution: Solution, spread: Spread | None = None) -> Iterator[st
     off = "" if spread is None else "      ± [N]"
     yield f"{'cable':<{wide}}  tension [N]{off}  rest length [m]"
     for k, name in enumerate(robot.cable_names):
-        slack = ("  slack" if solution.slack[0, k] else "") + _kind(robot, k)
+        held = robot.constant_tension_N[k] > 0.0
+        slack = "  slack" * bool(solution.slack[0, k])
+        slack += "" if robot.driven[k] and not held else "  passive" + ", constant tension" * held
         tension, rest = solution.tensions[0, k] + 0.0, solution.rest_lengths[0, k]
         shown, off = f"{tension:.4f}", ""
         if spread is not None:
             known = solution.slack[0, k]  # zero, and certain to first order
             shown, error = (shown, "") if known else with_error(tension, spread.tensions[0, k])
             off = f"  {error:>9}"
-        length = "–" if robot.constant_tension_N[k] > 0.0 else f"{rest:.6f}"
+        length = "–" if held else f"{rest:.6f}"
         yield f"{name:<{wide}}  {shown:>11}{off}  {length:>15}{slack}"
     if solution.slack[0].any():
         yield from sag_lines(solution.tables)
-
-
-def _kind(robot: Robot, k: int) -> str:
-    """What is said of line k beside its numbers, if no winch drives it."""
-    if robot.constant_tension_N[k] > 0.0:
-        return "  passive, constant tension"
-    return "" if robot.driven[k] else "  passive"
 
 
 def sag_lines(tables: Tables) -> Iterator[str]:
@@ -398,13 +388,17 @@ def open_lines(solution: Solution, held: bool, limits: tuple[float, float]) -> I
 def reason(solution: Solution) -> str:
     """Why a robot does not rest where it was sent: directions in which no cable resists."""
     robot, pose = solution.robot, solution.pose[0]
+
+    def motions(some: Array) -> str:
+        return "; ".join(direction_words(robot, one) for one in some)
+
     if not np.isfinite(pose).all():
         pose = solution.command[0]
     free = unresisted(robot, pose, np.ones(robot.n_cables, dtype=bool))
     if len(free):
         return (
             f"no cable, taut or slack, resists {counted(len(free), 'motion')}: "
-            f"{_motions(solution, free)}; expected more cables, or anchor points elsewhere"
+            f"{motions(free)}; expected more cables, or anchor points elsewhere"
         )
     slack = solution.slack[0]
     if slack.all():
@@ -417,12 +411,8 @@ def reason(solution: Solution) -> str:
         names = [name for name, hangs in zip(robot.cable_names, slack, strict=True) if hangs]
         return (
             f"with {some(names)} slack nothing but the weight resists: "
-            f"{_motions(solution, loose)}; another pose (--at) may hold it"
+            f"{motions(loose)}; another pose (--at) may hold it"
         )
     if np.isfinite(solution.softest_direction[0]).all():
         return f"it gives way there: {softest_words(solution)}; another pose (--at) may hold it"
     return "no pose was found where its cables carry it; another reference pose (--at) may do"
-
-
-def _motions(solution: Solution, motions: Array) -> str:
-    return "; ".join(direction_words(solution.robot, one) for one in motions)

@@ -32,15 +32,19 @@ from crosscheck.inference.held_out import rms_by_block
 from crosscheck.inference.noise import Noise
 from crosscheck.preparation.prepare import noise_floor
 from crosscheck.show.blocks import text_of as text_of_words
-from crosscheck.show.candidates import candidate_rows, untried
 from crosscheck.show.diagnosis import checks
-from crosscheck.show.effect_figures import confusion_of, waterfall
+from crosscheck.show.effect_figures import cables_of, confusion_of, projection, waterfall
 from crosscheck.show.error_figures import Wall, draw_wall, failure_map, length_changes, walls_of
 from crosscheck.show.figures import WIDTH, collecting, keeping
-from crosscheck.show.findings import correlations, in_brief, parameter_table
+from crosscheck.show.findings import (
+    candidate_rows,
+    correlations,
+    in_brief,
+    parameter_table,
+    untried,
+)
 from crosscheck.show.misfit import Misfit, views_of
 from crosscheck.show.pictures import render
-from crosscheck.show.robot_figure import cables_of, projection
 from seecr import load_robot
 from seecr.effects import Term, Terms, layout_of
 from seecr.pose import transform_points

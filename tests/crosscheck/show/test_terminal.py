@@ -21,9 +21,9 @@ from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.measurements.read import together
-from crosscheck.show.candidates import candidate_rows
 from crosscheck.show.comparison import print_comparison
 from crosscheck.show.diagnosis import print_diagnosis
+from crosscheck.show.findings import candidate_rows
 from crosscheck.show.models import print_addition, print_calibration, why_not
 from seecr.description.mjcf import load_robot
 from seecr.prediction.experiment import predict
