@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from functools import cache
 from html import escape
 from pathlib import Path
 
@@ -37,7 +38,7 @@ PURPOSES = (
 )
 
 # Sizes [pixels].
-_WIDTH, _FLOOR, _BOX, _TITLE, _ROOMS, _LETTER, _GAP = 900, 42, 30, 34, 290, 8.5, 9
+_FLOOR, _BOX, _TITLE, _ROOMS, _LETTER, _GAP = 42, 30, 34, 285, 8.0, 8
 _COLOURS = {"crosscheck": ("#e8f0fb", "#3d6fb0"), "seecr": ("#fdf0e0", "#c0792a")}
 
 
@@ -52,7 +53,7 @@ def picture() -> str:
             y += _TITLE
         body += _floor(line, purpose, y)
         y += _FLOOR
-    size = f'width="{_WIDTH}" height="{y + 4}" viewBox="0 0 {_WIDTH} {y + 4}"'
+    size = f'width="{_width():.0f}" height="{y + 4}" viewBox="0 0 {_width():.0f} {y + 4}"'
     head = f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="sans-serif">'
     return "\n".join([head, '<rect width="100%" height="100%" fill="white"/>', *body, "</svg>\n"])
 
@@ -60,19 +61,35 @@ def picture() -> str:
 def _floor(line: str, purpose: str, y: int) -> Iterator[str]:
     """A floor: its background, what it is for, and its rooms from left to right."""
     fill, edge = _COLOURS[line.partition(":")[0]]
-    yield f'<rect x="8" y="{y}" width="{_WIDTH - 16}" height="{_FLOOR - 4}" rx="6" fill="{fill}"/>'
+    size = f'width="{_width() - 16:.0f}" height="{_FLOOR - 4}"'
+    yield f'<rect x="8" y="{y}" {size} rx="6" fill="{fill}"/>'
     yield _text(purpose, 20, y + 24, 13, "#5b6570")
     x = float(_ROOMS)
-    for room in rooms_of(line):
-        folder = "/" if ROOT.joinpath(*room.split(".")).is_dir() else ""
-        title = room.partition(".")[2] + folder
-        width = _LETTER * len(title) + 20
+    for title in _titles(line):
         yield (
-            f'<rect x="{x:.0f}" y="{y + 4}" width="{width:.0f}" height="{_BOX}" rx="5" '
+            f'<rect x="{x:.0f}" y="{y + 4}" width="{_box(title):.0f}" height="{_BOX}" rx="5" '
             f'fill="white" stroke="{edge}"/>'
         )
-        yield _text(title, x + 10, y + 24, 14, "#1d2733")
-        x += width + _GAP
+        yield _text(title, x + 9, y + 24, 13, "#1d2733")
+        x += _box(title) + _GAP
+
+
+def _titles(line: str) -> list[str]:
+    """The rooms of a floor, folders with a stroke."""
+    folders = [ROOT.joinpath(*room.split(".")).is_dir() for room in rooms_of(line)]
+    names = [room.partition(".")[2] for room in rooms_of(line)]
+    return [f"{name}/" if folder else name for name, folder in zip(names, folders, strict=True)]
+
+
+def _box(title: str) -> float:
+    """Width of a room."""
+    return _LETTER * len(title) + 22
+
+
+@cache
+def _width() -> float:
+    """Of the picture, in which the widest floor has room."""
+    return _ROOMS + 12 + max(sum(_box(title) + _GAP for title in _titles(line)) for line in TABLE)
 
 
 def _text(words: str, x: float, y: int, size: int, fill: str, weight: str = "normal") -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,7 +21,6 @@ from seecr.show.colours import COMMAND, MUJOCO, SEECR, Rgba
 from seecr.show.plots import Legend, legend_of
 from seecr.show.scene import Scene, States, write_legend
 from seecr.show.stream import (
-    Index,
     Recording,
     entity_of,
     opening,
@@ -59,6 +59,8 @@ _QUANTITIES: dict[str, tuple[str, Rgba]] = {
     "orientation": ("orientation [rad]", colours.ORANGE),
     "tension": ("tension [N]", colours.GREEN),
 }
+# Their keys in differences and in what is allowed.
+_KEYS = {"position": "position_m", "orientation": "orientation_rad", "tension": "tension_N"}
 # Heights of the plots in parts of the column; its size in points of a window of 1920 by 1080.
 _PARTS = {DEVIATION: 2.8, TILT: 3.0, TENSION: 3.8, DIFFERENCE: 3.6}
 _WIDTH, _HEIGHT = 640.0, 1000.0
@@ -74,10 +76,10 @@ def write_case_recording(result: CaseResult, path: str | Path) -> None:
     with recording_file(path, result.case.name, _layout(drawn)) as recording:
         _draw_scene(recording, drawn)
         write_legend(recording, drawn.top)
-        _write_over_poses(recording, drawn)
+        for track in drawn.tracks:
+            _write_track(recording, drawn, track)
+        _write_limits_and_words(recording, drawn)
         _style(recording, drawn)
-        if drawn.motion is not None:
-            _write_over_settling(recording, drawn, drawn.motion)
 
 
 # --- what is drawn ------------------------------------------------------------------------------
@@ -103,41 +105,54 @@ class Motion:
 
 
 @dataclass(frozen=True, eq=False)
+class _Track:
+    """Both physics over poses, or over the instants of a settling.
+
+    Attributes:
+        index: timelines over k poses or instants.
+        command: (k, 7).
+        seecr: SEECR's answers, NaN at poses that are no equilibria to it.
+        mujoco: MuJoCo's, after the polish, or as it settles.
+        apart: (k,) how far they are from each other by quantity [m, rad, N].
+    """
+
+    index: Sequence[rr.TimeColumn]
+    command: Array
+    seecr: States
+    mujoco: States
+    apart: dict[str, Array]
+
+    @property
+    def deviations(self) -> dict[str, dict[str, Array]]:
+        """Deviations from the command [mm, deg] of both, by name."""
+        both = {"seecr": self.seecr, "mujoco": self.mujoco}
+        return {who: plots.deviation(one.pose, self.command) for who, one in both.items()}
+
+
+@dataclass(frozen=True, eq=False)
 class _Drawn:
     """A case and what its recording shows.
 
     Attributes:
-        result: the case's. index: the timelines over its poses.
-        seecr: SEECR's answers, NaN at poses that are no equilibria to it.
-        mujoco: MuJoCo's, after the polish.
-        watched: the pose, counted from 0, whose settling is shown.
-        motion: that settling; None if MuJoCo did not come to rest at any pose.
-        moving: its platform and cables; none without a motion.
+        result: the case's. tracks: over its poses, and over a settling if MuJoCo came to rest.
+        watched: the pose, counted from 0, whose settling is shown. motion: that settling.
     """
 
     result: CaseResult
-    index: list[rr.TimeColumn]
-    seecr: States
-    mujoco: States
-    watched: int
-    motion: Motion | None
-    moving: States
-
-    @property
-    def command(self) -> Array:
-        """Commanded poses (n, 7)."""
-        return self.result.case.poses
+    tracks: list[_Track]
+    watched: int | None = None
+    motion: Motion | None = None
 
     @property
     def seen(self) -> Array:
         """Every pose (k, 7) that the 3D view has to contain."""
-        return np.concatenate([self.command, self.seecr.pose, self.mujoco.pose])
+        over = self.tracks[0]
+        return np.concatenate([over.command, over.seecr.pose, over.mujoco.pose])
 
     @property
     def top(self) -> float:
         """Tension [N] at the end of the colour scale, a round number."""
-        tensions = np.concatenate([self.seecr.tensions, self.mujoco.tensions])
-        return colours.round_up(float(np.nanmax(tensions, initial=0.0)))
+        return colours.round_up(float(np.nanmax(np.concatenate(self.tensions[:2]), initial=0.0)))
 
     @property
     def shares(self) -> dict[str, float]:
@@ -152,20 +167,8 @@ class _Drawn:
 
     @property
     def tensions(self) -> list[Array]:
-        """(n, m) tensions of both physics over the poses, and those of the settling."""
-        return [self.seecr.tensions, self.mujoco.tensions, *([self.moving.tensions] * self.moves)]
-
-    @property
-    def moves(self) -> bool:
-        """Whether there is a settling to watch."""
-        return self.motion is not None
-
-    def from_the_answer(self) -> Array:
-        """Distance of MuJoCo from SEECR's answer as it settles (k, 3) [m, rad, N]."""
-        gap = pose_difference(self.moving.pose, self.seecr.pose[self.watched])
-        worst = np.abs(self.moving.tensions - self.seecr.tensions[self.watched]).max(axis=1)
-        turned = np.linalg.norm(gap[:, 3:], axis=1)
-        return np.stack([np.linalg.norm(gap[:, :3], axis=1), turned, worst], axis=1)
+        """(k, m) tensions of both physics over each timeline."""
+        return [one.tensions for track in self.tracks for one in (track.seecr, track.mujoco)]
 
 
 def _gathered(result: CaseResult) -> _Drawn:
@@ -175,14 +178,25 @@ def _gathered(result: CaseResult) -> _Drawn:
     pose = np.where(np.array(known)[:, None], solved.pose, np.nan)
     seecr = States(pose, solved.tensions, solved.rest_lengths, solved.slack)
     mujoco = States(settled.pose, settled.tensions, lengths, settled.slack)
-    index, watched = sweep_index(result.case.poses), _worth_watching(result)
-    if watched is None:
-        return _Drawn(result, index, seecr, mujoco, 0, None, mujoco)
-    settler = result.case.settler()
-    motion = record_motion(settler, result.case.begins[watched], lengths[watched])
-    same = np.tile(lengths[watched], (len(motion.t_s), 1))
+    apart = {quantity: getattr(result.difference, key) for quantity, key in _KEYS.items()}
+    poses = _Track(sweep_index(result.case.poses), result.case.poses, seecr, mujoco, apart)
+    i = _worth_watching(result)
+    if i is None:
+        return _Drawn(result, [poses])
+    motion = record_motion(result.case.settler(), result.case.begins[i], lengths[i])
+    k = len(motion.t_s)
+    # MuJoCo's platform moves; the command and SEECR's answer stay where they are
+    aim = States(*(np.repeat(part[i : i + 1], k, axis=0) for part in vars(seecr).values()))
+    same = np.tile(lengths[i], (k, 1))
     moving = States(motion.pose, motion.tensions, same, motion.tensions == 0.0)
-    return _Drawn(result, index, seecr, mujoco, watched, motion, moving)
+    gap = pose_difference(moving.pose, aim.pose)
+    worst = np.abs(moving.tensions - aim.tensions).max(axis=1)
+    away = (np.linalg.norm(gap[:, :3], axis=1), np.linalg.norm(gap[:, 3:], axis=1), worst)
+    settling = _Track(
+        [settling_index(motion.t_s)], np.tile(poses.command[i], (k, 1)), aim, moving,
+        dict(zip(_KEYS, away, strict=True)),
+    )  # fmt: skip
+    return _Drawn(result, [poses, settling], i, motion)
 
 
 def _worth_watching(result: CaseResult) -> int | None:
@@ -234,48 +248,51 @@ def _layout(drawn: _Drawn) -> rrb.Blueprint:
         column_shares=[5, 4, 2.6],
     )
     speed = 0.0 if drawn.motion is None else float(drawn.motion.t_s[-1]) / _WATCH_S
-    return layout.blueprint(
-        root, playback_speed=colours.round_up(speed), timeline=opening(drawn.index)
-    )
+    opens = opening(drawn.tracks[0].index)
+    return layout.blueprint(root, playback_speed=colours.round_up(speed), timeline=opens)
 
 
 def _plot_views(drawn: _Drawn) -> list[rrb.TimeSeriesView]:
     """The plots, top to bottom."""
-    moved, turned = _components(drawn)
+    # components that are worth a line: those that move at all
+    parts = drawn.tracks[0].deviations["seecr"]
+    largest = {name: np.nanmax(np.abs(values), initial=0.0) for name, values in parts.items()}
+    most = max(largest[n] for n in plots.TRANSLATIONS)
+    moved = [n for n in plots.TRANSLATIONS if largest[n] > _UNSEEN * most] or ["dz"]
+    turned = [n for n in plots.TURNS if largest[n] > _UNSEEN * max(largest["tilt"], 1e-6)]
+    turned = turned if len(turned) == 1 else [*turned, "tilt"]
     views = [_component_view(drawn, DEVIATION, "Deviation from the command [mm]", moved)]
     if TILT in drawn.shares:
         views.append(_component_view(drawn, TILT, "Rotation from the command [°]", turned))
-    names = drawn.result.robot.cable_names
     roots = [f"{TENSION}/{who}" for who in ("seecr", "mujoco")]
+    limit = drawn.result.allowance
+    gap = drawn.result.difference
+    lines = [*(getattr(limit, key) for key in _KEYS.values()), gap.settled_position_m,
+             gap.settled_orientation_rad]  # fmt: skip
+    apart = [list(track.apart.values()) for track in drawn.tracks]
+    apart[0] += lines
+    curves = [plots.log10(np.stack(values, axis=1)) for values in apart]
     titles = [title for title, _colour in _QUANTITIES.values()]
     return [
         *views,
-        plots.cables_view("Tension [N]", drawn.tensions, names, drawn.size(TENSION), roots),
+        plots.cables_view(
+            "Tension [N]", drawn.tensions, drawn.result.robot.cable_names, drawn.size(TENSION),
+            roots,
+        ),
         plots.plot(
             "log10 |SEECR - MuJoCo| (crosses: before the polish, lines: limits)",
             [f"{SETTLED}/**", f"{DIFFERENCE}/**", f"{LIMIT}/**"],
-            legend_of(_logarithms(drawn), titles, drawn.size(DIFFERENCE)),
+            legend_of(curves, titles, drawn.size(DIFFERENCE)),
         ),
-    ]
-
-
-def _components(drawn: _Drawn) -> tuple[list[str], list[str]]:
-    """Components that are worth a line: those that move at all."""
-    parts = plots.deviation(drawn.seecr.pose, drawn.command)
-    largest = {name: np.nanmax(np.abs(values), initial=0.0) for name, values in parts.items()}
-    most = max(largest[n] for n in plots.TRANSLATIONS)
-    moved = [n for n in plots.TRANSLATIONS if largest[n] > _UNSEEN * most]
-    turned = [n for n in plots.TURNS if largest[n] > _UNSEEN * max(largest["tilt"], 1e-6)]
-    return moved or ["dz"], [*turned, "tilt"] if len(turned) != 1 else turned
+    ]  # fmt: skip
 
 
 def _component_view(drawn: _Drawn, root: str, title: str, names: list[str]) -> rrb.TimeSeriesView:
     """Some components of the deviation; where nothing moves an axis that hides rounding."""
-    poses = [(drawn.seecr.pose, drawn.command), (drawn.mujoco.pose, drawn.command)]
-    ways = [[plots.deviation(*both) for both in poses]]
-    if drawn.moves:
-        ways.append([plots.deviation(drawn.moving.pose, drawn.command[drawn.watched])])
-    curves = [np.stack([part[n] for part in parts for n in names], axis=1) for parts in ways]
+    curves = [
+        np.stack([parts[n] for parts in track.deviations.values() for n in names], axis=1)
+        for track in drawn.tracks
+    ]
     largest = np.nanmax(np.abs(curves[0][:, : len(names)]), initial=0.0)
     legend = (
         Legend(values=(-_STILL, _STILL)) if largest < _NOISE
@@ -285,98 +302,71 @@ def _component_view(drawn: _Drawn, root: str, title: str, names: list[str]) -> r
     return plots.plot(title, both, legend)
 
 
-def _logarithms(drawn: _Drawn) -> list[Array]:
-    """Curves of differences and their limits: (n, 8) over the poses, (k, 3) over time."""
-    gap, limit = drawn.result.difference, drawn.result.allowance
-    out = [
-        gap.position_m, gap.orientation_rad, gap.tension_N, gap.settled_position_m,
-        gap.settled_orientation_rad, limit.position_m, limit.orientation_rad, limit.tension_N,
-    ]  # fmt: skip
-    moving = [drawn.from_the_answer()] if drawn.moves else []
-    return [plots.log10(values) for values in (np.stack(out, axis=1), *moving)]
-
-
 # --- content ------------------------------------------------------------------------------------
 
 
 def _draw_scene(recording: Recording, drawn: _Drawn) -> None:
     scene = Scene(recording, drawn.result.robot, drawn.seen, drawn.top)
     scene.surroundings()
-    index, i = drawn.index, drawn.watched
-    scene.platform("command", index, drawn.command, COMMAND)
-    scene.platform("seecr", index, drawn.seecr.pose, SEECR, solid=True)
-    scene.cables("seecr", index, drawn.seecr)
-    timelines: list[tuple[Index, States]] = [(index, drawn.mujoco)]
+    for over in drawn.tracks:
+        scene.platform("command", over.index, over.command, COMMAND)
+        scene.platform("seecr", over.index, over.seecr.pose, SEECR, solid=True)
+        scene.platform("mujoco", over.index, over.mujoco.pose, MUJOCO)
+        scene.cables("mujoco", over.index, over.mujoco)
+        scene.anchors("mujoco", over.index, over.mujoco.pose, MUJOCO)
+    poses = drawn.tracks[0]
+    scene.cables("seecr", poses.index, poses.seecr)
     if drawn.result.case.kind == "sweep":
-        scene.path("command", drawn.command, COMMAND)
-        scene.path("seecr", drawn.seecr.pose, SEECR)
+        scene.path("command", poses.command, COMMAND)
+        scene.path("seecr", poses.seecr.pose, SEECR)
+
+
+def _write_track(recording: Recording, drawn: _Drawn, track: _Track) -> None:
+    """Deviations from the command, tensions, differences and lanes over a timeline."""
+    names = drawn.result.robot.cable_names
+    for who, parts in track.deviations.items():
+        for name, values in parts.items():
+            root = DEVIATION if name in plots.TRANSLATIONS else TILT
+            if root in drawn.shares:
+                recording.scalars(f"{root}/{who}/{entity_of(name)}", track.index, values)
+    for who, states in (("seecr", track.seecr), ("mujoco", track.mujoco)):
+        for name, values in zip(names, states.tensions.T, strict=True):
+            recording.scalars(f"{TENSION}/{who}/{entity_of(name)}", track.index, values)
+    for quantity, values in track.apart.items():
+        recording.scalars(f"{DIFFERENCE}/{quantity}", track.index, plots.log10(values))
+    slack, differs = track.mujoco.slack, track.mujoco.slack & False
+    if track is drawn.tracks[0]:
+        # slack for one physics and taut for the other by more than is allowed
+        slack, allowed = track.seecr.slack, drawn.result.allowance.tension_N[:, None]
+        differs = (slack != track.mujoco.slack) & (
+            drawn.result.difference.cable_tension_N > allowed
+        )
+    both = track.seecr.known & track.mujoco.known
+    plots.write_lanes(recording, LANES, track.index, names, plots.lane_states(slack, differs, both))
+
+
+def _write_limits_and_words(recording: Recording, drawn: _Drawn) -> None:
+    """What is allowed, plain settling, verdicts, and the texts."""
+    result, poses = drawn.result, drawn.tracks[0]
+    for quantity, key in _KEYS.items():
+        allowed = plots.log10(getattr(result.allowance, key))
+        recording.scalars(f"{LIMIT}/{quantity}", poses.index, allowed)
+    for quantity in ("position", "orientation"):
+        plain = plots.log10(getattr(result.difference, f"settled_{_KEYS[quantity]}"))
+        recording.scalars(f"{SETTLED}/{quantity}", poses.index, plain)
+    verdicts = [verdict.name.lower() for verdict in result.verdict]
+    plots.lane(recording, VERDICT, poses.index, verdicts)
+    guide = suite.guide_text(result, opening(poses.index)[0], drawn.watched)
+    recording.text(READ_ME, guide)
+    numbers = [suite.pose_numbers_text(result, i, pose) for i, pose in enumerate(poses.seecr.pose)]
+    recording.texts(NOW, poses.index, numbers)
     if drawn.motion is not None:
-        # MuJoCo's platform moves; the command and SEECR's answer stay where they are
-        begin = settling_index(np.zeros(1))
-        scene.platform("command", begin, drawn.command[i : i + 1], COMMAND)
-        scene.platform("seecr", begin, drawn.seecr.pose[i : i + 1], SEECR, solid=True)
-        timelines.append((settling_index(drawn.motion.t_s), drawn.moving))
-    for over, states in timelines:
-        scene.platform("mujoco", over, states.pose, MUJOCO)
-        scene.cables("mujoco", over, states)
-        scene.anchors("mujoco", over, states.pose, MUJOCO)
-
-
-def _write_over_poses(recording: Recording, drawn: _Drawn) -> None:
-    """Both physics at every pose, their difference and its limits, in numbers and words."""
-    result, index = drawn.result, drawn.index
-    for who, states in (("seecr", drawn.seecr), ("mujoco", drawn.mujoco)):
-        _write_curves(recording, drawn, who, index, states.pose, states.tensions, drawn.command)
-    gap, limit = result.difference, result.allowance
-    quantities = ("position_m", "orientation_rad", "tension_N")
-    for quantity, key in zip(_QUANTITIES, quantities, strict=True):
-        difference, allowed = plots.log10(getattr(gap, key)), plots.log10(getattr(limit, key))
-        recording.scalars(f"{DIFFERENCE}/{quantity}", index, difference)
-        recording.scalars(f"{LIMIT}/{quantity}", index, allowed)
-    recording.scalars(f"{SETTLED}/position", index, plots.log10(gap.settled_position_m))
-    recording.scalars(f"{SETTLED}/orientation", index, plots.log10(gap.settled_orientation_rad))
-    # slack for one physics and taut for the other by more than is allowed
-    apart = gap.cable_tension_N > limit.tension_N[:, None]
-    differs = np.asarray((drawn.seecr.slack != drawn.mujoco.slack) & apart)
-    both = drawn.seecr.known & drawn.mujoco.known
-    pulls = plots.lane_states(drawn.seecr.slack, differs, both)
-    plots.write_lanes(recording, LANES, index, result.robot.cable_names, pulls)
-    plots.lane(recording, VERDICT, index, [verdict.name.lower() for verdict in result.verdict])
-    watched = drawn.watched if drawn.moves else None
-    recording.text(READ_ME, suite.guide_text(result, opening(index)[0], watched))
-    poses = enumerate(drawn.seecr.pose)
-    recording.texts(NOW, index, [suite.pose_numbers_text(result, i, pose) for i, pose in poses])
-
-
-def _write_over_settling(recording: Recording, drawn: _Drawn, motion: Motion) -> None:
-    """MuJoCo's motion, and its distance from SEECR's answer."""
-    index, moving, i = settling_index(motion.t_s), drawn.moving, drawn.watched
-    k, robot = len(motion.t_s), drawn.result.robot
-    aim, pull = (np.tile(a[i], (k, 1)) for a in (drawn.seecr.pose, drawn.seecr.tensions))
-    _write_curves(recording, drawn, "seecr", index, aim, pull, drawn.command[i])
-    _write_curves(recording, drawn, "mujoco", index, moving.pose, moving.tensions, drawn.command[i])
-    away = drawn.from_the_answer()
-    for quantity, values in zip(_QUANTITIES, away.T, strict=True):
-        recording.scalars(f"{DIFFERENCE}/{quantity}", index, plots.log10(values))
-    states = plots.lane_states(moving.slack, moving.slack & False, moving.known)
-    plots.write_lanes(recording, LANES, index, robot.cable_names, states)
-    slack = [suite.slack_names(robot, which) for which in moving.slack]
-    moments = zip(motion.t_s.tolist(), motion.kinetic_energy.tolist(), away[:, :2], slack,
-                  strict=True)  # fmt: skip
-    recording.texts(NOW, index, [suite.instant_text(*moment) for moment in moments])
-
-
-def _write_curves(
-    recording: Recording, drawn: _Drawn, who: str, index: Index, poses: Array, tensions: Array,
-    command: Array,
-) -> None:  # fmt: skip
-    """Deviations from the command and tensions of one physics."""
-    for name, values in plots.deviation(poses, command).items():
-        root = DEVIATION if name in plots.TRANSLATIONS else TILT
-        if root in drawn.shares:
-            recording.scalars(f"{root}/{who}/{entity_of(name)}", index, values)
-    for name, values in zip(drawn.result.robot.cable_names, tensions.T, strict=True):
-        recording.scalars(f"{TENSION}/{who}/{entity_of(name)}", index, values)
+        over = drawn.tracks[1]
+        slack = [suite.slack_names(result.robot, which) for which in over.mujoco.slack]
+        away = np.stack([over.apart["position"], over.apart["orientation"]], axis=1)
+        times, kinetic = drawn.motion.t_s.tolist(), drawn.motion.kinetic_energy.tolist()
+        moments = zip(times, kinetic, away, slack, strict=True)
+        recording.texts(NOW, over.index, [suite.instant_text(*moment) for moment in moments])
 
 
 def _style(recording: Recording, drawn: _Drawn) -> None:

@@ -100,19 +100,26 @@ def write_comparison_recording(found: Comparison, path: str | Path) -> None:
         scene.surroundings()
         arrows(recording, pose_index(1), shown, [found.state], scene.size)
         index = _pose_by_pose(recording, scene, shown, found.state)
+        starts = problem.experiment.commands.starts
         for kind in kinds:
-            _reading_plots(recording, index, found, kind)
+            shades = colours.cable_colours(len(channels(problem)[0][kind.columns]))
+            for k, reading, values in _errors_of(found, kind):
+                entity, colour = f"plot/{kind.name}/reading_{k + 1}", shades[k]
+                plots.line_by_runs(recording, entity, index, values, starts, reading, colour, 1.5)
         recording.texts(NOW, index, [pose_errors_text(found, k) for k in range(n)])
         recording.text(VERDICT, verdict_text(found, kinds, misfit_words(shown)))
 
 
 def _comparison_layout(found: Comparison, shown: Misfit, name: str) -> rrb.Blueprint:
-    many = len(shown.kinds)
+    many, legends = len(shown.kinds), []
+    for kind in shown.kinds:
+        _numbers, names, curves = zip(*_errors_of(found, kind), strict=True)
+        legends.append(legend_of([np.stack(curves, axis=1)], names, _HALF))
     root = rrb.Horizontal(
         _scene_view(shown, name, 0.76),
         rrb.Vertical(
             *map_views(shown),
-            panels(shown, [_reading_legend(found, kind) for kind in shown.kinds]),
+            panels(shown, legends),
             row_shares=[*[1.0] * many, float(many)],
         ),
         _texts(2.4, 2.0),
@@ -134,20 +141,6 @@ def _errors_of(found: Comparison, kind: Kind) -> list[tuple[int, str, Array]]:
         for k, name in enumerate(names)
         if read[:, k].any()
     ]
-
-
-def _reading_legend(found: Comparison, kind: Kind) -> Legend:
-    _numbers, names, curves = zip(*_errors_of(found, kind), strict=True)
-    return legend_of([np.stack(curves, axis=1)], names, _HALF)
-
-
-def _reading_plots(recording: Recording, index: Index, found: Comparison, kind: Kind) -> None:
-    """The errors of one kind, reading by reading, over the poses."""
-    shades = colours.cable_colours(len(channels(found.problem)[0][kind.columns]))
-    starts = found.problem.experiment.commands.starts
-    for k, name, values in _errors_of(found, kind):
-        entity = f"plot/{kind.name}/reading_{k + 1}"
-        plots.line_by_runs(recording, entity, index, values, starts, name, shades[k], 1.5)
 
 
 # --- diagnosis ------------------------------------------------------------------------------------

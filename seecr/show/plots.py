@@ -95,12 +95,6 @@ def lane(recording: Recording, entity: str, index: Index, words: Sequence[str]) 
     recording.rows(entity, index, rr.StateChange.columns(state=list(words)))
 
 
-def lane_style(recording: Recording, entity: str, colour: Rgba) -> None:
-    """Taut in the cable's colour, slack in grey; warnings stand out."""
-    shades = {TAUT: _dim(colour), SLACK: _GREY, DIFFER: _RED, NONE: _BLACK}
-    state_colours(recording, entity, shades)
-
-
 def state_colours(recording: Recording, entity: str, shades: dict[str, Rgba]) -> None:
     """The colours of a lane's words."""
     style = rr.StateConfiguration(
@@ -229,8 +223,13 @@ def write_lanes(
     recording: Recording, root: str, index: Index, names: Sequence[str],
     states: NDArray[np.object_],
 ) -> None:  # fmt: skip
-    """A lane for each cable with its states (k, m), in its own colour."""
+    """A lane for each cable with its states (k, m).
+
+    Taut is in the cable's own colour, slack in grey; warnings stand out.
+    """
     shades = colours.cable_colours(len(names))
     for name, column, colour in zip(names, states.T, shades, strict=True):
-        lane(recording, f"{root}/{entity_of(name)}", index, list(column))
-        lane_style(recording, f"{root}/{entity_of(name)}", colour)
+        entity = f"{root}/{entity_of(name)}"
+        lane(recording, entity, index, list(column))
+        words = {TAUT: _dim(colour), SLACK: _GREY, DIFFER: _RED, NONE: _BLACK}
+        state_colours(recording, entity, words)

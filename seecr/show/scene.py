@@ -50,33 +50,6 @@ class States:
         return np.asarray(np.isfinite(self.pose).all(axis=1))
 
 
-@dataclass(frozen=True, eq=False)
-class Box:
-    """The platform as a box around its anchor points, platform frame.
-
-    Attributes:
-        half_size: (3,) [m].
-        centre: (3,) [m].
-    """
-
-    half_size: Array
-    centre: Array
-
-    def centres(self, poses: Array) -> Array:
-        """Centres (n, 3) [m] in the base frame at poses (n, 7)."""
-        return poses[:, :3] + quat_rotate(poses[:, 3:], self.centre)
-
-
-def platform_box(robot: Robot, size: float) -> Box:
-    """Box around the anchor points; a flat one is given some thickness, a point some of the robot's
-    size [m].
-    """
-    low, high = robot.anchor_points.min(axis=0), robot.anchor_points.max(axis=0)
-    half = (high - low) / 2.0
-    thinnest = max(_FLAT * float(half.max()), 0.006 * size)
-    return Box(np.maximum(half, thinnest), (low + high) / 2.0)
-
-
 def extent(robot: Robot, poses: Array) -> tuple[Array, Array]:
     """Corners (3,), (3,) [m] of the visible box: exit points and the platform's poses."""
     seen = poses[np.isfinite(poses).all(axis=-1)]
@@ -116,30 +89,6 @@ def cable_labels(robot: Robot, low: Array, high: Array) -> tuple[Array, list[str
     depth = (places - points.mean(axis=0)) @ front(robot, low, high)[1]
     places += np.where(depth > _BEFORE * size, _LIFT * size, 0.0)[:, None] * robot.up
     return places, [joined([robot.cable_names[k] for k in group]) for group in groups]
-
-
-def frame_edges(low: Array, high: Array) -> list[Array]:
-    """Edges of the box between two corners, as strips (2, 3) [m]; a flat one has four."""
-    flat = (high - low) < 1e-3 * float(np.max(high - low))
-    edges = []
-    for axis in range(3):
-        others = [k for k in range(3) if k != axis]
-        for corner in np.ndindex(2, 2):
-            ends = np.array([low, low], dtype=float)
-            ends[1, axis] = high[axis]
-            for k, side in zip(others, corner, strict=True):
-                ends[:, k] = high[k] if side else low[k]
-            doubled = any(flat[k] and side for k, side in zip(others, corner, strict=True))
-            if not flat[axis] and not doubled:
-                edges.append(ends)
-    return edges
-
-
-def taut_strips(robot: Robot, poses: Array, slack: NDArray[np.bool_]) -> list[Array]:
-    """Straight lines (2, 3) [m] of the cables that pull, pose by pose."""
-    anchors = transform_points(poses, robot.anchor_points)
-    exits = np.broadcast_to(robot.exit_points, anchors.shape)
-    return list(np.stack([exits, anchors], axis=2)[~slack])
 
 
 def slack_strips(
@@ -190,20 +139,21 @@ class Scene:
         self.recording, self.robot, self.top = recording, robot, top
         self.low, self.high = extent(robot, poses)
         self.size = float(np.linalg.norm(self.high - self.low))
-        self.box = platform_box(robot, self.size)
+        corners = robot.anchor_points.min(axis=0), robot.anchor_points.max(axis=0)
+        half = (corners[1] - corners[0]) / 2.0
+        # a flat platform is given some thickness, a point some of the robot's size
+        thinnest = max(_FLAT * float(half.max()), 0.006 * self.size)
+        self.half_size, self.centre = np.maximum(half, thinnest), (corners[0] + corners[1]) / 2.0
 
     def surroundings(self) -> None:
         """Draw what does not move: axes, frame, and exit points with the names of cables."""
         robot, record = self.robot, self.recording
         record.always(ROOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-        record.always(
-            f"{ROOT}/frame",
-            rr.LineStrips3D(
-                frame_edges(self.low, self.high),
-                radii=_FRAME * self.size,
-                colors=colours.FRAME,
-            ),
-        )
+        frame = rr.Boxes3D(
+            mins=[self.low], sizes=[self.high - self.low], radii=_FRAME * self.size,
+            colors=colours.FRAME, fill_mode=rr.components.FillMode.MajorWireframe,
+        )  # fmt: skip
+        record.always(f"{ROOT}/frame", frame)
         record.always(
             f"{ROOT}/exit_points",
             rr.Points3D(robot.exit_points, radii=1.5 * _FRAME * self.size, colors=colours.SILVER),
@@ -238,12 +188,12 @@ class Scene:
     ) -> None:
         """Draw the platform as a box: solid, or only its edges so that others show through."""
         seen = np.isfinite(poses).all(axis=1)
-        k, box = int(seen.sum()), self.box
+        k, poses = int(seen.sum()), poses[seen]
         fill = rr.components.FillMode.Solid if solid else rr.components.FillMode.MajorWireframe
         columns = rr.Boxes3D.columns(
-            half_sizes=np.tile(box.half_size, (k, 1)),
-            centers=box.centres(poses[seen]),
-            quaternions=np.roll(poses[seen, 3:], -1, axis=1),  # Rerun's are scalar last
+            half_sizes=np.tile(self.half_size, (k, 1)),
+            centers=poses[:, :3] + quat_rotate(poses[:, 3:], self.centre),
+            quaternions=np.roll(poses[:, 3:], -1, axis=1),  # Rerun's are scalar last
         ).partition(seen.astype(int))
         entity = f"{ROOT}/{name}/platform"
         self.recording.rows(entity, index, columns)
@@ -264,7 +214,16 @@ class Scene:
         """Draw taut cables as thick lines coloured by tension, slack ones dashed and grey."""
         known = states.known
         poses = np.where(known[:, None], states.pose, self.robot.reference_pose)
-        self._taut(f"{ROOT}/{name}/cables/taut", index, states, poses)
+        pulls = ~states.slack & known[:, None]
+        anchors = transform_points(poses, self.robot.anchor_points)
+        exits = np.broadcast_to(self.robot.exit_points, anchors.shape)
+        taut = rr.LineStrips3D.columns(
+            strips=list(np.stack([exits, anchors], axis=2)[pulls]),
+            colors=colours.scale_colours(states.tensions[pulls], self.top),
+        )
+        entity = f"{ROOT}/{name}/cables/taut"
+        self.recording.rows(entity, index, taut.partition(pulls.sum(axis=1)))
+        self.recording.always(entity, rr.LineStrips3D.from_fields(radii=[_TAUT * self.size]))
         slack = states.slack & known[:, None]
         strips = slack_strips(self.robot, poses, slack, states.rest_lengths)
         entity = f"{ROOT}/{name}/cables/slack"
@@ -273,15 +232,6 @@ class Scene:
         self.recording.rows(entity, index, columns.partition(counts))
         style = rr.LineStrips3D.from_fields(radii=[_LOOSE * self.size], colors=[colours.SLACK])
         self.recording.always(entity, style)
-
-    def _taut(self, entity: str, index: Index, states: States, poses: Array) -> None:
-        pulls = ~states.slack & states.known[:, None]
-        columns = rr.LineStrips3D.columns(
-            strips=taut_strips(self.robot, poses, ~pulls),
-            colors=colours.scale_colours(states.tensions[pulls], self.top),
-        )
-        self.recording.rows(entity, index, columns.partition(pulls.sum(axis=1)))
-        self.recording.always(entity, rr.LineStrips3D.from_fields(radii=[_TAUT * self.size]))
 
 
 def write_legend(recording: Recording, top: float, who: Mapping[str, Rgba] = PHYSICS) -> None:
