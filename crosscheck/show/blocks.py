@@ -110,9 +110,10 @@ class TextTable:
     kind: str = ""
 
     @property
-    def wordy(self) -> bool:
-        """Whether it is mostly words: on a narrow page each row is then a few lines."""
-        return sum(not head.startswith("#") for head in self.heads) > 3
+    def wide(self) -> bool:
+        """Whether a narrow page has no room for it: each row is then a few lines there."""
+        words = sum(not head.startswith("#") for head in self.heads)
+        return words > 3 or len(self.heads) > 6
 
 
 @dataclass(frozen=True)
