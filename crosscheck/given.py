@@ -12,7 +12,9 @@ import numpy as np
 
 from crosscheck.errors import CrosscheckError
 from seecr.arguments import finite
-from seecr.description.mjcf import GivenRobot, load_robot, robot_file, robot_of
+from seecr.description.mjcf import GivenRobot as GivenRobot
+from seecr.description.mjcf import load_robot, robot_file
+from seecr.description.mjcf import robot_of as robot_of
 from seecr.description.passive import declare
 from seecr.description.robot import Robot
 from seecr.effects import Effect, GivenEffect, Term, Terms, catalogue, class_of
@@ -20,22 +22,6 @@ from seecr.errors import InputError, RobotError
 from seecr.folders import check_ours
 from seecr.pose import Array
 from seecr.prediction.model import Model, effects_given, model_given, new_model
-
-__all__ = [
-    "GivenModel",
-    "GivenNames",
-    "GivenRobot",
-    "basis_of",
-    "check_above_zero",
-    "check_case",
-    "considered",
-    "copy_robot",
-    "file_of",
-    "model_of",
-    "names_of",
-    "opened",
-    "robot_of",
-]
 
 GivenModel: TypeAlias = Model | Iterable[Term | Effect] | str | Path
 """A model, its effects alone, or the path of its TOML; ``()`` is the plain model."""

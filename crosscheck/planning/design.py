@@ -29,7 +29,6 @@ from crosscheck.planning.planned import (
     kinds_of,
     near_slack,
     planned,
-    slack_at,
 )
 from crosscheck.planning.proposer import propose
 from crosscheck.planning.result import Plan, Visible, all_visible
@@ -147,7 +146,7 @@ def _beside_catalogue(effects: GivenNames) -> frozenset[str]:
 
 def _loose(plan: Planned) -> tuple[tuple[int, tuple[str, ...]], ...]:
     """The lines at which cables are slack, with these cables' names."""
-    names, slack = np.array(plan.problem.robot.cable_names), slack_at(plan)
+    names, slack = np.array(plan.problem.robot.cable_names), plan.base.prediction.slack
     rows = np.flatnonzero(plan.problem.use & slack.any(axis=1))
     line = plan.problem.data.line
     return tuple((int(line[k]), tuple(names[slack[k]].tolist())) for k in rows)

@@ -12,6 +12,7 @@ from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Measurements
 from crosscheck.planning.planned import (
     MORE_POSES,
+    READ,
     Adding,
     Extension,
     Planned,
@@ -229,7 +230,7 @@ def _sensors(plan: Planned, data: Measurements) -> Iterator[Extension]:
             Adding.TENSIONS,
             f"record the cable tensions (to {noise:g} N)",
             like(
-                plan, data, reads=Reads.whole(m, pose=False, tensions=True),
+                plan, data, reads=Reads.of_kinds(m, READ[2:]),
                 sigma=replace(problem.sigma, tension_N=noise),
             ),
         )  # fmt: skip
@@ -238,7 +239,7 @@ def _sensors(plan: Planned, data: Measurements) -> Iterator[Extension]:
         yield Extension(
             Adding.POSE,
             "record the whole pose of the platform",
-            like(plan, data, reads=Reads.whole(m), sigma=sigma),
+            like(plan, data, reads=Reads.of_kinds(m), sigma=sigma),
         )
 
 

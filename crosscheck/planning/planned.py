@@ -54,14 +54,8 @@ class Reads:
         return cls(data.position_mask, whole, data.angle_mask, data.tension_mask)
 
     @classmethod
-    def whole(cls, n_cables: int, pose: bool = True, tensions: bool = False) -> Reads:
-        """The complete pose, all tensions, or both."""
-        every = np.full(3, pose)
-        return cls(every, pose, np.zeros(3, dtype=bool), np.full(n_cables, tensions))
-
-    @classmethod
-    def of_kinds(cls, n_cables: int, kinds: Collection[str]) -> Reads:
-        """Complete positions, orientations and tensions, as far as they are named.
+    def of_kinds(cls, n_cables: int, kinds: Collection[str] = READ[:2]) -> Reads:
+        """Complete positions, orientations and tensions, as far as they are named; else the pose.
 
         Raises:
             CrosscheckError: a name is unknown, or there is none.
@@ -188,11 +182,6 @@ def _as_read(commands: Measurements, readings: Readings, reads: Reads) -> Measur
         angles_rad=np.where(stops & reads.angles, angles, np.nan),
         tensions=np.where(stops & reads.tensions, readings.tensions, np.nan),
     )
-
-
-def slack_at(plan: Planned) -> NDArray[np.bool_]:
-    """(n, m) bool which cables are slack where the model rests."""
-    return plan.base.prediction.slack
 
 
 def near_slack(plan: Planned) -> list[tuple[int, int]]:

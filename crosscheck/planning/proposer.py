@@ -14,7 +14,7 @@ import numpy as np
 
 from crosscheck.fit.state import derivatives
 from crosscheck.measurements.data import Measurements
-from crosscheck.planning.planned import MORE_POSES, Adding, Extension, Planned, slack_at
+from crosscheck.planning.planned import MORE_POSES, Adding, Extension, Planned
 from crosscheck.planning.room import Demand
 from crosscheck.planning.visibility import (
     EXACT,
@@ -174,7 +174,7 @@ def _few_poses(
     words = f"add the {counted(len(rows), 'pose')} listed below"
     gains, told = _gains(own, few, open_), grid.plan.problem.data.rows(rows)
     names = np.array(grid.plan.problem.robot.cable_names)
-    slack = tuple(tuple(names[loose].tolist()) for loose in slack_at(grid.plan)[rows])
+    slack = tuple(tuple(names[loose].tolist()) for loose in grid.plan.base.prediction.slack[rows])
     demand = Demand.of(grid.plan, np.array(rows))
     return Suggestion(Adding.POSES, words, gains, grid.poses[rows], told, slack, demand)
 

@@ -80,13 +80,13 @@ def largest_gain(eigenvalues: Complex, delay: int) -> float:
     return float(np.min(2.0 * np.sin(room / (2 * delay + 1)) / size, initial=np.inf))
 
 
-def largest_delay(eigenvalues: Complex, gain: float) -> int | None:
-    """The most steps of delay with which a gain holds; None if it holds with none, or any do.
+def largest_delay(eigenvalues: Complex, gain: float) -> int:
+    """The most steps of delay with which a gain holds; -1 if it holds with none, or any do.
 
     The bound of :func:`largest_gain`, solved for the delay.
     """
     if len(eigenvalues) == 0 or not gain < largest_gain(eigenvalues, 0):
-        return None
+        return -1
     room = 0.5 * np.pi - np.abs(np.angle(eigenvalues))
     most = 0.5 * (room / np.arcsin(0.5 * gain * np.abs(eigenvalues)) - 1.0)
     return int(np.ceil(np.min(most))) - 1
@@ -127,24 +127,6 @@ class Course:
     steps: NDArray[np.int64]
     travel: Array
     eigenvalues: tuple[Complex | None, ...]
-
-    def radii(self, tuning: Tuning) -> Array:
-        """Spectral radii (n,); NaN where there is no loop that could settle."""
-        known = [
-            np.nan if one is None else spectral_radius(one, tuning.gain, tuning.delay)
-            for one in self.eigenvalues
-        ]
-        return np.array(known)
-
-    def largest_gains(self, tuning: Tuning) -> Array:
-        """(n,) gains below which the loop settles."""
-        return np.array([
-            np.nan if one is None else largest_gain(one, tuning.delay) for one in self.eigenvalues
-        ])  # fmt: skip
-
-    def largest_delays(self, tuning: Tuning) -> list[int | None]:
-        """Most steps of delay with which the gain holds; None where it holds with none."""
-        return [None if e is None else largest_delay(e, tuning.gain) for e in self.eigenvalues]
 
 
 class Loop:

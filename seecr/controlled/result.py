@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 
 from seecr.commands import Commands
 from seecr.controlled.belief import Belief
-from seecr.controlled.loop import Course, Tuning
+from seecr.controlled.loop import (
+    Complex,
+    Course,
+    Tuning,
+    largest_delay,
+    largest_gain,
+    spectral_radius,
+)
 from seecr.controlled.schemes import Scheme
 from seecr.counted import between, counted, rows_words
 from seecr.description.robot import Robot
@@ -68,19 +75,25 @@ class Controlled(Result):
         limits: tuple[Array, Array], tuning: Tuning,
     ) -> Controlled:  # fmt: skip
         """Of a course, with the poses that are believed and those that are read."""
-        solution, loops, radius = course.solution, bool(scheme.feedbacks), course.radii(tuning)
+
+        def of_loops(number: Callable[[Complex], float]) -> Array:
+            """(n,) numbers; NaN where there is no loop that could settle."""
+            return np.array([np.nan if e is None else number(e) for e in course.eigenvalues])
+
+        solution, loops = course.solution, bool(scheme.feedbacks)
+        radius = of_loops(lambda e: spectral_radius(e, tuning.gain, tuning.delay))
         room = _ROUNDING * solution.tables.scale[:, None]
         pulls = (solution.tensions * solution.robot.falls)[:, solution.robot.driven]
         low, high = limits[0] - room, limits[1] + room
         within = np.asarray(((pulls >= low) & (pulls <= high)).all(axis=1))
         rests = solution.converged & np.isfinite(solution.pose).all(axis=1)
-        delays = [-1 if one is None else one for one in course.largest_delays(tuning)]
+        delays = np.nan_to_num(of_loops(lambda e: largest_delay(e, tuning.gain)), nan=-1.0)
         return cls(
             scheme.name, solution, course.told, *seen, within,
             rests & (course.steps >= 0) & ~(radius > 1.0 + _NEUTRAL), course.steps, course.travel,
             radius if loops else None,
-            course.largest_gains(tuning) if loops else None,
-            np.array(delays) if loops else None, course.error,
+            of_loops(lambda e: largest_gain(e, tuning.delay)) if loops else None,
+            delays.astype(np.int64) if loops else None, course.error,
         )  # fmt: skip
 
     def __len__(self) -> int:

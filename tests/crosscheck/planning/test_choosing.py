@@ -103,7 +103,7 @@ def test_a_set_up_sees_what_it_reads(cogiro):
 
 def test_way_points_and_payloads_aside_are_proposed(cogiro, tmp_path):
     data = measured(cogiro, points=3)
-    plan = planned(cogiro, data, SIGMA, Reads.whole(cogiro.n_cables))
+    plan = planned(cogiro, data, SIGMA, Reads.of_kinds(cogiro.n_cables))
     found = {one.kind: one.plan.problem.data for one in detours(plan)}
     over = found[Adding.WAY_POINTS]
     assert np.array_equal(over.read, np.tile([False, True], data.n_rows))
@@ -129,7 +129,7 @@ def test_a_run_that_starts_at_its_first_row_has_nothing_beyond_that(cogiro):
     anywhere = Room.of(cogiro, limits=(0.0, np.inf), box=[[-9.0] * 3, [9.0] * 3])
 
     def moved(one):
-        plan = planned(cogiro, one, SIGMA, Reads.whole(cogiro.n_cables))
+        plan = planned(cogiro, one, SIGMA, Reads.of_kinds(cogiro.n_cables))
         found = {item.kind: item.plan.problem.data for item in detours(plan, anywhere)}
         return found[Adding.WAY_POINTS].command_pose[::2, :3] - one.command_pose[:, :3]
 

@@ -17,7 +17,7 @@ from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import together
 from crosscheck.planning.design import choose_poses, make_plan
 from crosscheck.planning.places import detours, extensions, more_poses
-from crosscheck.planning.planned import MORE_POSES, Adding, Reads, near_slack, planned
+from crosscheck.planning.planned import MORE_POSES, READ, Adding, Reads, near_slack, planned
 from crosscheck.planning.proposer import NEEDED, telling_apart
 from crosscheck.planning.room import Room, usual_tension
 from crosscheck.planning.visibility import (
@@ -267,7 +267,7 @@ def test_constant_commands_and_slack_rows(robot, commands):
 def test_what_tells_two_effects_of_a_model_apart_is_proposed_by_the_same_means(robot, few):
     """Mass and stiffness move a robot alike: sensors or a load part them, poses never do."""
     model = Terms([term(robot, "stiffness", factor=1.4)])
-    here = planned(robot, few, SIGMA, Reads.whole(robot.n_cables), model)
+    here = planned(robot, few, SIGMA, Reads.of_kinds(robot.n_cables), model)
     options = list(extensions(here))
     rival = term(robot, "platform_mass").layout
     found = telling_apart(here, options, "stiffness", rival)
@@ -284,7 +284,7 @@ def test_what_tells_two_effects_of_a_model_apart_is_proposed_by_the_same_means(r
 def test_the_payload_of_a_heavy_crane_has_no_exponent(robot, few):
     """It was "a known extra 1e+02 kg" of a platform of 420 kg."""
     heavy = replace(robot, mass=420.0, ea=robot.ea * 1000.0)
-    here = planned(heavy, few, SIGMA, Reads.whole(robot.n_cables))
+    here = planned(heavy, few, SIGMA, Reads.of_kinds(robot.n_cables))
     kinds = (Adding.PAYLOAD, Adding.PAYLOAD_ASIDE)
     every = [*extensions(here), *detours(here)]
     said = [one.words for one in every if one.kind in kinds]
@@ -293,7 +293,7 @@ def test_the_payload_of_a_heavy_crane_has_no_exponent(robot, few):
 
 def _later(robot, data):
     sigma = replace(SIGMA, tension_N=0.05)
-    plan = planned(robot, data, sigma, Reads.whole(robot.n_cables, tensions=True))
+    plan = planned(robot, data, sigma, Reads.of_kinds(robot.n_cables, READ))
     return next(e.plan for e in extensions(plan) if e.kind is Adding.LATER)
 
 

@@ -69,23 +69,38 @@ def run_of_few(*names: str) -> Run:
 # --- ways to plant an error --------------------------------------------------------------------
 
 
-def tables(edit: Callable[[Any], None]) -> Callable[[Patch], None]:
-    """SEECR's solver reads other tables: ``cables`` (n, m, columns) and ``load`` (n, columns)."""
+Plant = Callable[[Patch], None]
+
+
+def wrong(
+    owner: Any, name: str, given: Callable[..., Any] | None = None,
+    answer: Callable[[Any], Any] | None = None,
+) -> Plant:  # fmt: skip
+    """A function is given other arguments, or its answer is changed on its way."""
 
     def plant(patch: Patch) -> None:
-        honest = search.assemble
+        honest = getattr(owner, name)
 
         def changed(*arguments: Any, **options: Any) -> Any:
-            table = honest(*arguments, **options)
-            edit(table)
-            return table
+            found = honest(*(given(*arguments) if given else arguments), **options)
+            return answer(found) if answer else found
 
-        patch.setattr(search, "assemble", changed)
+        patch.setattr(owner, name, changed)
 
     return plant
 
 
-def cable(column: int, factor: float, which: int | slice = 0, part: int = 0) -> Any:
+def tables(edit: Callable[[Any], None]) -> Plant:
+    """SEECR's solver reads other tables: ``cables`` (n, m, columns) and ``load`` (n, columns)."""
+
+    def answer(table: Any) -> Any:
+        edit(table)
+        return table
+
+    return wrong(search, "assemble", answer=answer)
+
+
+def cable(column: int, factor: float, which: int | slice = 0, part: int = 0) -> Plant:
     """A number of one cable, or of all, times a factor."""
 
     def edit(table: Any) -> None:
@@ -95,61 +110,39 @@ def cable(column: int, factor: float, which: int | slice = 0, part: int = 0) -> 
     return tables(edit)
 
 
-def load(column: int, factor: float, size: int = 3) -> Any:
+def load(column: int, factor: float, size: int = 3) -> Plant:
     def edit(table: Any) -> None:
         table.load[:, column : column + size] *= factor
 
     return tables(edit)
 
 
-def asked(edit: Callable[[np.ndarray], np.ndarray]) -> Callable[[Patch], None]:
+def asked(edit: Callable[[np.ndarray], np.ndarray]) -> Plant:
     """SEECR is asked for other poses."""
-
-    def plant(patch: Patch) -> None:
-        honest = suite.seecr_solve
-        patch.setattr(
-            suite, "seecr_solve", lambda robot, poses, **k: honest(robot, edit(poses), **k)
-        )
-
-    return plant
+    return wrong(suite, "seecr_solve", given=lambda robot, poses: (robot, edit(poses)))
 
 
-def answered(edit: Callable[[Any], Any]) -> Callable[[Patch], None]:
+def answered(edit: Callable[[Any], Any]) -> Plant:
     """SEECR's answer is changed on its way to the comparison."""
-
-    def plant(patch: Patch) -> None:
-        honest = suite.seecr_solve
-        patch.setattr(suite, "seecr_solve", lambda *a, **k: edit(honest(*a, **k)))
-
-    return plant
+    return wrong(suite, "seecr_solve", answer=edit)
 
 
-def described(edit: Callable[[Any], Any]) -> Callable[[Patch], None]:
+def described(edit: Callable[[Any], Any]) -> Plant:
     """SEECR reads another robot than the one in the file."""
-
-    def plant(patch: Patch) -> None:
-        honest = suite.load_robot
-        patch.setattr(suite, "load_robot", lambda path, *more: edit(honest(path, *more)))
-
-    return plant
+    return wrong(suite, "load_robot", answer=edit)
 
 
-def model(edit: Callable[[Any], None]) -> Callable[[Patch], None]:
+def model(name: str, factor: float) -> Plant:
     """MuJoCo's own model of the robot is another one."""
 
-    def plant(patch: Patch) -> None:
-        honest = Physics.__init__
+    def given(physics: Physics, own: Any, *rest: Any) -> Any:
+        getattr(own, name).__imul__(factor)
+        return physics, own, *rest
 
-        def init(self: Physics, model: Any, *rest: Any) -> None:
-            edit(model)
-            honest(self, model, *rest)
-
-        patch.setattr(Physics, "__init__", init)
-
-    return plant
+    return wrong(Physics, "__init__", given)
 
 
-def springs(edit: Callable[[Physics], None]) -> Callable[[Patch], None]:
+def spring(name: str, factor: float, where: Any) -> Plant:
     """MuJoCo's cables are other springs than those asked for."""
 
     def plant(patch: Patch) -> None:
@@ -157,26 +150,9 @@ def springs(edit: Callable[[Physics], None]) -> Callable[[Patch], None]:
 
         def set_cables(self: Physics, *arguments: Any) -> None:
             honest(self, *arguments)
-            edit(self)
+            getattr(self.model, name)[where] *= factor
 
         patch.setattr(Physics, "set_cables", set_cables)
-
-    return plant
-
-
-def spring(name: str, factor: float, where: Any) -> Callable[[Patch], None]:
-    def edit(physics: Physics) -> None:
-        getattr(physics.model, name)[where] *= factor
-
-    return springs(edit)
-
-
-def mujoco(name: str, edit: Callable[[Any], Any]) -> Callable[[Patch], None]:
-    """What one of MuJoCo's methods gives back is changed."""
-
-    def plant(patch: Patch) -> None:
-        honest = getattr(Physics, name)
-        patch.setattr(Physics, name, lambda self, *a: edit(honest(self, *a)))
 
     return plant
 
@@ -244,13 +220,8 @@ def wrong_branch(patch: Patch) -> None:
     patch.setattr(suite, "seecr_solve", solve)
 
 
-def wrong_branch_of_mujoco(patch: Patch) -> None:
-    honest = suite.settle_batch
-
-    def settle(side: Settler, starts: np.ndarray, rest: np.ndarray) -> Any:
-        return honest(side, rolled(starts) if side.physics.is_free else starts, rest)
-
-    patch.setattr(suite, "settle_batch", settle)
+def other_start(side: Settler, starts: np.ndarray, rest: np.ndarray) -> Any:
+    return side, rolled(starts) if side.physics.is_free else starts, rest
 
 
 def everything_counts_as_free(patch: Patch) -> None:
@@ -258,21 +229,8 @@ def everything_counts_as_free(patch: Patch) -> None:
     patch.setattr(Settling, "free_to_move", property(lambda settling: settling.settled))
 
 
-def rest_lengths_of_the_command_before(patch: Patch) -> None:
-    honest = Settler.paid_out
-    patch.setattr(Settler, "paid_out", lambda self, poses: np.roll(honest(self, poses), 1, axis=0))
-
-
-def gravity(factor: float) -> Callable[[Patch], None]:
-    def plant(patch: Patch) -> None:
-        honest = Physics.set_load
-
-        def set_load(self: Physics, wrench: Any = None, gravity: Any = None) -> None:
-            honest(self, wrench, factor * self.reference_gravity)
-
-        patch.setattr(Physics, "set_load", set_load)
-
-    return plant
+def gravity(physics: Physics, _wrench: Any = None, _gravity: Any = None) -> Any:
+    return physics, None, 1.001 * physics.reference_gravity
 
 
 @dataclass(frozen=True)
@@ -280,7 +238,7 @@ class Fault:
     """What is wrong, how to plant it, and a case that has to go red."""
 
     name: str
-    plant: Callable[[Patch], None]
+    plant: Plant
     case: str = CROSSED
     exit_status: int = 1
 
@@ -337,14 +295,14 @@ FAULTS = (
     Fault("MuJoCo's stiffness 0.1 % off", spring("tendon_stiffness", 1.001, slice(None)), PLANAR),
     Fault("MuJoCo's rest length 0.1 % off", spring("tendon_lengthspring", 1.001, (0, 1))),
     Fault("MuJoCo's cable dropped", spring("tendon_stiffness", 1e-9, 2), OFF_CENTRE),
-    Fault("MuJoCo's gravity 0.1 % off", gravity(1.001), UNEVEN),
-    Fault("MuJoCo's mass 0.1 % off", model(lambda m: m.body_mass.__imul__(1.001))),
-    Fault("MuJoCo's centre of mass 0.1 % off",
-          model(lambda m: m.body_ipos.__imul__(1.001)), OFF_CENTRE),
-    Fault("MuJoCo's sites 0.1 % off", model(lambda m: m.site_pos.__imul__(1.001)), TILTED),
-    Fault("MuJoCo's tensions 0.1 % off", mujoco("tensions", lambda t: 1.001 * t), CROSSED),
-    Fault("MuJoCo told the lengths of another pose", rest_lengths_of_the_command_before, UNEVEN),
-    Fault("MuJoCo in another equilibrium", wrong_branch_of_mujoco, CROSSED),
+    Fault("MuJoCo's gravity 0.1 % off", wrong(Physics, "set_load", gravity), UNEVEN),
+    Fault("MuJoCo's mass 0.1 % off", model("body_mass", 1.001)),
+    Fault("MuJoCo's centre of mass 0.1 % off", model("body_ipos", 1.001), OFF_CENTRE),
+    Fault("MuJoCo's sites 0.1 % off", model("site_pos", 1.001), TILTED),
+    Fault("MuJoCo's tensions 0.1 % off", wrong(Physics, "tensions", answer=lambda t: 1.001 * t)),
+    Fault("MuJoCo told the lengths of another pose",
+          wrong(Settler, "paid_out", answer=lambda rest: np.roll(rest, 1, axis=0)), UNEVEN),
+    Fault("MuJoCo in another equilibrium", wrong(suite, "settle_batch", other_start), CROSSED),
     Fault("everything counts as free to move", everything_counts_as_free, CROSSED),
 )  # fmt: skip
 
@@ -376,18 +334,6 @@ def test_another_equilibrium_is_no_error_of_either_physics(monkeypatch):
 
 
 # --- effects -----------------------------------------------------------------------------------
-
-
-def effect_of(name: str, edit: Callable[[Any], Any]) -> Callable[[Patch], None]:
-    """The robot in MuJoCo has another effect than seecr is told."""
-
-    def plant(patch: Patch) -> None:
-        honest = effects_suite.measure
-        patch.setattr(
-            effects_suite, "measure", lambda r, c, e, **k: honest(r, c, [edit(e[0])], **k)
-        )
-
-    return plant
 
 
 EFFECT_FAULTS = {
@@ -427,7 +373,9 @@ def test_every_effect_has_a_planted_error() -> None:
 
 @pytest.mark.parametrize("name", EFFECT_FAULTS)
 def test_a_planted_error_of_an_effect_is_named(name, monkeypatch):
-    effect_of(name, EFFECT_FAULTS[name])(monkeypatch)
+    # the robot in MuJoCo has another effect than seecr is told
+    edit = EFFECT_FAULTS[name]
+    wrong(effects_suite, "measure", lambda r, c, e: (r, c, [edit(e[0])]))(monkeypatch)
     case = EffectCase(model_path("demobot_parallel"), name)
     result = run_effect(case)
     assert result.outcome is Outcome.DIFFER

@@ -13,11 +13,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from called import as_json, ran, refused_in_a_line
 from remembered_twins import remember_twins
 from scipy.stats import chi2
 
-from crosscheck.cli import main
 from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_measurements
@@ -96,26 +95,18 @@ def test_a_user_s_own_poses_are_measured_with_their_loads_and_way_points(tmp_pat
 
 def test_the_command_takes_poses_and_noise(tmp_path):
     path = users_poses(tmp_path)
-    args = ["twin", str(COGIRO), "--hide", "1", "--effects", "0", "--poses", str(path)]
-    args += [
-        "--sigma",
-        "position=2um",
-        "--sigma",
-        "tension=0.1N",
-        "--out",
-        str(tmp_path / "a case"),
-    ]
-    result = CliRunner().invoke(main, args)
-    assert result.exit_code == 0, result.output
-    assert "12 rows of demobot_cogiro in 1 run; noise 0.002 mm" in result.output
+    noise = f"--sigma position=2um --sigma tension=0.1N --out '{tmp_path / 'a case'}'"
+    words = f"crosscheck twin {COGIRO} --hide 1 --effects 0 {noise}"
+    output = ran(f"{words} --poses {path}", 0).output
+    assert "12 rows of demobot_cogiro in 1 run; noise 0.002 mm" in output
     measured = tmp_path / "a case" / "measured.csv"
     before = measured.read_bytes()
-    args[args.index("--poses") + 1] = str(measured)
-    again = CliRunner().invoke(main, args)
-    assert again.exit_code == 2 and f"{measured}: would be overwritten, but was" in again.output
+    assert f"{measured}: would be overwritten, but was" in refused_in_a_line(
+        f"{words} --poses '{measured}'"
+    )
     assert measured.read_bytes() == before
     opening = ["twin", "--open", str(tmp_path / "a case")]
-    (shown,) = [line for line in result.output.splitlines() if line.startswith("to see ")]
+    (shown,) = [line for line in output.splitlines() if line.startswith("to see ")]
     assert shlex.split(shown.partition(": ")[2])[1:] == opening
     toml = (tmp_path / "a case" / "measured.toml").read_text()
     assert 'start = "first_row"' in toml and "tension_N = 0.1" in toml
@@ -384,25 +375,19 @@ def _scaled(text, factor):
 @pytest.mark.slow
 def test_the_command_writes_a_case_and_does_not_tell(tmp_path):
     out = tmp_path / "case"
-    args = ["twin", str(COGIRO), "--hide", "3", "--effect", "tracker_scale", "--out", str(out)]
-    run = CliRunner().invoke(main, args)
-    assert run.exit_code == 0, run.output
-    assert "144 rows of demobot_cogiro in 7 runs" in run.output
-    assert "tracker_scale" not in run.output and "factor" not in run.output
-    opened = CliRunner().invoke(main, ["twin", "--open", str(out)])
-    assert opened.exit_code == 0 and "tracker_scale" in opened.output
-    as_json = CliRunner().invoke(main, ["twin", "--open", str(out / NAME), "--json"])
-    told = json.loads(as_json.output)
+    words = f"crosscheck twin {COGIRO} --hide 3 --effect tracker_scale --out {out}"
+    output = ran(words, 0).output
+    assert "144 rows of demobot_cogiro in 7 runs" in output
+    assert "tracker_scale" not in output and "factor" not in output
+    assert "tracker_scale" in ran(f"crosscheck twin --open {out}", 0).output
+    told = as_json(f"crosscheck twin --open {out / NAME}")
     assert told["hidden"] == ["tracker_scale"] and list(told["made"]["sha256"]) == [NAME]
 
 
 @pytest.mark.slow
 def test_the_command_s_json_is_all_it_prints(tmp_path):
-    args = ["twin", "demobot_cogiro", "--hide", "1", "--effects", "0", "--out", str(tmp_path)]
-    run = CliRunner().invoke(main, [*args, "--json"])
-    assert run.exit_code == 0
+    result = as_json(f"crosscheck twin demobot_cogiro --hide 1 --effects 0 --out {tmp_path}")
     assert (tmp_path / "robot.xml").read_text() == COGIRO.read_text()
-    result = json.loads(run.output)
     assert result["rows"] == 144 and "hidden" not in result and "values" not in result
     assert "twin demobot_cogiro --hide 1" in result["made"]["command"]
     assert list(result["made"]["sha256"]) == [COGIRO.name]
@@ -412,21 +397,18 @@ def test_the_command_s_json_is_all_it_prints(tmp_path):
 @pytest.mark.parametrize(
     ("args", "text"),
     [
-        ([], "expected ROBOT.xml and --hide SEED, or --open FILE"),
-        (["ROBOT"], "expected ROBOT.xml and --hide SEED"),
-        (["ROBOT", "--hide", "1", "--effect", "pully_radius"], "nearest first: pulley_radius"),
-        (["ROBOT", "--hide", "1", "--effect", "stiffness", "--effects", "1"], "leave out --effect"),
-        (["missing.xml", "--hide", "1"], "missing.xml"),
-        (["--open", "ROBOT"], "is not a sealed answer; expected a file answer.sealed"),
-        (["--open", "nowhere"], "nowhere: no such file; expected a file answer.sealed"),
+        ("", "expected ROBOT.xml and --hide SEED, or --open FILE"),
+        ("ROBOT", "expected ROBOT.xml and --hide SEED"),
+        ("ROBOT --hide 1 --effect pully_radius", "nearest first: pulley_radius"),
+        ("ROBOT --hide 1 --effect stiffness --effects 1", "leave out --effect"),
+        ("missing.xml --hide 1", "missing.xml"),
+        ("--open ROBOT", "is not a sealed answer; expected a file answer.sealed"),
+        ("--open nowhere", "nowhere: no such file; expected a file answer.sealed"),
     ],
 )
 def test_bad_usage_is_one_line_and_status_2(tmp_path, args, text):
-    args = [str(COGIRO) if arg == "ROBOT" else arg for arg in args]
-    to = [] if "--open" in args else ["--out", str(tmp_path / "out")]
-    run = CliRunner().invoke(main, ["twin", *args, *to])
-    assert run.exit_code == 2
-    assert text in run.output and run.output.count("\n") == 1
+    to = "" if "--open" in args else f"--out {tmp_path / 'out'}"
+    assert text in refused_in_a_line(f"crosscheck twin {args.replace('ROBOT', str(COGIRO))} {to}")
     assert not (tmp_path / "out").exists()
 
 
@@ -466,9 +448,8 @@ def test_what_of_the_mjcf_plays_no_part_is_told_once(tmp_path):
     rough = tmp_path / "rough.xml"
     text = model_path("planar_vertical").read_text(encoding="utf-8")
     rough.write_text(text.replace('<joint name="x"', '<joint name="x" frictionloss="2"'))
-    args = ["twin", str(rough), "--hide", "1", "--effects", "0", "--out", str(tmp_path / "case")]
-    run = CliRunner().invoke(main, [*args, "--json"])
-    assert run.exit_code == 0
+    words = f"crosscheck twin {rough} --hide 1 --effects 0 --out {tmp_path / 'case'} --json"
+    run = ran(words, 0)
     (note,) = json.loads(run.stdout)["notes"]
     assert note.startswith(f"{rough} has dry friction: left out here")
     assert run.stderr == f"note: {note}\n"
