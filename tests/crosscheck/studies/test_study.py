@@ -132,11 +132,12 @@ def test_another_version_computes_anew(
     pendulum: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     crosscheck.study([hung(pendulum)], out=tmp_path / "out")
-    for module in ("cases", "tasks", "study"):
+    for module in ("cases", "study"):
         monkeypatch.setattr(f"crosscheck.studies.{module}.full_version", lambda: "9.9")
     assert crosscheck.study([hung(pendulum)], out=tmp_path / "out").computed == 1
     # and a worker of another one is told
-    monkeypatch.setattr("crosscheck.studies.tasks.full_version", lambda: "9.8")
+    answers = iter(["9.9", "9.8", "9.8"])
+    monkeypatch.setattr("crosscheck.studies.study.full_version", lambda: next(answers))
     ((_, why),) = crosscheck.study([hung(pendulum)]).failed
     assert "a worker has seecr 9.8, and this is 9.9" in why
 
@@ -183,7 +184,7 @@ def test_a_defect_ends_its_case_alone_and_is_called_so(
     def broken(*_args: Any, **_more: Any) -> None:
         raise KeyError("gone")
 
-    monkeypatch.setattr("crosscheck.studies.tasks.workspace_map", broken)
+    monkeypatch.setattr("crosscheck.studies.study.workspace_map", broken)
     assert crosscheck.study([hung(pendulum)]).failed == [("1", "a defect, KeyError: 'gone'")]
 
 
