@@ -123,7 +123,8 @@ def _hung(path: Path, exits: Array, names: tuple[str, ...], lines: list[tuple[in
             "lines run to and fro as U of M666 says: each is one cable with E S times U, and "
             "tensions are those of all its parts"
         )
-    low, high = said.get("I", np.zeros(1)), said.get("X", np.array([np.inf]))
+    # the forces of M666 are those of one part of a line
+    low, high = falls * said.get("I", np.zeros(1)), falls * said.get("X", np.array([np.inf]))
     return Draft(
         path, path.stem, exits, np.zeros((m, 3)), said.get("S", np.array([np.nan])) * falls,
         np.full(m, np.nan), names, float(said["W"][0]) if "W" in said else None,

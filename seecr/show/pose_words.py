@@ -372,9 +372,8 @@ def open_lines(solution: Solution, held: bool, limits: tuple[float, float]) -> I
     elif names:
         verb = "hangs" if len(names) == 1 else "hang"
         yield (
-            f"  {some(names)} {verb} slack there, and where cables hang slack crosscheck plan "
-            f"finds few poses; tensions {within} could hold the platform with all of them taut: "
-            "--pretension 10 shortens them so"
+            f"  {some(names)} {verb} slack there; tensions {within} could hold the platform with "
+            "all cables taut: --pretension 10 shortens them so"
         )
     over = [
         f"{name} {significant(tension, 3)} N"

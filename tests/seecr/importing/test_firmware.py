@@ -52,7 +52,8 @@ def test_a_hangprinter_is_a_point_on_reeved_lines() -> None:
     assert any("run to and fro as U of M666 says" in note for note in notes)
     # and rests by its uppermost line alone: m g = E S e / l of the others slack
     document = as_json("seecr new hp.xml --from reprap config.g")
-    assert document["tension_limits_N"] == [5.0, 60.0]
+    # the largest of U I, the least of U X
+    assert document["tension_limits_N"] == [4 * 5.0, 2 * 60.0]
     assert document["home"]["pose"][2] == pytest.approx(-2.5 * 9.81 / 80e3 * 3.0, rel=1e-3)
 
 
