@@ -197,6 +197,8 @@ class _Nearest:
 
     def farthest(self, robot: Robot) -> tuple[int, str] | None:
         """The row that is farthest off, and its distance; None if all poses are reached."""
+        if not self.off.any():  # as in most calls
+            return None
         miss = np.abs(self.off) / np.repeat([robot.length, 1.0], 3)
         miss[np.isnan(miss)] = np.inf
         if not np.any(miss > OFF_MANIFOLD):

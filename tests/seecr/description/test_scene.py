@@ -44,15 +44,6 @@ def test_two_dashes_in_a_remark_do_not_end_it() -> None:
     assert root.tag == "mujoco" and root.find("worldbody") is not None
 
 
-def test_the_bodys_inertia_mass_and_centre_are_the_robots() -> None:
-    robot = turned(centre_of_mass=np.array([0.01, -0.02, 0.03]))
-    model, _data = loaded(plain_text(robot, "a test"))
-    axes = Rotation.from_quat(model.body_iquat[1], scalar_first=True).as_matrix()
-    np.testing.assert_allclose(axes * model.body_inertia[1] @ axes.T, INERTIA, atol=1e-12)
-    assert model.body_mass[1] == 2.0
-    np.testing.assert_allclose(model.body_ipos[1], robot.centre_of_mass, atol=1e-15)
-
-
 def test_of_unknown_inertia_a_body_gets_that_of_its_mass_at_its_length() -> None:
     model, _data = loaded(plain_text(RECTANGLE, "a test"))
     np.testing.assert_allclose(model.body_inertia[1], np.full(3, 2.0 * 0.5**2))
@@ -67,16 +58,6 @@ def test_joints_are_in_the_base_frame_however_the_platform_is_turned() -> None:
     assert model.jnt_type.tolist() == [mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE]
     np.testing.assert_allclose(data.xaxis, [axis, axis], atol=1e-12)
     np.testing.assert_allclose(data.xanchor[1], point, atol=1e-12)
-
-
-def test_points_are_where_the_robot_has_them() -> None:
-    robot = turned()
-    model, data = loaded(plain_text(robot, "a test"))
-    ends = robot.reference_pose[:3] + TURN.apply(np.array(robot.anchor_points))
-    for i in range(4):
-        np.testing.assert_allclose(data.site(f"exit{i + 1}").xpos, robot.exit_points[i])
-        np.testing.assert_allclose(data.site(f"anchor{i + 1}").xpos, ends[i], atol=1e-12)
-    np.testing.assert_array_equal(model.opt.gravity, robot.gravity)
 
 
 @pytest.mark.parametrize(("rest", "force"), [(1.0, 300.0 * 1.0), (2.5, 0.0)])

@@ -73,21 +73,6 @@ def test_what_edits_nothing_is_in_no_file_and_the_rest_lengths_have_what_winches
     )
 
 
-def test_a_description_is_read_back_as_it_was(plain: tuple[Terms, Export], tmp_path: Path) -> None:
-    path = tmp_path / "robot.xml"
-    for robot, text in (
-        (plain[1].robot, plain[1].text),
-        *((one, export(one).text) for one in (load_robot(model_path("planar_vertical")),)),
-    ):
-        path.write_text(text)
-        back = load_robot(path)
-        for name in ("exit_points", "anchor_points", "ea", "rest_lengths", "centre_of_mass",
-                     "gravity", "reference_pose", "mass", "inertia"):  # fmt: skip
-            np.testing.assert_allclose(getattr(back, name), getattr(robot, name), rtol=1e-14,
-                                       atol=1e-15)  # fmt: skip
-        assert back.cable_names == robot.cable_names and len(back.joints) == len(robot.joints)
-
-
 def forces(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     """What is unbalanced at rest: springs, weight and actuators."""
     data.qvel[:], data.qacc[:] = 0.0, 0.0
