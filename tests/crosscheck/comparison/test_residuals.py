@@ -10,7 +10,7 @@ from made_data import SIGMA, measured, soft_cogiro, term
 from scipy import stats
 
 from crosscheck.comparison.associations import SIGNIFICANT, Association, f_test, labelled
-from crosscheck.comparison.noise import underestimation
+from crosscheck.comparison.noise import Coloured, underestimation
 from crosscheck.comparison.quantities import (
     EVERYWHERE,
     STILL,
@@ -380,3 +380,19 @@ def test_estimates_from_differences_areunderestimation_if_neighbours_are_alike()
     part = np.std(np.diff(noise, n=3)) / np.sqrt(20.0)
     assert 1.0 / part == pytest.approx(underestimation(False, rho), rel=0.02)
     assert underestimation(False, 0.0) == underestimation(True, 0.8) == 1.0
+
+
+def test_outliers_have_one_count_in_a_sentence() -> None:
+    """It said "noise (...; 8 outliers). 6 outliers (lines ...) left out of this."."""
+    found = compare(ROBOT, measured(ROBOT))
+    coloured = Coloured({"position": 0.99}, {"position": 0.0}, 8)
+    some = np.arange(found.problem.data.n_rows) < 2
+    agree = "Model and data agree: the residuals are noise (position 0.99 times the assumed noise"
+    for outliers, further, end in (
+        (some, 8, "). 10 outliers left out of this, or given little weight."),
+        (some, 0, "). 2 outliers (lines 2, 3) left out of this."),
+        (some & ~some, 8, "; 8 outliers)."),
+    ):
+        noise = replace(coloured, outliers=further)
+        said = replace(found, whiteness=LOOSE, coloured=noise, outliers=outliers).sentence
+        assert said == f"{agree}{end}"

@@ -437,8 +437,8 @@ FAULTS = {
         ("bias=float(values.mean())", "bias=float(np.median(values))", compared),
     ),
     "crosscheck.comparison.limits": (
-        ("float(np.nanmax(sizes)) if rule.worst",
-         "float(np.nanmean(sizes)) if rule.worst", compared),
+        ("float(np.nanmax(sizes)) if worst",
+         "float(np.nanmean(sizes)) if worst", compared),
     ),
     "crosscheck.inference.evidence": (
         ("-0.5 * (self.linear.power - gained)", "-0.5 * self.linear.power + gained", evidence),
