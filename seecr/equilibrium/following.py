@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.commands import Commands, Path, waypoints_of
-from seecr.compiled.columns import CONVERGED, SINGULAR
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot
 from seecr.effects.setup import Setup
@@ -128,7 +127,7 @@ def follow_commands(robot: Robot, commands: Commands, setup_of: SetupOf) -> Solu
         last = None if path.fresh[k] else state
         now = followed.afresh(k) if last is None else followed.on(k, last, jumped)
         found.put(np.array([k]), now)
-        state = now if _rests(now) else None
+        state = now if now.at_rest[0] else None
         jumps[path.source[k]] += jumped
     solution = certify(robot, take(tables, path.rows), found.only(path.rows))
     return replace(solution, jumps=tuple(tuple(some) for some in jumps))
@@ -163,7 +162,7 @@ class _Followed:
                     size *= 0.5
                     continue
                 found = self._landed(trial, pose, state.guess, jumps)
-                if not _rests(found):
+                if not found.at_rest[0]:
                     return self.afresh(k)
             pose = batch.platform_poses(trial, found.deviation)
             state, done, size = found, done + size, 2.0 * size
@@ -211,7 +210,7 @@ class _Followed:
         )
 
     def _smooth(self, trial: Tables, pose: Array, found: batch.Evaluation) -> bool:
-        if not _rests(found):
+        if not found.at_rest[0]:
             return False
         step = step_between(self.robot, batch.platform_poses(trial, found.deviation), pose)[0]
         size, length = float(np.linalg.norm(step)), self.robot.length
@@ -232,15 +231,16 @@ class _Followed:
             ends.append(self._descended(trial, there, guess))
             turns.append(over)
         places = [batch.platform_poses(trial, end.deviation) for end in ends]
-        first, after = ends[0], places[0][0] if _rests(ends[0]) else np.full(7, np.nan)
+        first, after = ends[0], places[0][0] if ends[0].at_rest[0] else np.full(7, np.nan)
         apart = [np.abs(step_between(self.robot, one, places[0])).max() for one in places]
-        same = all(_rests(end) for end in ends) and max(apart) < _SMALL * self.robot.length
-        if _rests(first) and apart_from(self.robot, places[0], pose) <= _SMALL * self.robot.length:
+        same = all(end.at_rest[0] for end in ends) and max(apart) < _SMALL * self.robot.length
+        near = apart_from(self.robot, places[0], pose) <= _SMALL * self.robot.length
+        if first.at_rest[0] and near:
             return first
         energies = [evaluated(self.robot, trial, one).energy[0] for one in (pose, places[0])]
         if turns[0] and under_moment(trial)[0]:
             energies[0] = np.nan  # the work of a moment on full turns is left out of energies
-        lost = energies[0] - energies[1] if _rests(first) else np.inf
+        lost = energies[0] - energies[1] if first.at_rest[0] else np.inf
         jumps.append(Jump(trial.poses[0].copy(), pose[0], after, float(lost), same))
         return first
 
@@ -255,9 +255,8 @@ def rest_below(robot: Robot, tables: Tables, pose: Array) -> Array:
         return np.full((1, 7), np.nan)
     start, values = start_of(robot, tables, there)
     found = batch.descend(tables, start, threads=1, start_values=values, staged=False)
-    return (
-        batch.platform_poses(tables, found.deviation) if _rests(found) else np.full((1, 7), np.nan)
-    )
+    there = batch.platform_poses(tables, found.deviation)
+    return there if found.at_rest[0] else np.full((1, 7), np.nan)
 
 
 def _flow(robot: Robot, tables: Tables, pose: Array, damping: float) -> tuple[Array, bool]:
@@ -306,7 +305,3 @@ def _stepped(robot: Robot, pose: Array, step: Array) -> tuple[Array, bool]:
 def apart_from(robot: Robot, pose: Array, other: Array) -> float:
     """Distance of two poses (1, 7) [m]; rotations count times the robot's length."""
     return float(np.linalg.norm(step_between(robot, pose, other)))
-
-
-def _rests(found: batch.Evaluation) -> bool:
-    return int(found.outcome[0]) in (CONVERGED, SINGULAR)

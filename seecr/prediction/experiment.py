@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -220,12 +221,7 @@ class Experiment:
             return self._predict_path(effects, needed)
         if near is not None and near.has_history:
             near = None
-        tables, found = self._solve(setup, near)
-        pose = batch.platform_poses(tables, found.deviation)
-        readings = read(effects, setup, pose, found.tension)
-        sensors = sensors_among(effects)
-        kept = {"pose": pose}
-        return Prediction(setup, tables, found, readings, False, sensors, kept=kept)
+        return _predicted(effects, setup, *self._solve(setup, near))
 
     def readings_at(self, effects: Sequence[Effect], poses: Array) -> Readings:
         """What the sensors would report if the platform were at poses (n, 7); no tensions."""
@@ -241,9 +237,7 @@ class Experiment:
         again = batch.descend(tables, start, _LIMIT, start_values=values, staged=False)
         found = at.found.copy()
         found.put(rows, again)
-        pose = batch.platform_poses(at.tables, found.deviation)
-        readings = read(effects, at.setup, pose, found.states[..., TENSION])
-        return Prediction(at.setup, at.tables, found, readings, at.has_history, at.sensors)
+        return _predicted(effects, at.setup, at.tables, found, at.has_history)
 
     def _solve(self, setup: Setup, near: Prediction | None) -> tuple[Tables, batch.Evaluation]:
         def run(tables: Tables, start: batch.Evaluation | None) -> batch.Evaluation:
@@ -257,14 +251,11 @@ class Experiment:
                     start_values=start.values[rows], staged=False, guess=start.guess[rows],
                 )  # fmt: skip
 
-            def on_the_way(rows: NDArray[np.intp]) -> batch.Evaluation:
-                assert self._first is not None
+            def afresh(rows: NDArray[np.intp], poses: Array | None = None) -> batch.Evaluation:
                 some = take(tables, rows)
-                first, values = start_of(self.robot, some, self._first[rows])
+                there = None if poses is None else poses[rows]
+                first, values = start_of(self.robot, some, there)
                 return batch.descend(some, first, _LIMIT, start_values=values)
-
-            def afresh(rows: NDArray[np.intp]) -> batch.Evaluation:
-                return batch.descend(take(tables, rows), limit=_LIMIT)
 
             if start is None:
                 found = batch.Evaluation.at_commands(tables)
@@ -275,8 +266,8 @@ class Experiment:
                 found = start.copy()
                 found.outcome[:] = ITERATIONS
                 found = _among(found, warm)
-            for search in (*([] if self._first is None else [on_the_way]), afresh):
-                found = _among(found, search)
+            for poses in (self._first, None) if self._first is not None else (None,):
+                found = _among(found, partial(afresh, poses=poses))
             return found
 
         start = None if near is None else near.found
@@ -314,10 +305,18 @@ class Experiment:
         found = whole.only(path.rows)
         lost = _after_lost_waypoints(path, whole)
         found.outcome[lost & (found.outcome == CONVERGED)] = STALLED
-        own = self.setup(effects)
-        pose = batch.platform_poses(rows, found.deviation)
-        readings = read(effects, own, pose, found.states[..., TENSION])
-        return Prediction(own, rows, found, readings, True, sensors_among(effects), whole)
+        return _predicted(effects, self.setup(effects), rows, found, True, whole)
+
+
+def _predicted(
+    effects: Sequence[Effect], setup: Setup, tables: Tables, found: batch.Evaluation,
+    has_history: bool = False, walk: batch.Evaluation | None = None,
+) -> Prediction:  # fmt: skip
+    """A prediction of solved rows, with what the sensors report of them."""
+    pose = batch.platform_poses(tables, found.deviation)
+    readings, sensors = read(effects, setup, pose, found.tension), sensors_among(effects)
+    kept = {"pose": pose}
+    return Prediction(setup, tables, found, readings, has_history, sensors, walk, kept)
 
 
 def predict(robot: GivenRobot, commands: Commanded, model: GivenEffects = ()) -> Prediction:

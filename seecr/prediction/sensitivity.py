@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.arguments import check_kind, numbers
+from seecr.commands import Commands
 from seecr.compiled.columns import RADIUS, STRAIN, WEIGHT
 from seecr.compiled.rates import wrench_by_ends_batch
 from seecr.counted import counted
@@ -112,6 +113,12 @@ class Sides:
     plus: Setup
     minus: Setup
     differing: frozenset[str]
+
+    @classmethod
+    def of(cls, experiment: Experiment, shift: Shift, commands: Commands | None = None) -> Sides:
+        """The setups of a shift, for the rows or for other commands on their way."""
+        plus, minus = (experiment.setup(t.effects, commands) for t in (shift.plus, shift.minus))
+        return cls(plus, minus, plus.differs(minus))
 
     @property
     def of_history(self) -> bool:
@@ -374,10 +381,6 @@ class _ByWrench:
         own = [(t.name, *t.vector.tolist()) for t in self.terms if senses(t.layout.effect)]
         return _kept(self.at, f"read_rates {own}", lambda at: rates_of_reading(at, self.sensing))
 
-    @property
-    def by_length(self) -> Array:
-        return length_sensitivities(self.at)
-
     @cached_property
     def way(self) -> _Waypoints:
         """The path through the rows, for effects with history."""
@@ -391,11 +394,14 @@ class _ByWrench:
         n, width = _shape(self.at)
         change = np.zeros((n, width))
         if shift.physical:
-            sides = None if along else self._sides(shift)
+            sides = None if along else Sides.of(self.experiment, shift)
             if sides is None or sides.of_history:
                 change = self.way.change(shift)
+            elif sides.of_lengths:
+                longer = sides.longer(shift.apart)
+                change = (length_sensitivities(self.at) @ longer[..., None])[..., 0]
             else:
-                change = self._physical(sides, shift.apart)
+                change = _response(self.at, *self._tables(sides), shift.apart)
         if shift.sensing:
             return self._read(shift, change, shift.apart)
         return (self.read_rates @ change[..., None])[..., 0] if self.reads_otherwise else change
@@ -404,11 +410,11 @@ class _ByWrench:
         """Derivatives (n, 6 + m, m) by a per-cable parameter, shifted for all cables together."""
         if shift.sensing:
             return None
-        sides = self._sides(shift)
+        sides = Sides.of(self.experiment, shift)
         if sides.of_history:
             return None
         if sides.of_lengths:
-            change = self.by_length * sides.longer(shift.apart)[:, None, :]
+            change = length_sensitivities(self.at) * sides.longer(shift.apart)[:, None, :]
         elif sides.of_ends and are_by_point(self.at.tables):
             change = self._by_ends(sides, shift.apart[:, None])
         else:
@@ -425,18 +431,8 @@ class _ByWrench:
             self.at, *wrench_by_ends(rates, self.at.pose, exits, anchors, longer)
         )
 
-    def _sides(self, shift: Shift) -> Sides:
-        plus = self.experiment.setup(shift.plus.effects)
-        minus = self.experiment.setup(shift.minus.effects)
-        return Sides(plus, minus, plus.differs(minus))
-
     def _tables(self, sides: Sides) -> tuple[Tables, Tables]:
         return sides.tables(self.at.tables, self.at.found.states[..., STRAIN])
-
-    def _physical(self, sides: Sides, apart: float) -> Array:
-        if sides.of_lengths:
-            return (self.by_length @ sides.longer(apart)[..., None])[..., 0]
-        return _response(self.at, *self._tables(sides), apart)
 
     def _read(self, shift: Shift, change: Array, apart: float) -> Array:
         at = self.at
@@ -461,19 +457,15 @@ def _kept(at: Prediction, name: str, make: Callable[[Prediction], Array]) -> Arr
 def _response(at: Prediction, plus: Tables, minus: Tables, apart: float) -> Array:
     """Change of pose and tensions (n, 6 + m) between two tables, per unit of ``apart``."""
     force, tension = batch.change(plus, minus, at.found)
-    step = -_inverse_stiffness(at) @ (force / apart)[..., None]
-    move = _moved(at, step)[..., 0]
-    return np.concatenate([move, tension / apart + (at.found.slopes @ step)[..., 0]], axis=1)
+    out = _after(at, -_inverse_stiffness(at) @ (force / apart)[..., None])[..., 0]
+    out[:, 6:] += tension / apart
+    return out
 
 
 def _response_by_cable(at: Prediction, plus: Tables, minus: Tables, apart: Array) -> Array:
     """The same (n, 6 + m, m) for tables in which every cable was changed, by ``apart`` (m,)."""
     force, own = batch.change_by_cable(plus, minus, at.found)
-    step = -_inverse_stiffness(at) @ (force / apart)
-    out = np.concatenate([_moved(at, step), at.found.slopes @ step], axis=1)
-    cable = np.arange(own.shape[1])
-    out[:, 6 + cable, cable] += own / apart
-    return out
+    return _after(at, -_inverse_stiffness(at) @ (force / apart), own / apart)
 
 
 def _response_to_wrench(at: Prediction, wrench: Array, own: Array) -> Array:
@@ -481,10 +473,15 @@ def _response_to_wrench(at: Prediction, wrench: Array, own: Array) -> Array:
     motion = motion_of(at)
     free = at.tables.screws.shape[1] == 0
     along = np.diagonal(motion[0])[:, None] * wrench if free else motion.swapaxes(1, 2) @ wrench
-    step = _inverse_stiffness(at) @ along
+    return _after(at, _inverse_stiffness(at) @ along, own)
+
+
+def _after(at: Prediction, step: Array, own: Array | None = None) -> Array:
+    """Change (n, 6 + m, k) of pose and tensions after steps (n, d, k), and each cable's own."""
     out = np.concatenate([_moved(at, step), at.found.slopes @ step], axis=1)
-    cable = np.arange(own.shape[1])
-    out[:, 6 + cable, cable] += own
+    if own is not None:
+        cable = np.arange(own.shape[1])
+        out[:, 6 + cable, cable] += own
     return out
 
 
@@ -549,9 +546,7 @@ class _Waypoints:
     def change(self, shift: Shift) -> Array:
         """Derivative of pose and tensions (n, 6 + m) with respect to the shifted parameter."""
         path = self.experiment.path
-        ahead = self.experiment.setup(shift.plus.effects, path.commands)
-        behind = self.experiment.setup(shift.minus.effects, path.commands)
-        sides = Sides(ahead, behind, ahead.differs(behind))
+        sides = Sides.of(self.experiment, shift, path.commands)
         plus, minus = sides.tables(self.tables, self.found.states[..., STRAIN])
         step, tension = batch.change_of_walk(plus, minus, path, self.found, self.inverse)
         change = np.concatenate([(self.motion @ step[..., None])[..., 0], tension], axis=1)
