@@ -695,7 +695,10 @@ class Search:
             start = 3.0 * columns
             found = fit(self.data, best.fit.state, widths, start, noise=Noise(scale, rho))
             other = scored(every, best.key | {_PLACE}, found, {**best.widths, _PLACE: 3.0})
-            odds = max(odds, float(np.exp(min(other.score + np.log(MISJUDGED) - best.score, 50.0))))
+            # what the sensor adds to it is as large as stated
+            as_stated = 1.0 - prior.misjudged(found.noise)[prior.kinds == kind]
+            share = float(np.log(MISJUDGED * np.maximum(as_stated, 1e-300)[0]))
+            odds = max(odds, float(np.exp(min(other.score + share - best.score, 50.0))))
         return odds
 
     def needed(self, some: Iterable[str]) -> float:
