@@ -15,7 +15,8 @@ from crosscheck.fit.problem import Rms, rms_by_kind
 from crosscheck.fit.residual_noise import Whiteness, whiteness
 from crosscheck.fit.state import contradictions
 from crosscheck.fit.words import rms_words
-from crosscheck.inference.catalogue import About, Catalogue, name_of
+from crosscheck.inference.about import About
+from crosscheck.inference.catalogue import Catalogue, name_of
 from crosscheck.inference.fit import Fit, unfitted
 from crosscheck.inference.held_out import hold_out, improves, pays
 from crosscheck.inference.priors import FALSE_ALARM, SURE

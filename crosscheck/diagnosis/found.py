@@ -28,6 +28,7 @@ from crosscheck.fit.problem import KINDS, Problem, Rms, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.residual_noise import overestimated, whiteness
 from crosscheck.fit.state import contradictions, largest_size
+from crosscheck.inference.about import About
 from crosscheck.inference.catalogue import name_of
 from crosscheck.inference.fields import detectable_size
 from crosscheck.inference.fit import Fit
@@ -199,7 +200,7 @@ def _spread_by_others(search: Search, said: Judgement, fit: Fit) -> Array:
     likely = {members[0]: p for members, p in said.classes.classes if not had & set(members)}
     if max(likely.values(), default=0.0) <= MATTERS:
         return np.zeros(len(fit.terms))
-    return np.sqrt(np.diag(spread_by_others(search.every.about(fit), likely)))
+    return np.sqrt(np.diag(spread_by_others(About(search.every, fit), likely)))
 
 
 # --- what is not listed ---------------------------------------------------------------------------

@@ -98,62 +98,85 @@ def by_reason(reasons: Mapping[str, Reason]) -> list[str]:
     return [f"{', '.join(names)} ({why})" for why, names in words.items()]
 
 
-class Unfit(Enum):
-    """Why measurements are not fit for a verdict; the values are what people read."""
-
-    NO_READINGS = "the data contain no readings"
-    NO_EQUILIBRIUM = "the model has no equilibrium at {lost} of {rows}; see the notes"
-    FEW_READINGS = "only {readings} can be used"
-    FEW_POSES = (
-        "only {poses} measured (repeated readings at rest count once): too few to tell effects "
-        "apart"
-    )
-    CONSTANT_COMMANDS = "all commands are the same, so effects cannot be told apart"
-    FROZEN_READINGS = "all readings are the same although the commands differ"
-    LOCKED_READINGS = "the robot's joints lock all parts of the pose that were read"
-    CONTRADICTION = (
-        "readings contradict each other: lines {lines} have the same command but readings far "
-        "apart, and so do others"
-    )
-    OTHER_CONVENTION = (
-        "the measured orientations{file} are {off} from those that the model expects, and only "
-        "{left} if {convention}: they seem to be written by another convention"
-    )
-    BLIND = "noise of {noise} would hide every effect, even at ten times its expected size"
-    NOTHING_TO_TRY = "none of the effects considered is visible in these data: {lacking}"
-    UNSOLVED_MODEL = "some rows could not be solved with the model's values"
-    STRUCTURE_OR_NOISE = (
-        "a pattern remains, but with only {rows} and no stated noise it may as well be noise that "
-        "is correlated from row to row"
-    )
-
-
 _MORE_POSES = (
     "add poses spread over the workspace, some of them tilted, in three runs or more; crosscheck "
     "plan says which poses reveal most"
 )
-_REMEDIES = {
-    Unfit.NO_READINGS: "add readings of each pose: positions, angles or tensions",
-    Unfit.NO_EQUILIBRIUM: "check the robot's file and the commands of the rows named in the notes",
-    Unfit.FEW_READINGS: _MORE_POSES,
-    Unfit.FEW_POSES: _MORE_POSES,
-    Unfit.CONSTANT_COMMANDS: _MORE_POSES,
-    Unfit.FROZEN_READINGS: "check that the tracker followed the platform, and read the poses again",
-    Unfit.LOCKED_READINGS: "read parts of the pose that change with the commands, or tensions",
-    Unfit.CONTRADICTION: "measure these poses again or remove the wrong rows; if the tracker or "
-    "the winches were set up anew in between, put each set-up into a file of its own and use "
-    "crosscheck add tracker_frame (or another effect) --per file",
-    Unfit.OTHER_CONVENTION: "write how the platform is turned as seen from the base: quaternions "
-    "with the scalar first (meas_qw meas_qx meas_qy meas_qz), or angles with "
-    "R = Rx(rx) Ry(ry) Rz(rz)",
-    Unfit.BLIND: "check the stated noise and its units ([sigma] in the TOML beside the file is in "
-    "metres and radians; or use --sigma position=0.1mm), or measure with less noise",
-    Unfit.NOTHING_TO_TRY: "record what they need, or consider other effects",
-    Unfit.UNSOLVED_MODEL: "check the model's values and the robot's file",
-    Unfit.STRUCTURE_OR_NOISE: "state the noise ([sigma] beside the file, or --sigma "
-    "position=0.1mm): stay at one pose and read it for as long as the measurements took; or read "
-    "more poses, some of them twice",
-}
+
+
+class Unfit(Enum):
+    """Why measurements are not fit for a verdict, as people read it, and what to do about it."""
+
+    NO_READINGS = (
+        "the data contain no readings",
+        "add readings of each pose: positions, angles or tensions",
+    )
+    NO_EQUILIBRIUM = (
+        "the model has no equilibrium at {lost} of {rows}; see the notes",
+        "check the robot's file and the commands of the rows named in the notes",
+    )
+    FEW_READINGS = (
+        "only {readings} can be used",
+        _MORE_POSES,
+    )
+    FEW_POSES = (
+        "only {poses} measured (repeated readings at rest count once): too few to tell effects "
+        "apart",
+        _MORE_POSES,
+    )
+    CONSTANT_COMMANDS = (
+        "all commands are the same, so effects cannot be told apart",
+        _MORE_POSES,
+    )
+    FROZEN_READINGS = (
+        "all readings are the same although the commands differ",
+        "check that the tracker followed the platform, and read the poses again",
+    )
+    LOCKED_READINGS = (
+        "the robot's joints lock all parts of the pose that were read",
+        "read parts of the pose that change with the commands, or tensions",
+    )
+    CONTRADICTION = (
+        "readings contradict each other: lines {lines} have the same command but readings far "
+        "apart, and so do others",
+        "measure these poses again or remove the wrong rows; if the tracker or the winches were "
+        "set up anew in between, put each set-up into a file of its own and use crosscheck add "
+        "tracker_frame (or another effect) --per file",
+    )
+    OTHER_CONVENTION = (
+        "the measured orientations{file} are {off} from those that the model expects, and only "
+        "{left} if {convention}: they seem to be written by another convention",
+        "write how the platform is turned as seen from the base: quaternions with the scalar "
+        "first (meas_qw meas_qx meas_qy meas_qz), or angles with R = Rx(rx) Ry(ry) Rz(rz)",
+    )
+    BLIND = (
+        "noise of {noise} would hide every effect, even at ten times its expected size",
+        "check the stated noise and its units ([sigma] in the TOML beside the file is in metres "
+        "and radians; or use --sigma position=0.1mm), or measure with less noise",
+    )
+    NOTHING_TO_TRY = (
+        "none of the effects considered is visible in these data: {lacking}",
+        "record what they need, or consider other effects",
+    )
+    UNSOLVED_MODEL = (
+        "some rows could not be solved with the model's values",
+        "check the model's values and the robot's file",
+    )
+    STRUCTURE_OR_NOISE = (
+        "a pattern remains, but with only {rows} and no stated noise it may as well be noise "
+        "that is correlated from row to row",
+        "state the noise ([sigma] beside the file, or --sigma position=0.1mm): stay at one pose "
+        "and read it for as long as the measurements took; or read more poses, some of them "
+        "twice",
+    )
+
+    remedy: str
+
+    def __new__(cls, why: str, remedy: str) -> Unfit:
+        """A reason with its remedy."""
+        unfit = object.__new__(cls)
+        unfit._value_, unfit.remedy = why, remedy
+        return unfit
 
 
 @dataclass(frozen=True)
@@ -185,7 +208,7 @@ class Refusal:
     @property
     def remedy(self) -> str:
         """What to do about it, as a sentence."""
-        return _REMEDIES[self.unfit]
+        return self.unfit.remedy
 
     @property
     def unsolved(self) -> bool:
@@ -203,7 +226,7 @@ class Refusal:
         rows, poses = counted(self.rows, "row"), counted(self.rows, "pose")
         readings = counted(self.readings, "reading")
         some = {**vars(self), "rows": rows, "poses": poses, "readings": readings}
-        return self.unfit.value.format(**some)
+        return str(self.unfit.value).format(**some)
 
 
 class DiagnosisVerdict(StrEnum):

@@ -187,6 +187,20 @@ def derivatives(
     return problem.whiten(state.factor, problem.as_read(change, state.prediction.readings))
 
 
+def amplitude_columns(problem: Problem, state: State, term: Term) -> Array:
+    """(N, p) whitened derivatives by the parameters of one effect in a state that may lack it.
+
+    Its history is held, and columns of shapes are 0.
+    """
+    terms = state.terms.with_term(term)
+    wanted = np.flatnonzero(terms.own(term.name))[~term.layout.shape]
+    out = np.zeros((len(state.white), len(term.layout)))
+    if len(wanted):
+        rates = derivatives(problem, state.of(terms), wanted.tolist(), frozen=True)
+        out[:, ~term.layout.shape] = rates
+    return out
+
+
 def free_derivatives(problem: Problem, state: State, frozen: bool = False) -> Array:
     """(N, p) whitened derivatives of the prediction by z; 0 for fixed values."""
     terms = state.terms

@@ -19,10 +19,10 @@ import numpy as np
 
 from crosscheck.fit.algebra import monomials, waves
 from crosscheck.fit.problem import KINDS, POSITION, Rms, rms_by_kind
-from crosscheck.fit.state import derivatives
+from crosscheck.fit.state import amplitude_columns
 from crosscheck.inference.fit import Data, Fit
 from crosscheck.inference.priors import FIELD_WIDTHS, UNKNOWN
-from seecr.effects import Term, Terms, layout_of
+from seecr.effects import Term, layout_of
 from seecr.pose import Array
 
 # Prior width of each degree of a smooth field over that of the degree before.
@@ -139,9 +139,7 @@ class _FieldColumns:
     def rates_by(self, name: str) -> Array:
         """(N, k) derivatives of the readings by the parameters of an effect at null."""
         layout = layout_of(name, self.problem.robot)
-        terms = Terms([*self.state.terms.without(name), Term(layout, layout.null)])
-        wanted = np.flatnonzero(terms.own(name)).tolist()
-        return np.asarray(derivatives(self.problem, self.state.of(terms), wanted, frozen=True))
+        return amplitude_columns(self.problem, self.state, Term(layout, layout.null))
 
     def readings(self) -> Iterator[tuple[Varying, Array]]:
         """A cubic in the position for each channel: by kind of reading, and for all together.

@@ -133,6 +133,12 @@ class Metric:
         (white, part), (left, rest) = self.split(x), self.split(residual)
         return white.T @ white - part.T @ part, white.T @ left - part.T @ rest
 
+    def equations(self, state: State, jacobian: Array) -> tuple[Array, Array]:
+        """Normal matrix (p, p) of z and gradient (p,) at a state, with what is known of values."""
+        known = known_readings(state.terms)[0]
+        normal, gradient = self.normal(jacobian, state.white)
+        return normal + known.T @ known, gradient + known.T @ known_left(state.terms)
+
     def less_field(self, residual: Array) -> Array:
         """A residual (N,) without the most probable part of the field, if there is one."""
         if self.field is None:
@@ -234,15 +240,18 @@ class Fit:
         return self.metric.white(self.left)
 
     @cached_property
+    def equations(self) -> tuple[Array, Array]:
+        """Normal matrix (p, p) and gradient (p,) of its values, see :meth:`Metric.equations`."""
+        return self.metric.equations(self.state, self.jacobian)
+
+    @cached_property
     def spread(self) -> Array:
         """(p, p) posterior covariance of z, from data and prior; 0 for values that do not move."""
         free = np.flatnonzero(self.free)
         out = np.zeros((len(self.width), len(self.width)))
         if len(free):
-            known = known_readings(self.terms)[0][:, free]
-            normal = self.metric.normal(self.jacobian[:, free], self.state.white)[0]
-            prior = np.diag(self.width[free] ** -2.0)
-            out[np.ix_(free, free)] = inverse_of(normal + known.T @ known + prior)
+            own = np.ix_(free, free)
+            out[own] = inverse_of(self.equations[0][own] + np.diag(self.width[free] ** -2.0))
         return out
 
     @cached_property
@@ -395,9 +404,7 @@ def _step(
 ) -> tuple[float, float, State, float] | None:
     """The objective, by how much a step lowers it, the state then and the next damping, or None."""
     terms, z = state.terms, state.terms.sizes
-    known, off = known_readings(terms)[0], known_left(terms)
-    normal, gradient = metric.normal(jacobian, state.white)
-    normal, gradient = normal + known.T @ known, gradient + known.T @ off
+    normal, gradient = metric.equations(state, jacobian)
     move = _movable(-gradient, terms, width)
     if len(move) == 0:
         return None

@@ -21,12 +21,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from crosscheck.fit.algebra import inverse_of, solved
-from crosscheck.fit.state import can_be, known_left, known_readings
-from crosscheck.inference.catalogue import Catalogue, Key, is_field, log_shares, widths_for
-from crosscheck.inference.evidence import Linear, MemberColumns, best_widths, log_evidence, log_gain
+from crosscheck.fit.state import can_be
+from crosscheck.inference.about import AmplitudeColumns, linear_of, log_shares
+from crosscheck.inference.catalogue import Catalogue, Key, is_field
+from crosscheck.inference.evidence import Linear, best_widths, log_evidence, log_gain
 from crosscheck.inference.fit import Fit
 from crosscheck.inference.noise import NoisePrior, log_det
-from crosscheck.inference.priors import EQUAL, FIELD_WIDTHS, WIDTHS, WITHIN
+from crosscheck.inference.priors import EQUAL, WIDTHS, WITHIN
 from seecr.pose import Array
 
 # The widths that maximise the evidence count only if the optimum with them loses less ln posterior
@@ -103,31 +104,14 @@ def wider(every: Catalogue, one: Hypothesis) -> dict[str, float]:
 
 def _own_linear(every: Catalogue, key: Key, fit: Fit) -> tuple[Linear, Array]:
     """Normal equations of a fit's own amplitudes and field, and their values in it."""
-    terms, free, keys = fit.terms, fit.free, every.keys_of(fit.terms)
-    groups, columns, first = dict[str, MemberColumns](), [], 0
-    for term in terms:
-        own = np.flatnonzero(terms.own(term.name))
-        own = own[free[own] & ~term.layout.shape]
-        if len(own):
-            one_sided = (terms.lower == terms.null)[own]
-            at, first = first + np.arange(len(own)), first + len(own)
-            groups[keys[term.name]] = MemberColumns(
-                at, widths_for(term.layout, fit.data.free), one_sided
-            )
-            columns.append(own)
-    own = np.concatenate([np.zeros(0, np.intp), *columns])
-    x, z = fit.jacobian[:, own], fit.z[own]
-    y = fit.state.white + x @ z
-    field = next((k for k in key if is_field(k)), None)
-    if field is not None:
-        more = every.fields[field]
-        groups[field] = MemberColumns(first + np.arange(more.shape[1]), np.array(FIELD_WIDTHS))
-        x, z = np.hstack([x, more]), np.append(z, np.zeros(more.shape[1]))
-    white = fit.metric.white(np.column_stack([x, y]))
-    known, readings = known_readings(terms)
-    known = np.hstack([known[:, own], np.zeros((len(known), x.shape[1] - len(own)))])
-    whole = np.concatenate([white[:, :-1], known])
-    return Linear.of(whole, np.concatenate([white[:, -1], readings]), groups), z
+    keys, members = every.keys_of(fit.terms), dict[str, AmplitudeColumns]()
+    for term in fit.terms:
+        at = np.flatnonzero(fit.terms.own(term.name))
+        own = fit.free[at] & ~term.layout.shape
+        if own.any():
+            x, z = fit.jacobian[:, at[own]], fit.z[at[own]]
+            members[keys[term.name]] = AmplitudeColumns(term, own, x, z)
+    return linear_of(fit, members, {k: every.fields[k] for k in key if is_field(k)})
 
 
 def _left_to_gain(fit: Fit) -> float:
@@ -139,11 +123,10 @@ def _left_to_gain(fit: Fit) -> float:
     free = np.flatnonzero(fit.free)
     if not len(free):
         return 0.0
-    known = known_readings(fit.terms)[0][:, free]
-    normal, gradient = fit.metric.normal(fit.jacobian[:, free], fit.state.white)
+    normal, gradient = fit.equations
     inverse2 = fit.width[free] ** -2.0
-    slope = gradient + known.T @ known_left(fit.terms) - fit.z[free] * inverse2
-    return float(slope @ solved(normal + known.T @ known + np.diag(inverse2), slope))
+    slope = gradient[free] - fit.z[free] * inverse2
+    return float(slope @ solved(normal[np.ix_(free, free)] + np.diag(inverse2), slope))
 
 
 # --- parameters that are stopped at zero ----------------------------------------------------------
@@ -167,11 +150,10 @@ def _log_absent(every: Catalogue, fit: Fit, widths: Mapping[str, float]) -> floa
         [widths.get(owners[k], fit.width[k]) if not shape[k] else fit.width[k] for k in free]
     )
     both = np.concatenate([free, held])
-    known = known_readings(terms)[0][:, both]
-    y = fit.state.white + fit.jacobian[:, free] @ fit.z[free]
-    normal, gradient = fit.metric.normal(fit.jacobian[:, both], y)
-    normal, n = normal + known.T @ known, len(free)
-    gradient = gradient + known.T @ (known_left(terms) + known[:, :n] @ fit.z[free])
+    n, (normal, gradient) = len(free), fit.equations
+    # those at zero as they would be if all that the others do were still to be explained
+    gradient = (gradient + normal[:, free] @ fit.z[free])[both]
+    normal = normal[np.ix_(both, both)]
     inverse = inverse_of(normal[:n, :n] + np.diag(wide**-2.0)) if n else np.zeros((0, 0))
     cross = normal[:n, n:]
     power = np.diag(normal)[n:] - np.sum(cross * (inverse @ cross), axis=0)

@@ -1,7 +1,7 @@
 """Searches hypotheses: linear evidence about a fit proposes, exact fits decide.
 
 All fits go into one cache. About a fit, the linear model of the whole catalogue
-(:class:`crosscheck.inference.catalogue.About`) gives the evidence of any hypothesis by linear
+(:class:`crosscheck.inference.about.About`) gives the evidence of any hypothesis by linear
 algebra; adding, dropping and exchanging members climbs from the model as it stands and from the
 fit itself. What the climb meets with a score within WITHIN of its best is fitted exactly, and the
 search goes on about the best fit of all until it stays the best.
@@ -23,22 +23,14 @@ import numpy as np
 from crosscheck.fit.problem import KINDS
 from crosscheck.fit.registration import registered, registered_each
 from crosscheck.fit.state import State, can_be
-from crosscheck.inference.catalogue import (
-    About,
-    Catalogue,
-    Key,
-    bare,
-    inside,
-    is_field,
-    name_of,
-    part_of,
-)
-from crosscheck.inference.evidence import Solved, best_widths, log_evidence
+from crosscheck.inference.about import About, inside
+from crosscheck.inference.catalogue import Catalogue, Key, bare, is_field, name_of, part_of
 from crosscheck.inference.fields import smooth_over_place
 from crosscheck.inference.fit import TRACKER, Data, Fit, fit, unfitted
 from crosscheck.inference.hypothesis import Hypothesis, scored, wider
 from crosscheck.inference.noise import Noise, NoisePrior
 from crosscheck.inference.priors import EQUAL, FEW, MAY_BE_UNKNOWN, MISJUDGED, WITHIN
+from crosscheck.inference.scores import LARGE, Scores, ranked
 from seecr.effects import Knowledge, Term
 from seecr.pose import Array
 
@@ -46,8 +38,6 @@ from seecr.pose import Array
 _SINGLES, _BEAM = 4, 2
 # Fields that are tried beside a set.
 _FIELDS = 2
-# Most moves of a climb. Larger sets are thinned member by member first; nothing is exchanged there.
-_MOVES, _LARGE, _KEPT = 60, 8, 3.0
 # Parts of the way to the linear values at which fits may begin: one that explains less than the
 # model as it stands leads nowhere.
 _PARTS = (1.0, 0.3, 0.1)
@@ -68,151 +58,6 @@ _LOSING = 2
 _REFITS = 2
 # The key of a smooth function of the place that stands for noise.
 _PLACE = "~place"
-# Sets whose neighbours are looked at where a search ends.
-_WIDENED = 30
-
-
-class Scores:
-    """Scores of hypotheses in the linear model about a fit: ln evidence plus ln prior."""
-
-    def __init__(self, about: About, centre: Hypothesis) -> None:
-        self.about, self.every, self.centre = about, about.every, centre
-        self.stood = about.every.stood_keys
-        self.solved: dict[Key, tuple[float, Solved]] = {}
-        self.near: dict[Key, float] = {}
-
-    def score(self, key: Key, start: Mapping[str, float] | None = None) -> float:
-        """The score of a hypothesis with its best widths."""
-        if key not in self.solved:
-            groups = self.about.linear.groups
-            widths = {k: (start or {}).get(k, groups[k].middle) for k in sorted(key & set(groups))}
-            best = best_widths(self.about.linear, widths)
-            self.solved[key] = (log_evidence(best) + self.prior(key), best)
-        return self.solved[key][0]
-
-    def promised(self, key: Key) -> float:
-        """What the linear model promises of a hypothesis, on the scale of exact scores."""
-        return self.score(key) - self.score(self.centre.key) + self.centre.score
-
-    def prior(self, key: Key) -> float:
-        """ln prior, less what the choice of shapes gains too much."""
-        return self.every.log_prior(key) - sum(self.about.prices.get(k, 0.0) for k in key)
-
-    def widths(self, key: Key) -> dict[str, float]:
-        """The best prior widths of its members."""
-        self.score(key)
-        return self.solved[key][1].chosen
-
-    def gain(self, key: Key, more: str) -> float:
-        """Approximate ln evidence that a member gains beside others; 0 where it moves nothing."""
-        if more not in self.about.linear.groups:
-            return 0.0
-        self.score(key)
-        return self.solved[key][1].gain(more)
-
-    @property
-    def seen(self) -> dict[Key, float]:
-        """Scores of all hypotheses met so far; those that were not solved are approximate."""
-        return self.near | {key: score for key, (score, _solved) in self.solved.items()}
-
-    def meet(self, scores: Mapping[Key, float]) -> None:
-        """Keep approximate scores of hypotheses that were not solved."""
-        self.near |= {k: s for k, s in scores.items() if k not in self.solved}
-
-    def neighbours(self, key: Key) -> dict[Key, float]:
-        """Approximate scores with one effect more, one less or, of small sets, one exchanged."""
-        base, out = self.score(key), self.larger(key)
-        standing = {name_of(k) for k in self.stood}
-        for member in sorted(k for k in bare(key) if name_of(k) not in standing):
-            rest = key - {member}
-            out[rest] = base - self.gain(key, member) - self.prior(key) + self.prior(rest)
-            if len(bare(key) - self.stood) <= _LARGE:
-                widths = {k: w for k, w in self.widths(key).items() if k != member}
-                solved = self.about.linear.solved(widths)
-                out |= self._with_one(rest, solved, out[rest], but=member)
-        return out
-
-    def larger(self, key: Key) -> dict[Key, float]:
-        """Approximate scores with one effect more."""
-        base = self.score(key)
-        return self._with_one(key, self.solved[key][1], base)
-
-    def _with_one(self, key: Key, solved: Solved, base: float, but: str = "") -> dict[Key, float]:
-        had, prior = {name_of(k) for k in key}, self.prior(key)
-        others = [
-            k for k in self.about.linear.groups
-            if not is_field(k) and not part_of(k) and k not in had and k != but
-        ]  # fmt: skip
-        return {key | {k}: base + solved.gain(k) + self.prior(key | {k}) - prior for k in others}
-
-    def with_fields(self, key: Key) -> dict[Key, float]:
-        """Approximate scores of a set, without its field, with each of the fields."""
-        key = bare(key)
-        base = self.score(key)
-        return {
-            key | {k}: base + self.gain(key, k) + self.every.log_shares[k]
-            for k in self.about.linear.groups if is_field(k)
-        }  # fmt: skip
-
-    def with_forms(self, key: Key) -> dict[Key, float]:
-        """Scores with an effect's form of other values in each file or run, added or exchanged."""
-        out = {}
-        for k in self.about.linear.groups:
-            if part_of(k) and k not in key:
-                rest = frozenset(other for other in key if name_of(other) != name_of(k))
-                gain = self.gain(rest, k) - self.prior(rest) + self.prior(rest | {k})
-                out[rest | {k}] = self.score(rest) + gain
-        return out
-
-    def climb(self, start: Key, moves: int = _MOVES, without: Key = frozenset()) -> Key:
-        """The best set reached by moves to better neighbours, none of which has some members."""
-        at = self._thinned(start)
-        for _ in range(moves):
-            around = {k: s for k, s in self.neighbours(at).items() if without.isdisjoint(k)}
-            self.meet(around)
-            for key in _ranked(around)[:2]:
-                if self.score(key, self.widths(at)) > self.score(at) + 1e-6:
-                    at = key
-                    break
-            else:
-                return at
-        return at
-
-    def widen(self, start: Key) -> None:
-        """Meet sets that are no larger and differ by more than one exchange, the best first.
-
-        Two effects may do what two others do, and each exchange alone explains a little less.
-        """
-        done = set[Key]()
-        for _ in range(_WIDENED):
-            small = {k: s for k, s in self.seen.items() if len(k) <= len(start) and k == bare(k)}
-            seen = {k: s for k, s in small.items() if k not in done}
-            key = max(seen, key=lambda k: (seen[k], sorted(k)), default=None)
-            if key is None or seen[key] < self.score(start) - WITHIN:
-                return
-            done.add(key)
-            self.meet({k: s for k, s in self.neighbours(key).items() if len(k) <= len(start)})
-
-    def _thinned(self, start: Key) -> Key:
-        """A set without its least valuable members, while it is large and they are worth little."""
-        linear = self.about.linear
-        widths = {k: linear.groups[k].middle for k in sorted(start & set(linear.groups))}
-        fixed = {k for k in widths if k in self.stood or is_field(k)}
-        while len(widths) > _LARGE + len(fixed):
-            solved = linear.solved(widths)
-            gains = {k: solved.gains(k) for k in widths}
-            least = min(sorted(widths.keys() - fixed), key=lambda k: float(np.max(gains[k])))
-            if float(np.max(gains[least])) > _KEPT:
-                break
-            widths = {k: float(linear.groups[k].widths[np.argmax(g)]) for k, g in gains.items()}
-            del widths[least]
-        return frozenset(widths) | (start & self.stood)
-
-    def best(self, count: int) -> list[Key]:
-        """The best hypotheses met so far, at most WITHIN worse than the best of all."""
-        scores = self.seen
-        order = _ranked(scores)
-        return [k for k in order if scores[k] >= scores[order[0]] - WITHIN][:count]
 
 
 @dataclass(eq=False)
@@ -260,7 +105,7 @@ class Search:
     @cached_property
     def none_about(self) -> About:
         """What every member does about the model as it stands."""
-        return self.every.about(self.none.fit)
+        return About(self.every, self.none.fit)
 
     @property
     def none(self) -> Hypothesis:
@@ -351,7 +196,7 @@ class Search:
         if best.field is None and best.fit.outlying.any():
             scores = self.scores_about(_with_rows_alike(best))
             near = scores.with_fields(best.key)
-            for key in _ranked(near)[:_FIELDS]:
+            for key in ranked(near)[:_FIELDS]:
                 self.fit(scores, key)
 
     def run(self) -> Hypothesis:
@@ -360,7 +205,7 @@ class Search:
         self.every = self.every.with_fields(none.fit)
         self._general_fields(none)
         alone = {k: h.score for k, h in self.fitted.items() if h.score > none.score + WITHIN}
-        for one in [self.fitted[key] for key in _ranked(alone)[:_BEAM]]:
+        for one in [self.fitted[key] for key in ranked(alone)[:_BEAM]]:
             self.look_about(one)
         self._settle()
         if self.is_open:
@@ -476,7 +321,7 @@ class Search:
 
     def _singles(self, beside: Hypothesis, forms: bool = False) -> None:
         """The most promising effects beside a hypothesis, each fitted from one or two sizes."""
-        about = self.every.about(beside.fit)
+        about = About(self.every, beside.fit)
         promises = {k: p for k, p in about.promises.items() if forms or not part_of(k)}
         for name in sorted(promises, key=lambda k: (-promises[k], k))[:_SINGLES]:
             key, term = beside.key | {name}, about.starts[name]
@@ -498,7 +343,7 @@ class Search:
         scores = self.scores_about(none)
         near = scores.with_fields(self.stood)
         general = [k for k, kind in self.every.kinds.items() if kind.name == "READINGS"]
-        likely = _ranked(near)[:_FIELDS]
+        likely = ranked(near)[:_FIELDS]
         for key in dict.fromkeys([*(self.stood | {k} for k in general), *likely]):
             self.fit(scores, key)
         if self.best.field is not None:
@@ -543,7 +388,7 @@ class Search:
 
     def _whole(self, whole: Hypothesis) -> Hypothesis:
         """A fit of all effects with those that wait and pay, wider where that explains more."""
-        about = self.every.about(whole.fit)
+        about = About(self.every, whole.fit)
         pays = {k: p for k, p in about.promises.items() if self._waits(k) and p > _PAYS}
         order = sorted(pays, key=lambda k: (-pays[k], k))
         for some in [order, *([k] for k in order)] if len(order) > 1 else [order]:
@@ -565,7 +410,7 @@ class Search:
 
     def scores_about(self, centre: Hypothesis) -> Scores:
         """Linear scores about a hypothesis' fit."""
-        return Scores(self.every.about(centre.fit), centre)
+        return Scores(About(self.every, centre.fit), centre)
 
     def look_about(self, centre: Hypothesis) -> None:
         """Search linear evidence about a fit, and fit exactly what looks best."""
@@ -578,16 +423,16 @@ class Search:
         for key in {end, self.stood, *(end - {k} for k in end - self.stood)}:
             fields |= scores.with_fields(key)
         scores.meet({**fields, **forms})
-        for key in _ranked(forms)[:1]:
+        for key in ranked(forms)[:1]:
             if forms[key] > scores.score(end) - WITHIN:
-                scores.climb(key, _LARGE)
+                scores.climb(key, LARGE)
         kinds = list[str]()
-        for key in _ranked(fields):
+        for key in ranked(fields):
             kind = next(k for k in key if is_field(k))
             if kind not in kinds:
                 kinds.append(kind)
-                scores.climb(key, _LARGE)
-                scores.climb(end | {kind}, _LARGE)
+                scores.climb(key, LARGE)
+                scores.climb(end | {kind}, LARGE)
             if len(kinds) >= _FIELDS:
                 break
         own = [k for k in centre.key if is_field(k)]
@@ -640,7 +485,7 @@ class Search:
             if core != best.key:
                 near[core] = base - 1.0
             done, added = 0, 0
-            for key in _ranked(near):
+            for key in ranked(near):
                 loses = key > best.key and near[key] < base
                 if loses and (added == _LOSING or near[key] < base - EQUAL):
                     continue
@@ -711,11 +556,6 @@ class Search:
     @cached_property
     def _about_everything(self) -> Scores:
         return self.scores_about(self.everything)
-
-
-def _ranked(scores: Mapping[Key, float]) -> list[Key]:
-    """Hypotheses, the best first."""
-    return sorted(scores, key=lambda k: (-scores[k], sorted(k)))
 
 
 def _with_rows_alike(found: Hypothesis) -> Hypothesis:

@@ -19,9 +19,10 @@ from scipy import optimize, special
 
 from crosscheck.fit.algebra import basis, beside, left_over
 from crosscheck.fit.reasons import Reason, Why
-from crosscheck.fit.state import free_derivatives
-from crosscheck.inference.catalogue import amplitude_columns, candidates
+from crosscheck.fit.state import amplitude_columns, free_derivatives
+from crosscheck.inference.catalogue import candidates
 from crosscheck.planning.planned import Planned
+from seecr.effects import Term
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
@@ -113,7 +114,7 @@ def _of_model(plan: Planned) -> Array:
 
 def _columns(plan: Planned, layout: Layout, shape: dict[str, float]) -> Array:
     start = layout.start(shape)
-    columns = amplitude_columns(plan.problem, plan.base, layout, start)
+    columns = amplitude_columns(plan.problem, plan.base, Term(layout, start))
     # a length behind the exit point only makes friction possible: its own signal is that of
     # another effect
     given = (start != layout.null) | layout.shape

@@ -18,7 +18,7 @@ from crosscheck.diagnosis.words import noise_is_other
 from crosscheck.fit.algebra import basis, beside, imitated
 from crosscheck.fit.problem import Kind, kinds_read
 from crosscheck.fit.reasons import DiagnosisVerdict, Why
-from crosscheck.inference.catalogue import About
+from crosscheck.inference.about import About
 from crosscheck.inference.held_out import rms_by_block
 from crosscheck.planning.result import Visible
 from crosscheck.show.figures import WIDTH, blank, grid, image, plain_log, styled
@@ -164,7 +164,7 @@ def confusion_of(found: Diagnosis) -> Confusion | None:
     """Of the effects found, their rivals and the best of the others, at the final model."""
     if found.path is None:
         return None
-    columns, about = {}, found.path.search.every.about(found.path.last.fit)
+    columns, about = {}, About(found.path.search.every, found.path.last.fit)
     for name in _names(found):
         own = _columns(found.path, about, name)
         if own is not None and float(np.sum(own**2)) > 0.0:

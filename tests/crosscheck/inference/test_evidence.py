@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import integrate, special, stats
 
-from crosscheck.inference.catalogue import widths_for
+from crosscheck.inference.about import widths_for
 from crosscheck.inference.evidence import (
     Linear,
     MemberColumns,

@@ -18,7 +18,8 @@ from crosscheck.inference.evidence import Linear, MemberColumns
 from crosscheck.inference.fit import Data, fit
 from crosscheck.inference.hypothesis import scored
 from crosscheck.inference.priors import WITHIN
-from crosscheck.inference.search import Scores, Search
+from crosscheck.inference.scores import Scores
+from crosscheck.inference.search import Search
 from crosscheck.inference.verdict import Posterior, judged
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.read import together
