@@ -262,6 +262,7 @@ def test_cables_pull_against_each_other_as_they_should(passive: tuple[str, ...])
     spare = null_space(np.vstack([pull.T, np.cross(arm, pull).T])[:, driven])
     left, was = (np.abs(off[:, driven] @ spare).max() for off in (left, was))
     assert left < 0.1 < 10.0 < was
+    assert np.abs(spread.solution.pose - before.solution.pose).max() < 1e-4
 
 
 @pytest.mark.parametrize("kind", ["spring", "counterweight"])
