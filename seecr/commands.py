@@ -312,11 +312,14 @@ class Path:
         return turning(self.robot, self.given)
 
 
-def waypoints_of(robot: Robot, commands: Commands, waypoints: float | None = None) -> Path:
+def waypoints_of(
+    robot: Robot, commands: Commands, waypoints: float | None = None, *, times: int = 1
+) -> Path:
     """The waypoints of commands: straight from the reference pose, straight between rows.
 
     The command moves from one to the next by at most ``waypoints`` [robot's length]; by default a
-    twentieth, with two to eight on the way to each row.
+    twentieth, with two to eight on the way to each row. Each of these steps is taken in so many
+    ``times`` as many.
     """
     n = len(commands)
     ways, fresh = _ways(robot, commands), commands.starts
@@ -327,7 +330,7 @@ def waypoints_of(robot: Robot, commands: Commands, waypoints: float | None = Non
         steps = np.ceil(moved / _STEP).astype(int).clip(_LEAST, _MOST)
     else:
         steps = np.ceil(moved / waypoints).astype(int).clip(1)
-    steps = np.where(commands.starts_here, 0, steps)
+    steps = np.where(commands.starts_here, 0, times * steps)
     source = np.repeat(np.arange(n), steps + begins)
     rows = np.cumsum(steps + begins) - 1
     step = np.arange(len(source)) - (rows - steps)[source]

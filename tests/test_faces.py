@@ -107,7 +107,7 @@ seecr.effects.base: unfed
 seecr.errors: printable
 seecr.effects.registry: load_effect
 seecr.equilibrium.search: elsewhere on_their_way
-seecr.equilibrium.strange: strained_rows strange
+seecr.equilibrium.strange: strained_rows strange walked_in_steps
 seecr.exported.export: wrote
 seecr.folders: check_ours staged
 seecr.files: Made check_writable json_pieces json_text with_toml write_text write_texts

@@ -32,7 +32,7 @@ from seecr.counted import counted
 from seecr.description.cables import ea_of
 from seecr.description.mjcf import CABLES
 from seecr.effects.base import unfed
-from seecr.equilibrium.strange import strained_rows, strange
+from seecr.equilibrium.strange import strained_rows, strange, walked_in_steps
 from seecr.pose import NORM_TOLERANCE
 from seecr.statics.starts import commanded_poses
 from seecr.workspace.maps import MOST_POSES, axis_of
@@ -91,7 +91,9 @@ def notes_of(
     if model is None:
         return said
     given = Commands(solution.command) if commands is None else commands
-    return (*said, *model.notes, *unfed(model.terms.effects, given), *model.beyond(solution))
+    unsure = walked_in_steps(solution, given, model.terms.effects)
+    beyond = model.beyond(solution)
+    return (*said, *model.notes, *unfed(model.terms.effects, given), *unsure, *beyond)
 
 
 def _outside(robot: Robot, commands: NDArray[np.float64]) -> tuple[str, ...]:

@@ -1,19 +1,24 @@
-"""Robots that are hardly meant as they are written: what is strange, and the likely cause."""
+"""What is strange about robots and their rests, in sentences, with the likely cause."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seecr.commands import Commands
+from seecr.compiled.columns import FRICTION, HYSTERESIS
 from seecr.counted import some
 from seecr.description.robot import Robot
+from seecr.effects.base import Effect
 from seecr.equilibrium.solving import solve
 from seecr.pose import Array
+from seecr.prediction.experiment import Experiment
 from seecr.statics.solution import Solution
 from seecr.statics.starts import poses_from_lengths
+from seecr.statics.tables import shared_cables
 from seecr.units import millimetres
 
 # The widest cable robot there is carries the receiver of the FAST telescope, between towers that
@@ -152,3 +157,28 @@ def _strains(robot: Robot) -> Array:
     pulls = home.tensions[0] * robot.falls
     strain = np.divide(pulls, robot.ea, out=np.zeros_like(robot.ea), where=driven)
     return np.asarray(np.maximum(drawn, strain))
+
+
+# Rests that are less exact than they look.
+
+
+def walked_in_steps(
+    solution: Solution, commands: Commands, effects: Sequence[Effect]
+) -> tuple[str, ...]:
+    """How far rests with hysteresis or friction may be off where cables are slack, in a sentence.
+
+    Nothing is said where no cable is slack, or where no effect rubs.
+    """
+    rubs = np.any(shared_cables(solution.tables)[..., [HYSTERESIS, FRICTION]])
+    if not rubs or not solution.slack.any():
+        return ()
+    experiment = Experiment(solution.robot, commands)
+    errors = experiment.error_of_steps(effects, solution)
+    if not np.isfinite(errors).any():
+        return ()
+    far, turned = np.nanmax(errors, axis=0)
+    return (
+        "Hysteresis and friction turn round where the way to a row ends a step, not where a cable "
+        f"goes slack between: rests may be off by {millimetres(far, 2)} and "
+        f"{np.degrees(turned):.2g} deg, by what half the steps change.",
+    )

@@ -177,6 +177,18 @@ class Experiment:
             self._path.append(waypoints_of(self.robot, self.commands))
         return self._path[0]
 
+    def error_of_steps(self, effects: Sequence[Effect], found: Solution) -> Array:
+        """How far (n, 2) [m, rad] rests may be off because the way to them is taken in steps.
+
+        A cable that goes slack, or taut, between two waypoints turns its hysteresis or friction
+        round there, and not where the steps end. That error shrinks with the step, so that it is
+        about twice what half the steps change; rows of ``found`` are those of this experiment.
+        """
+        path = waypoints_of(self.robot, self.commands, times=2)
+        finer = Experiment(self.robot, self.commands, self.length_errors, [path])
+        change = pose_difference(finer.predict(effects).solution().pose, found.pose)
+        return np.asarray(2.0 * np.linalg.norm(change.reshape(-1, 2, 3), axis=2))
+
     def with_length_errors(self, errors: Array | None) -> Experiment:
         """The same experiment with other errors of the paid-out lengths."""
         kept = (self._path, self._plain)

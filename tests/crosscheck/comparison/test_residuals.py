@@ -269,6 +269,26 @@ def test_p_values_of_associations_are_those_of_the_f_distribution() -> None:
     assert f_test(between[:1], won[:1], 0.0 * within[:1], lost[:1]) == 0.0
 
 
+def test_p_values_are_corrected_for_all_that_was_tried(robot):
+    """Of positions alone three readings were tried, beside all together, and each quantity."""
+    plain = measured(robot)
+    late = np.isin(plain.run, plain.runs[1:])
+    shift = 4e-5 * late[:, None] * np.array([0.0, 0.0, 1.0])
+    data = replace(plain, position=plain.position + shift, quat_wxyz=None)
+    found = compare(robot, data)
+    run = next(a for a in found.associations if a.against == "the run")
+    errors = found.state.raw[:, :3]
+    groups = [errors[data.run == name] for name in data.runs]
+    each = stats.f_oneway(*groups).pvalue
+    # of all three, sums of squares and degrees of freedom add up: noise is the same along each axis
+    within = sum(((one - one.mean(axis=0)) ** 2).sum() for one in groups)
+    between = ((errors - errors.mean(axis=0)) ** 2).sum() - within
+    k, n = len(groups) - 1, len(errors)
+    whole = stats.f.sf(between / (3 * k) / (within / (3 * (n - k - 1))), 3 * k, 3 * (n - k - 1))
+    assert run.p == pytest.approx(len(found.associations) * 2.0 * min(whole, 3 * each.min()))
+    assert 1e-12 < run.p < 0.5
+
+
 def test_groups_of_numbers_have_no_sign_at_zero() -> None:
     assert labelled(-0.0, 0.25, "m") == "0 to 0.25 m"
     assert labelled(0.4, 0.4, "m") == "0.4 m" and labelled(2.0, 2.0, "") == "2"

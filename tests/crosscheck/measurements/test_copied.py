@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from made_data import measured
+from scipy import stats
 
 import crosscheck
 from crosscheck.measurements.copied import repetitions
@@ -94,6 +95,27 @@ def test_hundreds_of_rows_with_few_digits_accuse_nobody(seed: int) -> None:
     notes, copied = repetitions(data)
     assert notes[0].startswith("Repeated")
     assert copied[[*range(10), *range(300, 310)]].all() and copied.sum() <= 26  # 3 more by chance
+
+
+@pytest.mark.parametrize("often", [2, 3, 4, 5])
+def test_so_many_copies_are_accused_as_chance_makes_in_one_file_of_a_thousand(often: int) -> None:
+    """Each of 30 numbers stands in so many rows, so two rows share one with a known probability."""
+    known, k = 30, np.arange(30 * often)
+    value = 0.01 * np.arange(known)
+    value[1] = 1e-5  # finely read: no step is coarse enough to repeat by itself
+    x, y = value[k // often], value[(k // often + 7 * (k % often)) % known]
+    base = np.column_stack([x, y, np.full(len(k), 0.1)])
+    alike = (often - 1) / (len(k) - 1)
+    accused = []
+    for count in range(1, 30):
+        read = np.concatenate([base, base[:count]])
+        pose = np.tile([0.0, 0, 0, 1, 0, 0, 0], (len(read), 1))
+        pose[:, 0] = np.arange(len(read))
+        data = Measurements(Path("m"), 8, np.full(len(read), "a"), pose, position=read)
+        expected = 0.5 * len(read) * (len(read) - 1) * alike**2
+        accused.append(bool(repetitions(data)[1].any()))
+        assert accused[-1] == (stats.poisson.sf(count - 1, expected) <= 1e-3), count
+    assert {True, False} <= {*accused[2:]}
 
 
 def test_rows_that_are_the_same_are_listed_up_to_eight() -> None:

@@ -235,6 +235,17 @@ def test_a_sweep_tells_the_zones_of_slack_cables_and_the_papers_points() -> None
     assert document["midline_point"] is None and "beside_weight_m" not in document["rows"][0]
 
 
+def test_a_sweep_says_how_exact_hysteresis_is_where_cables_go_slack() -> None:
+    told = model("m.toml", hysteresis="amplitude_N = 0.05, stretch_m = 0.0002")
+    sweep = f"seecr sweep {{}} --line {PLACE} 0.63 0.25 0.2 --count 4 {BARE}"
+    (said,) = [note for note in as_json(f"{sweep.format(PARALLEL)} {told}")["notes"]
+               if note.startswith("Hysteresis and friction turn round where")]  # fmt: skip
+    found = re.search(r"off by (\S+) mm and (\S+) deg, by what half the steps change", said)
+    assert found and 1e-7 < float(found[1]) < 0.01 and 1e-7 < float(found[2]) < 0.01
+    for plain in (sweep.format(PARALLEL), f"{sweep.format(COGIRO)} {told}"):  # no cable goes slack
+        assert "half the steps" not in json.dumps(as_json(plain)["notes"])
+
+
 def test_a_sweep_of_a_bar_is_compared_with_the_manifold(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figs 3 and 4 of the paper."""
     line = "seecr sweep planar_two_cable --line 0.2 0 0.5 0.5 0 0.5 --count 3"

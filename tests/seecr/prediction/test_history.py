@@ -302,6 +302,22 @@ def test_a_slack_cable_keeps_its_stretch_and_its_friction_and_pulls_again_from_t
     assert found.pose[:, 2] == pytest.approx(heights, abs=2e-6)
 
 
+@pytest.mark.slow
+def test_the_error_of_walking_in_steps_is_stated() -> None:
+    """The last row's lower cable goes slack, turns, and pulls again between waypoints."""
+    robot = lift()
+    lower = robot.rest_lengths[1] + np.array([0.0, 0.004, 0.03, 0.001, 0.025, -0.003, 0.04, 0.0])
+    lengths = np.column_stack([np.full(len(lower), robot.rest_lengths[0]), lower])
+    pose = np.tile(robot.reference_pose, (len(lower), 1))
+    turned = effect("hysteresis", amplitude=2.0, stretch=5e-3)
+    experiment = seecr.Experiment(robot, seecr.Commands(pose, lengths))
+    found = experiment.predict([turned]).solution()
+    stated = experiment.error_of_steps([turned], found)
+    true = np.abs(found.pose[:, 2] - lift_by_small_steps(lengths, 2.0, 5e-3))
+    assert 0.5 * stated[-1, 0] < true[-1] < stated[-1, 0]
+    assert true[-1] > 5e-8 and np.all(stated[:-1] < 1e-11)
+
+
 @pytest.mark.parametrize("name, values", [
     ("hysteresis", {"amplitude": 0.2, "stretch": 2e-4}),
     ("exit_friction", {"friction": 0.2, "length": 0.4}),
