@@ -27,9 +27,9 @@ sweep: ## more cases of what the tests hold, and how good the diagnosis is on a 
 score: ## how good the diagnosis is, on three hundred new cases: docs/figures.json; half an hour
 	$(BIN)/python scripts/score.py --out docs/figures.json --page docs/diagnosis.md
 
-bench: ## how fast it is, one process at a time; docs/performance.md
+bench: ## how fast it is, beside other ways: docs/figures.json and docs/performance.md
 	$(BIN)/python -m pytest -m benchmark -n 0 -s
-	$(BIN)/python scripts/bench.py --page docs/performance.md
+	$(BIN)/python scripts/bench.py --before 2a123ab2 --out docs/figures.json --page docs/performance.md
 
 docs: ## write the pages and pictures made from the sources, and build the site: build/site/index.html
 	$(BIN)/python scripts/draw_effects.py

@@ -1,33 +1,41 @@
-"""How fast equilibria are found: many poses abreast beside one by one, in this process.
+"""How fast equilibria are found, beside other ways to find them: all in one run.
 
-    python scripts/bench.py                            a table on the terminal; a minute
-    python scripts/bench.py --page docs/performance.md  and as the page
+    python scripts/bench.py                             a page on the terminal; some minutes
+    python scripts/bench.py --out docs/figures.json --page docs/performance.md
+    python scripts/bench.py --before 2a123ab2           and how fast that commit is, compiled anew
 
-Times are of one processor, the best of three, the two ways in turns, with all that `seecr.solve`
-does. Ratios are safer than times where other work goes on beside.
+Times are of one processor, the best of three, the ways in turns, with all that `seecr.solve` does.
+Ratios are safer than times where other work goes on beside.
 """
 
 from __future__ import annotations
 
 import argparse
-import resource
+import json
+import os
+import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import seecr
+from crosscheck.settle.settler import Settler
 from seecr.description.joints import pose_of_values, values_of_pose
+from seecr.files import write_text
 from seecr.parallel import processors, undivided
-from seecr.statics.batch import Abreast
+from seecr.statics.batch import Brief
 from seecr.statics.tables import one_by_one
 from seecr.workspace.maps import default_axes
 
-# Poses of each robot, and values along the axes of a map.
-POSES, VALUES = 20_000, 60
+# Poses of each robot, values along the axes of a map, and poses for the slow ways.
+POSES, VALUES, FEW = 20_000, 40, 40
+DEMOBOTS = ("demobot_cogiro", "demobot_parallel")
 SHIPPED = (
     ("demobot_cogiro", (300.0, 3e3, 1e5, 1e7)), ("demobot_parallel", (300.0, 3e3, 1e5, 1e7)),
     ("cogiro_large", (0.0,)), ("ipanema", (0.0,)), ("planar_vertical", (0.0,)),
@@ -35,17 +43,37 @@ SHIPPED = (
 )  # fmt: skip
 PAGE = """# Performance
 
-`make bench` writes this page, on {count}. "One by one" is the compiled descent of a single
-pose, which small batches still take; "abreast" is the same descent for sixteen poses at once, which
-batches from 64 poses on take. Both are the whole of `seecr.solve`, in microseconds a pose on one
-processor. "Left" are poses that lanes leave to the descent of one: falls, saddles, and rests within
-rounding of a cable's rest length.
+`make bench` writes this page from `docs/figures.json`, on {count}. "One by one" is the compiled
+descent of a single pose, which small batches still take; "abreast" is the same descent for sixteen
+poses at once, which batches from 64 poses on take. Both are the whole of `seecr.solve`, in
+microseconds a pose on one processor. "Left" are poses that lanes leave to the descent of one:
+falls, saddles, and rests within rounding of a cable's rest length.
 
 {table}
 
-Maps, and lengths for wanted poses, on all processors of that machine:
+Maps, and lengths for wanted poses, in microseconds a pose, and of all processors together:
 
-{others}
+{maps}
+
+Other ways to the same equilibria, in the same run, and how many times longer they take a pose than
+`seecr.solve` of {poses} poses. "The paper's search" is SciPy's `fsolve` on our compiled equations,
+"in MuJoCo" is the settling of `crosscheck`{before}.
+
+{ratios}
+
+A map of {large} poses in parts on disk (`seecr.store_map`) takes {store:.2f} µs of processor a
+pose, and {memory:.2f} GB of memory at most.
+"""
+# What an older commit is asked: microseconds a pose, the best of three.
+OLDER = """
+import sys, time, numpy as np, seecr
+for name, poses in np.load(sys.argv[1]).items():
+    robot, best = seecr.load_robot(seecr.model_path(name)), np.inf
+    for _ in range(4):
+        start = time.thread_time()
+        seecr.solve(robot, poses, threads=1)
+        best = min(best, time.thread_time() - start)
+    print(name, 1e6 * best / len(poses))
 """
 
 
@@ -87,13 +115,6 @@ def poses_of(robot: seecr.Robot) -> np.ndarray:
     return np.column_stack([places, np.tile(robot.reference_pose[3:], (POSES, 1))])
 
 
-def timed(run: Callable[[], object]) -> float:
-    """Seconds of this thread."""
-    start = time.thread_time()
-    run()
-    return time.thread_time() - start
-
-
 def row(name: str, robot: seecr.Robot) -> list[str]:
     """One robot's line of the table."""
     poses = poses_of(robot)
@@ -106,9 +127,9 @@ def row(name: str, robot: seecr.Robot) -> list[str]:
         found = run()
         for _ in range(3):
             with one_by_one():
-                single = min(single, timed(run))
-            abreast = min(abreast, timed(run))
-    left = found.evaluation.alone.mean() if isinstance(found.evaluation, Abreast) else 1.0
+                single = min(single, best_of(run, runs=1))
+            abreast = min(abreast, best_of(run, runs=1))
+    left = found.evaluation.alone.mean() if isinstance(found.evaluation, Brief) else 1.0
     return [
         name, f"{robot.n_cables}", f"{robot.ea.mean():.3g}", f"{found.slack.sum(1).mean():.1f}",
         f"{found.iterations.mean():.1f}", f"{100 * left:.1f} %", f"{1e6 * single / POSES:.2f}",
@@ -116,8 +137,8 @@ def row(name: str, robot: seecr.Robot) -> list[str]:
     ]  # fmt: skip
 
 
-def others(name: str) -> list[str]:
-    """Microseconds a pose of maps and corrections of one robot, on all processors."""
+def maps(name: str) -> list[str]:
+    """Microseconds of processor a pose of maps and corrections of one robot."""
     robot = seecr.load_robot(seecr.model_path(name))
     axes = default_axes(robot, VALUES)
     poses = poses_of(robot)
@@ -127,15 +148,75 @@ def others(name: str) -> list[str]:
         (lambda: seecr.workspace_map(robot, *axes, elastic=False), VALUES**3),
         (lambda: seecr.correct(robot, poses), len(poses)),
     )
-    out = [name]
-    for run, count in runs:
-        best = np.inf
-        for _ in range(3):
-            start = time.perf_counter()
-            run()
-            best = min(best, time.perf_counter() - start)
-        out.append(f"{1e6 * best / count:.2f}")
-    return out
+    return [name, *(f"{1e6 * best_of(run, time.process_time) / n:.2f}" for run, n in runs)]
+
+
+def best_of(
+    run: Callable[[], object], clock: Callable[[], float] = time.thread_time, runs: int = 4
+) -> float:
+    """Seconds of the fastest of some runs, of which the first loads what is needed."""
+    times = []
+    for _ in range(runs):
+        start = clock()
+        run()
+        times.append(clock() - start)
+    return min(times)
+
+
+def ratios(name: str) -> dict[str, float]:
+    """Microseconds a pose of one robot in several ways."""
+    robot = seecr.load_robot(seecr.model_path(name))
+    poses = poses_of(robot)
+    some = poses[:: len(poses) // FEW]
+    settler = Settler(seecr.model_path(name))
+    lengths = settler.paid_out(some)
+
+    def settle() -> None:
+        for pose, paid in zip(some, lengths, strict=True):
+            settler.settle(pose, paid)
+
+    with undivided():
+        out = {
+            "seecr": best_of(lambda: seecr.solve(robot, poses, threads=1)) / len(poses),
+            "paper": best_of(lambda: seecr.solve(robot, some, method="fsolve")) / len(some),
+            "mujoco": best_of(settle) / len(some),
+        }
+    return {way: 1e6 * seconds for way, seconds in out.items()}
+
+
+def of_commit(commit: str) -> dict[str, float]:
+    """Microseconds a pose of an older commit, compiled anew, on the same poses, by robot."""
+    with tempfile.TemporaryDirectory() as folder:
+        tree, file = Path(folder) / "tree", Path(folder) / "poses.npz"
+        np.savez(file, **{name: poses_of(seecr.load_robot(name)) for name in DEMOBOTS})
+        subprocess.run(["git", "worktree", "add", "-q", "--detach", tree, commit], check=True)
+        try:
+            told = subprocess.run(
+                [sys.executable, "-c", OLDER, file], cwd=tree, check=True, text=True,
+                stdout=subprocess.PIPE, env=os.environ | {"PYTHONPATH": str(tree)},
+            )  # fmt: skip
+        finally:
+            subprocess.run(["git", "worktree", "remove", "--force", tree], check=True)
+    return {name: float(value) for name, value in map(str.split, told.stdout.splitlines())}
+
+
+def stored() -> tuple[int, float, float]:
+    """Poses of a map in parts, microseconds of processor a pose, and the memory at most [GB]."""
+    code = (
+        "import sys, time, resource, seecr; robot = seecr.load_robot('demobot_cogiro'); "
+        "start = time.process_time(); "
+        "poses = seecr.store_map(robot, *seecr.default_axes(robot, 100), sys.argv[1]).sum('poses');"
+        "print(poses, 1e6 * (time.process_time() - start) / poses, "
+        "resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        told = subprocess.run(
+            [sys.executable, "-c", code, f"{folder}/map"], check=True, text=True,
+            capture_output=True,
+        )  # fmt: skip
+    poses, each, memory = told.stdout.split()
+    unit = 1e9 if sys.platform == "darwin" else 1024**2
+    return int(poses), float(each), float(memory) / unit
 
 
 def table(head: str, rows: list[list[str]]) -> str:
@@ -145,29 +226,61 @@ def table(head: str, rows: list[list[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
+def figures(before: str | None) -> dict[str, Any]:
+    """What docs/figures.json has of the speed."""
+    poses, each, memory = stored()
+    times = {name: ratios(name) for name in DEMOBOTS}
+    for name, older in (of_commit(before) if before else {}).items():
+        times[name]["before"] = older
+    return {
+        "processors": processors(), "poses": POSES, "before": before,
+        "robots": [row(*robot) for robot in robots()],
+        "maps": [maps(name) for name in DEMOBOTS],
+        "ratios": times,
+        "stored": {"poses": poses, "microseconds": each, "gigabytes": memory},
+    }  # fmt: skip
+
+
+def page_of(found: dict[str, Any]) -> str:
+    """docs/performance.md."""
+    head = "robot, cables, E S (N), slack, evaluations, left, one by one (µs), abreast (µs), ratio"
+    ways = {"paper": "the paper's search", "mujoco": "in MuJoCo", "before": "before"}
+    known = [way for way in ways if way in next(iter(found["ratios"].values()))]
+    lines = [
+        [name, f"{each['seecr']:.2f}", *(f"{each[way]:.4g} ({each[way] / each['seecr']:.0f} times)"
+                                         for way in known)]
+        for name, each in found["ratios"].items()
+    ]  # fmt: skip
+    commit = found["before"]
+    return PAGE.format(
+        count=f"a machine with {found['processors']} processors",
+        table=table(head, found["robots"]),
+        maps=table("robot, elastic map, static map, correct", found["maps"]),
+        poses=found["poses"],
+        before=f', "before" is `seecr.solve` of commit {commit}' if commit else "",
+        ratios=table(", ".join(["robot, seecr (µs)", *(f"{ways[w]} (µs)" for w in known)]), lines),
+        large=found["stored"]["poses"], store=found["stored"]["microseconds"],
+        memory=found["stored"]["gigabytes"],
+    )  # fmt: skip
+
+
 def main() -> None:
-    """Measure, print, and write the page if asked."""
+    """Measure, print, and write the figures and the page if asked."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
+    parser.add_argument("--out", type=Path, help="file of figures whose part `speed` is replaced")
     parser.add_argument("--page", type=Path, help="write it as this page, too")
+    parser.add_argument("--before", help="a commit to compare with")
     given = parser.parse_args()
-    head = "robot, cables, E S (N), slack, evaluations, left, one by one (µs), abreast (µs), ratio"
-    first = table(head, [row(*each) for each in robots()])
-    rows = [others(name) for name in ("demobot_cogiro", "demobot_parallel")]
-    second = table("robot, elastic map (µs), static map (µs), correct (µs)", rows)
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    print(
-        first,
-        second,
-        f"{memory / (2**20 if sys.platform != 'darwin' else 2**30):.2f} GB",
-        sep="\n\n",
-    )
+    found = figures(given.before)
+    page = page_of(found)
+    print(page)
+    if given.out:
+        every = json.loads(given.out.read_text(encoding="utf-8")) if given.out.exists() else {}
+        write_text(given.out, json.dumps(every | {"speed": found}, indent=1) + "\n")
     if given.page:
-        count = f"a machine with {processors()} processors"
-        given.page.write_text(
-            PAGE.format(count=count, table=first, others=second), encoding="utf-8"
-        )
+        write_text(given.page, page)
 
 
 if __name__ == "__main__":

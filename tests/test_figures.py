@@ -1,4 +1,4 @@
-"""docs/diagnosis.md quotes docs/figures.json, which `make score` writes."""
+"""Pages quote docs/figures.json, which `make score` and `make bench` write."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import re
 from pathlib import Path
 
+import bench
 import pytest
 import score
 
@@ -17,6 +18,12 @@ def test_the_page_quotes_the_figures() -> None:
     page = (DOCS / "diagnosis.md").read_text(encoding="utf-8")
     quoted = page.partition(f"{score.BEGIN}\n")[2].partition(f"\n{score.END}")[0]
     assert quoted == score.page_of(found), "run: make score"
+
+
+def test_the_page_of_speed_is_that_of_the_figures() -> None:
+    found = json.loads((DOCS / "figures.json").read_text(encoding="utf-8"))["speed"]
+    page = (DOCS / "performance.md").read_text(encoding="utf-8")
+    assert page == bench.page_of(found), "run: make bench"
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,6 @@ from seecr.units import newtons
 
 # Part of the load that may stay unbalanced, by rounding of the tensions.
 _BALANCED = 1e-9
-# Part of that by which a search for any tensions may itself be off.
-_PART = 1e-2
 AIMS = ("minimum", "middle")
 """Names of wanted tensions: as small as possible, or the middle of the limits."""
 SAFE = "safe"
@@ -173,14 +171,13 @@ def can_balance(
 
 def _decided(matrices: Array, loads: Array, low: Array, high: Array, scale: Array) -> Array:
     """(n,) positive where tensions balance, to rounding; NaN where W is singular or too narrow."""
-    from seecr.compiled.tensions import MOST, feasible_of  # takes a while to import
+    from seecr.compiled.tensions import margins_of  # takes a while to import
 
-    room, spare = _BALANCED * scale, matrices.shape[2] - matrices.shape[1]
-    if not 0 <= spare <= MOST:
-        return _innermost(matrices, loads, low, high, scale)[0] + room
-    given, out = map(np.ascontiguousarray, (matrices, loads, low, high)), np.empty(len(matrices))
-    by_row(feasible_of, *given, room, _PART * room, out)
-    return out
+    out = np.full(len(matrices), np.nan)
+    if matrices.shape[2] >= matrices.shape[1]:
+        given = map(np.ascontiguousarray, (matrices, loads[:, None], low, high))
+        by_row(margins_of, *given, scale, out)
+    return out + _BALANCED * scale
 
 
 def innermost(

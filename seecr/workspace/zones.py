@@ -160,13 +160,9 @@ def tension_margin(
     acting = effects_of(effects, robot)
     if acting or not robot.all_driven:
         return margins_with(robot, places, acting, lowest, highest, wrenches, wrench)
-    out = np.full(len(places), np.nan)
-    scale = load_scale(robot)
-    if robot.n_driven < robot.n_dof:
-        pass
-    elif robot.joints or (wrench is not None and np.ndim(wrench) == 2):
-        return margins_from(*_loads(robot, places, wrench, wrenches), low, high, scale)
-    else:
+    out, scale = np.full(len(places), np.nan), load_scale(robot)
+    by_row = wrench is not None and np.ndim(wrench) == 2
+    if not (robot.joints or by_row or robot.n_driven < robot.n_dof):
         some = np.zeros((1, 6)) if wrenches is None else wrenches_of(wrenches)
         some = some if wrench is None else some + wrenches_of(wrench)
         in_parts(
@@ -176,10 +172,10 @@ def tension_margin(
             ),
             len(places),
         )  # fmt: skip
-    odd = np.flatnonzero(np.isnan(out))
-    if len(odd):
-        some_loads = _loads(robot, places[odd], _rows(wrench, odd), wrenches)
-        out[odd] = _by_rank(*some_loads, low, high, scale)
+    left = np.flatnonzero(np.isnan(out))
+    if len(left):
+        own = np.asarray(wrench)[left] if by_row else wrench
+        out[left] = margins_from(*_loads(robot, places[left], own, wrenches), low, high, scale)
     return out
 
 
@@ -230,9 +226,10 @@ def margins_from(matrices: Array, loads: Array, low: Array, high: Array, scale: 
     from seecr.compiled.tensions import margins_of  # takes a while to import
 
     matrices, out = np.ascontiguousarray(matrices), np.full(len(matrices), np.nan)
+    limits = low[None], high[None], np.array([scale])
     if matrices.shape[2] >= matrices.shape[1]:
         in_parts(
-            lambda part: margins_of(matrices[part], loads[part], low, high, scale, out[part]),
+            lambda part: margins_of(matrices[part], loads[part], *limits, out[part]),
             len(out),
         )
     odd = np.flatnonzero(np.isnan(out))
@@ -274,6 +271,7 @@ def _by_rank(matrices: Array, loads: Array, low: Array, high: Array, scale: floa
     out = np.full(len(matrices), -np.inf)
     sound = np.isfinite(matrices).all(axis=(1, 2)) & np.isfinite(loads).all(axis=(1, 2))
     rows = np.flatnonzero(sound)
+    limits = low[None], high[None], np.array([scale])
     left, sizes, _right = np.linalg.svd(matrices[rows], full_matrices=False)
     rank = np.sum(sizes > _SINGULAR * sizes[:, :1], axis=1)
     for r in np.unique(rank[rank > 0]):
@@ -284,7 +282,7 @@ def _by_rank(matrices: Array, loads: Array, low: Array, high: Array, scale: floa
         held = np.flatnonzero((beyond <= _BALANCED * size).all(axis=1))
         reduced = np.ascontiguousarray(base.swapaxes(1, 2) @ matrices[own])[held]
         found = np.full(len(held), np.nan)
-        margins_of(reduced, np.ascontiguousarray(inside[held]), low, high, scale, found)
+        margins_of(reduced, np.ascontiguousarray(inside[held]), *limits, found)
         out[own[held]] = np.where(np.isnan(found), -np.inf, found)
     return out
 
@@ -308,10 +306,6 @@ def wrenches_of(values: ArrayLike) -> Array:
     if some.ndim != 2 or some.shape[1] != 6:
         raise InputError(f"wrenches must be (k, 6) [N, N m], got {np.shape(values)}")
     return some
-
-
-def _rows(wrench: ArrayLike | None, rows: NDArray[np.intp]) -> ArrayLike | None:
-    return wrench if wrench is None or np.ndim(wrench) < 2 else np.asarray(wrench)[rows]
 
 
 def slack_zones(solution: Solution) -> list[Zone]:
