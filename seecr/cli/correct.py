@@ -62,7 +62,8 @@ def command(
     poses. Elasticity and all effects of the model are taken into account; tensions stay within the
     limits. A pose that cannot be held is replaced by the nearest one that can (without --highest,
     the nearest of those that strain no cable by more than 5 %), and the program says which cables
-    would have to push, or pull more than allowed. If the model has a covariance, tensions keep a
+    would have to push, or pull more than allowed. Without --highest it says how much cables are
+    strained, and which ropes that breaks. If the model has a covariance, tensions keep a
     distance from the limits, so that they stay within them with a probability of 0.99 wherever the
     balance allows it, and correction.json gives that probability for each row.
 

@@ -13,11 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from seecr.compiled.columns import (
     CABLE_LAW,
-    CENTRE_OF_MASS,
     CONVERGED,
     EA,
     FALLING,
-    FORCE_OF_WEIGHT,
     ITERATIONS,
     SINGULAR,
     SPINNING,
@@ -26,15 +24,12 @@ from seecr.compiled.columns import (
     UNSTABLE,
 )
 from seecr.counted import between, counted, rows_words
-from seecr.description.joints import motion_columns, values_of_pose
 from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.pose import (
     SMALLEST,
     Array,
     pose_difference,
-    quat_rotate,
-    quat_to_matrix,
     rotation_vectors,
 )
 from seecr.result import COORDINATES, Record, Result, named, rows_of
@@ -50,39 +45,8 @@ from seecr.statics.tables import (
     take,
 )
 from seecr.statics.verification import Verification, verification_of
+from seecr.statics.vibration import modes_of
 from seecr.units import joules, millimetres
-
-# The platform's mass matrix in the coordinates of its stiffness.
-
-
-def mass_matrices(robot: Robot, tables: Tables, poses: Array) -> Array:
-    """Mass matrices (n, d, d) of the platform at poses (n, 7).
-
-    For a free platform by translation of its origin and rotation, base frame [kg, kg m; kg m,
-    kg m^2]; else by its joints. Mass and centre of mass are those of the rows, with effects and
-    known payloads. A payload counts as a point mass, and cables have no mass.
-
-    Raises:
-        InputError: the platform's inertia is not known.
-    """
-    if not np.any(robot.inertia):
-        raise InputError(f"robot {robot.name}: its inertia is not known; expected Robot.inertia")
-    g = float(np.linalg.norm(robot.gravity))
-    weight = np.linalg.norm(tables.load[:, FORCE_OF_WEIGHT : FORCE_OF_WEIGHT + 3], axis=1)
-    mass = weight / g if g > 0.0 else np.full(len(poses), robot.mass)
-    turn = quat_to_matrix(poses[:, 3:])
-    lever = quat_rotate(poses[:, 3:], tables.load[:, CENTRE_OF_MASS : CENTRE_OF_MASS + 3])
-    cross = np.cross(lever[:, None, :], np.eye(3)).swapaxes(1, 2)
-    out = np.zeros((len(poses), 6, 6))
-    out[:, :3, :3] = mass[:, None, None] * np.eye(3)
-    out[:, 3:, :3] = mass[:, None, None] * cross
-    out[:, :3, 3:] = out[:, 3:, :3].swapaxes(1, 2)
-    about = turn @ robot.inertia @ turn.swapaxes(1, 2)
-    out[:, 3:, 3:] = about - mass[:, None, None] * cross @ cross
-    if not robot.joints:
-        return out
-    columns = motion_columns(values_of_pose(robot, poses)[1], poses[:, :3])
-    return np.asarray(columns.swapaxes(1, 2) @ out @ columns)
 
 
 class Status(Enum):
@@ -121,8 +85,6 @@ _PER_ROW = (
 # By outcome; the last is for whatever is none.
 _STATUSES = np.array([*(_OF_OUTCOME[k] for k in range(len(_OF_OUTCOME))), Status.GAVE_UP])
 _IS_BALANCED = np.array([one in _BALANCED for one in _STATUSES])
-# A squared frequency below this part of the largest is rounding.
-_NO_FREQUENCY = 1e-12
 # Errors [mm, deg] that differ by less than this, or by this part of them, are alike.
 _ALIKE = 1e-9
 
@@ -270,24 +232,7 @@ class Solution(Result):
         Raises:
             InputError: the platform's inertia is not known.
         """
-        frequencies = np.full(self.stiffness.shape[:2], np.nan)
-        shapes = np.full(self.stiffness.shape, np.nan)
-        known = np.isfinite(self.stiffness).all(axis=(1, 2)) & np.isfinite(self.pose).all(axis=1)
-        rows = np.flatnonzero(known)
-        if len(rows) == 0:
-            return frequencies, shapes
-        mass = mass_matrices(self.robot, take(self.tables, rows), self.pose[rows])
-        # K v = w^2 M v, made symmetric by the Cholesky factor of the mass matrix
-        half = np.linalg.inv(np.linalg.cholesky(mass))
-        stiffness = self.stiffness[rows]
-        stiffness = 0.5 * (stiffness + stiffness.swapaxes(1, 2))
-        squares, vectors = np.linalg.eigh(half @ stiffness @ half.swapaxes(1, 2))
-        nothing = _NO_FREQUENCY * np.abs(squares).max(axis=1, keepdims=True)
-        squares = np.where(np.abs(squares) <= nothing, 0.0, squares)
-        with np.errstate(invalid="ignore"):
-            frequencies[rows] = np.sqrt(squares) / (2.0 * np.pi)
-        shapes[rows] = half.swapaxes(1, 2) @ vectors
-        return frequencies, shapes
+        return modes_of(self.robot, self.tables, self.pose, self.stiffness)
 
     @property
     def frequencies(self) -> Array:

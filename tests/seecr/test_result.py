@@ -13,6 +13,7 @@ import pyarrow
 import pytest
 
 import seecr
+from crosscheck.model.fitted import Fitted
 from seecr.result import Result
 
 HOME = [0.4, 0.25, 0.1, 1, 0, 0, 0]
@@ -130,6 +131,29 @@ def test_a_model_prints_its_effects(tmp_path: Path) -> None:
     table = model.to_frame().to_pydict()
     assert table["parameter"] == ["radius_m", "shift_x_m", "shift_y_m", "shift_z_m"]
     assert table["stderr"] == [1e-4, None, None, None]
+
+
+def test_models_terms_and_fits_print_alike(tmp_path: Path) -> None:
+    robot = seecr.load_robot("demobot_cogiro")
+    path = tmp_path / "m.toml"
+    path.write_text(
+        '[[effect]]\nname = "pulley_radius"\n[effect.parameters]\n'
+        "radius_m = { value = 0.0083702, stderr = 1.3e-5 }\n"
+        '[[effect]]\nname = "stiffness"\n[effect.parameters]\n'
+        "factor = { value = 0.91, fixed = true }\n",
+        encoding="utf-8",
+    )
+    model = seecr.load_model(path, robot)
+    text = str(model)
+    assert "pulley_radius: radius = 8.370 ± 0.013 mm" in text
+    assert "stiffness: factor = 0.91 (fixed)" in text
+    term = model.terms["pulley_radius"]
+    assert repr(term) == "pulley_radius: radius = 8.37 mm"
+    fitted = Fitted(term, np.array([1.3e-5]), np.array([False]))
+    assert repr(fitted) == "pulley_radius: radius = 8.370 ± 0.013 mm"
+    gains = seecr.Term.of(robot, "drum_gain", gain_2=0.001)
+    assert repr(gains) == "drum_gain: gain_1 = 0, gain_2 = 0.001, gain_3 = 0, gain_4 = 0 and 4 more"
+    assert repr(gains.layout).startswith("Layout(drum_gain: gain_1, gain_2")
 
 
 def test_small_results_are_a_line_each_and_a_row_for_each_thing() -> None:

@@ -11,6 +11,7 @@ from seecr.units import (
     UNITS,
     chance,
     in_unit,
+    measured,
     millimetres,
     of_columns,
     parameter_name,
@@ -99,3 +100,10 @@ def test_names_and_chances() -> None:
     assert parameter_name("radius_m", "m") == "radius" and parameter_name("gain", "") == "gain"
     assert chance(1e-20) == "< 1e-12" and chance(0.25) == "0.25"
     assert chance(3e-11) == "3.0e-11"
+
+
+def test_a_value_has_the_digits_of_its_error() -> None:
+    assert measured(0.0083702, 1.3e-5, "m") == "8.370 ± 0.013 mm"
+    assert measured(0.0083702, np.inf, "m") == "not determined by these data"
+    assert measured(0.0083702, 0.0, "m") == "8.37 mm (fixed)"
+    assert measured(np.deg2rad(1.5), np.deg2rad(0.12), "rad") == "1.50 ± 0.12 deg"

@@ -15,8 +15,8 @@ from crosscheck.settle.physics import Physics
 from seecr.effects.setup import plain_setup
 from seecr.pose import Array, quat_from_rotvec
 from seecr.show.pose_words import direction_words, stiffness_lines
-from seecr.statics.solution import mass_matrices
 from seecr.statics.tables import assemble
+from seecr.statics.vibration import mass_matrices
 
 BOB = seecr.Robot(
     "bob", np.array([[0.0, 0, 1]]), np.zeros((1, 3)), np.array([100.0]), np.ones(1), 2.0,
