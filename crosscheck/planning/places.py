@@ -94,12 +94,10 @@ def more_poses(plan: Planned, room: Room | None = None) -> Extension | None:
 def in_room(room: Room, poses: Array) -> Array:
     """The poses (n, 7) in a room, and in its box."""
     poses = poses[room.holds(poses)]
-    return poses if room.box is None else within_box(poses, room.box)
-
-
-def within_box(poses: Array, box: Array) -> Array:
-    """The poses (n, 7) whose positions are within a box (2, 3) [m]: lowest and highest."""
-    return poses[np.all((poses[:, :3] >= box[0]) & (poses[:, :3] <= box[1]), axis=1)]
+    if room.box is None:
+        return poses
+    low, high = room.box
+    return poses[np.all((poses[:, :3] >= low) & (poses[:, :3] <= high), axis=1)]
 
 
 def held_within(robot: Robot, poses: Array, limits: tuple[float, float]) -> Array:

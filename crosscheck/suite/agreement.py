@@ -56,15 +56,15 @@ def _angle(a: Array, b: Array) -> Array:
     return np.asarray(2.0 * np.arctan2(half_sine, half_cosine))
 
 
-QUANTITIES = (
-    "settled_position_m",
-    "settled_orientation_rad",
-    "position_m",
-    "orientation_rad",
-    "tension_N",
-)
-"""Quantities with thresholds; ``settled_`` is MuJoCo after plain settling, the others after the
-polish.
+QUANTITIES = {
+    "settled_position_m": ("settled", "position after plain settling"),
+    "settled_orientation_rad": ("settled", "orientation after plain settling"),
+    "position_m": ("polished", "position"),
+    "orientation_rad": ("polished", "orientation"),
+    "tension_N": ("tension", "tension of a cable"),
+}
+"""Quantities with thresholds, each as the head of a column and in words. ``settled_`` is MuJoCo
+after plain settling, the others after the polish.
 """
 
 

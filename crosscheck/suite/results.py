@@ -22,23 +22,10 @@ from seecr.pose import Array
 from seecr.result import COORDINATES, Record, Result, named, rows_of
 from seecr.statics.solution import Solution
 
-QUANTITY_HEADS = {
-    "settled_position_m": "settled [m]",
-    "settled_orientation_rad": "settled [rad]",
-    "position_m": "polished [m]",
-    "orientation_rad": "polished [rad]",
-    "tension_N": "tension [N]",
-}
-"""Column heads of the quantities, in the order of ``QUANTITIES``."""
-
-QUANTITY_NAMES = {
-    "settled_position_m": "position after plain settling",
-    "settled_orientation_rad": "orientation after plain settling",
-    "position_m": "position",
-    "orientation_rad": "orientation",
-    "tension_N": "tension of a cable",
-}
-_UNITS = {name: head[head.index("[") + 1 : -1] for name, head in QUANTITY_HEADS.items()}
+_UNITS = {name: name.rpartition("_")[2] for name in QUANTITIES}
+QUANTITY_HEADS = {name: f"{head} [{_UNITS[name]}]" for name, (head, _words) in QUANTITIES.items()}
+"""Column heads of the quantities, in their order."""
+QUANTITY_NAMES = {name: words for name, (_head, words) in QUANTITIES.items()}
 _SHORT = {
     Verdict.NEUTRAL: "free to move",
     Verdict.BRANCH: "two equilibria",
