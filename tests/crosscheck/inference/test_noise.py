@@ -54,22 +54,14 @@ def covariance(c: Chain, noise: Noise, weight: Array) -> Array:
 
 
 def test_whitening_is_an_inverse_root_of_the_noise() -> None:
-    c = chain(8)
-    weight = np.random.default_rng(0).uniform(0.1, 1.0, len(c.row))
+    """Also where rows are missing: the gaps then differ."""
+    random, c = np.random.default_rng(0), chain(8)
+    c = replace(c, gap=random.integers(1, 4, len(c.row)).astype(float))
+    weight = random.uniform(0.1, 1.0, len(c.row))
     root = whitened(c, NOISE, weight, np.eye(len(c.row)))
     assert root @ covariance(c, NOISE, weight) @ root.T == pytest.approx(np.eye(24), abs=1e-12)
     whole = covariance(c, NOISE, np.ones(24))
     assert log_det(c, NOISE) == pytest.approx(np.linalg.slogdet(whole)[1])
-
-
-def test_true_noise_is_white_when_whitened() -> None:
-    """Also where rows are missing: the gaps then differ."""
-    random, c = np.random.default_rng(0), chain(400, 1, 1)
-    c = replace(c, gap=random.integers(1, 4, 400).astype(float))
-    factor = np.linalg.cholesky(covariance(c, NOISE, np.ones(400)))
-    white = whitened(c, NOISE, np.ones(400), factor @ random.standard_normal((400, 200)))
-    assert np.std(white) == pytest.approx(1.0, rel=0.01)
-    assert np.mean(white[1:] * white[:-1]) == pytest.approx(0.0, abs=0.01)
 
 
 @pytest.mark.parametrize("rho", [0.1, 0.5, 0.9])

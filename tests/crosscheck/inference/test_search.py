@@ -172,7 +172,7 @@ def test_loud_noise_that_goes_by_the_place_is_none(
     assert unknown > 0.95 if is_unknown else unknown < 0.05
     search.cache = {k: h for k, h in search.cache.items() if not any(map(is_field, k))}
     odds = search.odds_of_place()
-    assert odds > 20.0 if is_unknown else odds < 0.05
+    assert odds > 20.0 if is_unknown else odds < 0.01
 
 
 @cache
