@@ -62,12 +62,16 @@ def test_two_files_are_one_comparison_with_runs_that_keep_apart(
 ) -> None:
     xml, first = stiff
     second = tmp_path / "second.csv"
-    second.write_text("\n".join(first.read_text().splitlines()[:17]) + "\n")
+    head, *rows = (line.split(",") for line in first.read_text().splitlines()[:17])
+    x = head.index("meas_x_m")
+    for row in rows:  # readings of their own: copied ones would not count
+        row[x] = repr(float(row[x]) + 1e-6)
+    second.write_text("\n".join(map(",".join, [head, *rows])) + "\n")
     second.with_suffix(".toml").write_text('[sigma]\nposition_m = "0.1mm"\n')
     result = compare(stiff, out, second, "--max-position-worst", "1um")
     assert result.exit_code == 1, result.output
     assert "run second.csv: along_low_fwd" in result.stdout
-    assert "Identical rows" in result.stdout and "worst at line measured.csv " in result.stdout
+    assert "worst at line measured.csv " in result.stdout
     document = comparison(out)
     assert document["data"] == "measured.csv + second.csv" and document["rows"]["compared"] == 80
     assert "given twice; expected each file once" in refused("compare", xml, first, first)

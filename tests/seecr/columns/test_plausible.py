@@ -10,7 +10,6 @@ from made_columns import columns_of
 from rectangle import RECTANGLE
 
 from seecr.columns.plausible import check_commands
-from seecr.description.robot import Joint
 from seecr.errors import InputFileError
 from seecr.pose import Array
 
@@ -111,12 +110,3 @@ def test_a_robot_that_most_commands_are_outside_of_is_another() -> None:
     said = r"most commands are outside the frame of robot rectangle: half of them are 6 m or more"
     with pytest.raises(InputFileError, match=said):
         check_places("m", inside, outside, outside, outside)
-
-
-def test_commands_that_the_joints_cannot_reach_are_for_another_robot() -> None:
-    slide = Joint("slide", "along y", np.array([0.0, 1.0, 0.0]), np.zeros(3))
-    robot = replace(RECTANGLE, joints=(slide,))
-    columns = columns_of("cmd_y_m", "1", "3")
-    check_commands(columns, robot, at((1.5, 1.0, -1.5), (1.5, 3.0, -1.5)), None)
-    with pytest.raises(InputFileError, match=r"line 3: the joints of robot rectangle cannot"):
-        check_commands(columns, robot, at((1.5, 1.0, -1.5), (1.6, 3.0, -1.5)), None)
