@@ -35,12 +35,15 @@ def repetitions(data: Measurements, across: bool = False) -> tuple[list[str], Ma
     twice, copies = _pairs(data, across)
     notes, copied = list[str](), np.zeros(data.n_rows, dtype=bool)
     if copies and _by_chance(data, len(copies)) <= _WRONG:
-        copied[np.ravel(copies)] = True
-        by_files: dict[Pair, list[Pair]] = {}
+        commands = _commands(data)
+        by_files: dict[tuple[int, int, bool], list[Pair]] = {}
         for row, before in copies:
-            files = int(data.file[row]), int(data.file[before])
-            by_files.setdefault(files, []).append((row, before))
-        notes += [_words(data, *files, found) for files, found in by_files.items()]
+            # of the same command in another file either reading is right, and counts twice
+            other = commands[row] != commands[before]
+            copied[[row, before]] |= other
+            key = int(data.file[row]), int(data.file[before]), other
+            by_files.setdefault(key, []).append((row, before))
+        notes += [_words(data, *key, found) for key, found in by_files.items()]
     if twice:
         pairs = [f"{data.place(row)} as {data.place(before)}" for row, before in twice]
         notes.append(
@@ -55,8 +58,7 @@ def _pairs(data: Measurements, across: bool) -> tuple[list[Pair], list[Pair]]:
     read = _readings(data)
     columns = {k: v for k, v in data.columns() if k != "run" and not k.startswith(_READ)}
     whole = list(zip(*columns.values(), strict=True))
-    told = [v for k, v in columns.items() if k != "t_s"]
-    commands = list(zip(*told, data.file.tolist(), strict=True))
+    commands = list(zip(_commands(data), data.file.tolist(), strict=True))
     number = np.isfinite(read).sum(axis=1)
     same, first = dict[object, int](), dict[object, int]()
     twice, copies = list[Pair](), list[Pair]()
@@ -74,6 +76,12 @@ def _pairs(data: Measurements, across: bool) -> tuple[list[Pair], list[Pair]]:
 
 
 _READ = ("meas_", "tension_")
+
+
+def _commands(data: Measurements) -> list[tuple[object, ...]]:
+    """The command and the load of each row, with what else it states beside its readings."""
+    but = (*_READ, "t_s", "run")
+    return list(zip(*(v for k, v in data.columns() if not k.startswith(but)), strict=True))
 
 
 def _readings(data: Measurements) -> Array:
@@ -125,7 +133,7 @@ def _density(step: float, spread: float) -> float:
     return min(step / (math.sqrt(2.0 * math.pi) * spread), 1.0) if spread > 0.0 else 1.0
 
 
-def _words(data: Measurements, file: int, other: int, found: list[Pair]) -> str:
+def _words(data: Measurements, file: int, other: int, differ: bool, found: list[Pair]) -> str:
     rows, before = (
         f"{plural(len(lines), 'line')} {some(lines, _MOST_COPIED)}"
         for k in (0, 1)
@@ -137,8 +145,10 @@ def _words(data: Measurements, file: int, other: int, found: list[Pair]) -> str:
         if file != other
         else "copied, or the tracker stood still"
     )
+    counts = "Then leave those out that were not measured; all count as measured here."
+    if differ:
+        counts = "At most one of each was measured, so none of them counts as long as others do."
     return (
         f"Repeated readings: {here}{rows} have those of {there}{before} to the last digit, beside "
-        f"another command, load or file. Noise does not repeat: were they {why}? At most one of "
-        "each was measured, so none of them counts as long as others do."
+        f"another command, load or file. Noise does not repeat: were they {why}? {counts}"
     )
