@@ -113,7 +113,7 @@ class TextTable:
     def wide(self) -> bool:
         """Whether a narrow page has no room for it: each row is then a few lines there."""
         words = sum(not head.startswith("#") for head in self.heads)
-        return words > 3 or len(self.heads) > 6
+        return words > 3 or len(self.heads) > 5
 
 
 @dataclass(frozen=True)

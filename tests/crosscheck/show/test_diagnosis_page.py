@@ -195,17 +195,17 @@ def test_beside_something_unknown_probabilities_say_so() -> None:
     assert within_words(unknown) in seen and "probability beside something unknown" in seen
 
 
-def test_text_from_users_stays_text() -> None:
+def test_text_from_users_stays_text(monkeypatch: pytest.MonkeyPatch) -> None:
     found = diagnosis("pulleys")
     old = path_of(found).problem
     robot = replace(old.robot, name=EVIL, cable_names=tuple(f"{EVIL}{k}" for k in range(4)))
     data = replace(old.data, path=Path(EVIL.replace("/", "")))
     problem = replace(old, robot=robot, data=data)
+    monkeypatch.setattr(ModelPath, "problem", property(lambda _self: problem))
     bad = NotListed(EVIL, EVIL, 0.0, Reason(Why.ALIKE, by=(EVIL,)))
     text = render(
         replace(
             found,
-            path=replace(path_of(found), problem=problem),
             sentence=EVIL,
             notes=(EVIL,),
             measure_next=(EVIL,),
