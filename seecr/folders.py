@@ -59,10 +59,10 @@ def folder_lock(folder: Path, wait: bool = True) -> Iterator[bool]:
         os.close(handle)
 
 
-def written_by_us(folder: Path) -> dict[str, Any]:
-    """What the manifest of a folder says of each file; empty where there is none to be read."""
+def _manifest(folder: Path, table: str) -> dict[str, Any]:
+    """What a folder's manifest says of each of its "files" or "results"; empty without one."""
     try:
-        listed = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["files"]
+        listed = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))[table]
     except (OSError, ValueError, KeyError, TypeError):
         return {}  # then no file counts as ours
     entries = listed.items() if isinstance(listed, dict) else ()
@@ -83,7 +83,7 @@ def check_ours(folder: Path, names: Iterable[str], option: str = "--out") -> Non
     Raises:
         InputFileError: there are others.
     """
-    listed = written_by_us(folder)
+    listed = _manifest(folder, "files")
     there = sorted(name for name in names if os.path.lexists(folder / name))
     others = [name for name in there if not _is_ours(folder, name, listed)]
     if not others:
@@ -175,7 +175,7 @@ def _check_replaced(out: Path, folder: Path, read: list[Path | None], option: st
         old = out / file.name
         check_not_read(old, read, option)
         if old.is_file() and digits_of(old) == digits_of(file):
-            if file.name not in written_by_us(out):
+            if file.name not in _manifest(out, "files"):
                 file.unlink()
         else:
             check_ours(out, [file.name], option)
@@ -184,7 +184,7 @@ def _check_replaced(out: Path, folder: Path, read: list[Path | None], option: st
 def _plan_moves(out: Path, folder: Path, sometimes: Iterable[str], made: Made | None) -> None:
     """Write down what is to be moved and removed, and the manifest as it is to be."""
     new = sorted(file.name for file in folder.iterdir())
-    before = written_by_us(out)
+    before = _manifest(out, "files")
     gone = sorted(name for name in {*sometimes} - {*new} if _is_ours(out, name, before))
     listed = {
         name: entry
@@ -193,7 +193,7 @@ def _plan_moves(out: Path, folder: Path, sometimes: Iterable[str], made: Made | 
     }
     result = {"id": secrets.token_hex(8)} if made is None else {"id": made.result, **made.as_json()}
     listed |= {name: {"sha256": digits_of(folder / name), "result": result["id"]} for name in new}
-    results = _results(out) | {result["id"]: result}
+    results = _manifest(out, "results") | {result["id"]: result}
     used = {str(entry.get("result")) for entry in listed.values()}
     kept = {name: one for name, one in results.items() if name in used}
     manifest = json.dumps({"results": kept, "files": listed}, indent=1)
@@ -204,14 +204,6 @@ def _plan_moves(out: Path, folder: Path, sometimes: Iterable[str], made: Made | 
         file.flush()
         os.fsync(file.fileno())
     part.replace(folder / _MOVES)
-
-
-def _results(out: Path) -> dict[str, Any]:
-    try:
-        found = json.loads((out / MANIFEST).read_text(encoding="utf-8"))["results"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return {}
-    return found if isinstance(found, dict) else {}
 
 
 def _move(out: Path, folder: Path) -> None:
@@ -265,7 +257,7 @@ def check_together(*paths: Path) -> None:
             finish_moves(folder)
     if len({path.parent for path in there}) != 1:
         return
-    listed = written_by_us(there[0].parent)
+    listed = _manifest(there[0].parent, "files")
     if not all(_is_ours(path.parent, path.name, listed) for path in there):
         return  # somebody's own files
     results = {str(listed[path.name].get("result")) for path in there}

@@ -221,7 +221,7 @@ OTHER = ("--robot", PLANAR, "--mujoco-robot", model_path("demobot_cogiro"), "--j
         (("--jobs", "0"), "expected a whole number of at least 1, got '0'"),
         (("--jobs", "two"), "expected a whole number of at least 1, got 'two'"),
         (("--seed", "-1"), "expected a whole number of at least 0, got '-1'"),
-        (("--sed", "1"), "No such option '--sed'"),
+        (("--sed", "1"), "No such option"),
         (("extra",), "unexpected extra argument"),
         ((*SMALL, "--out", "empty.xml"), "cannot write there"),
         ((*SMALL, "--out", "empty.xml/below"), "cannot write there"),
