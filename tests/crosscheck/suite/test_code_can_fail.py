@@ -384,10 +384,12 @@ FAULTS = {
         ("by_rest[1] * up[k] - by_rest[0] * e[k]",
          "by_rest[1] * up[k]", slopes, "length_scale", "cable_weight"),
     ),
-    "seecr.statics.solution": (
+    "seecr.statics.vibration": (
         ("about - mass[:, None, None] * cross", "about - 2.0 * mass[:, None, None] * cross", modes),
         ("turn @ robot.inertia @ turn.swapaxes(1, 2)", "robot.inertia[None] + 0 * turn", modes),
         ("np.sqrt(squares) / (2.0 * np.pi)", "np.sqrt(squares)", modes),
+    ),
+    "seecr.statics.solution": (
         ("np.where(self.robot.hinges, self.robot.length, 1.0)",
          "np.where(self.robot.hinges, 1.0, 1.0)", modes),
     ),
@@ -397,10 +399,10 @@ FAULTS = {
         ("setup.commands.pose) - rest", "setup.commands.pose) - rest - 1e-6", rests),
     ),
     "seecr.prediction.sensitivity": (
-        ("step = -_inverse_stiffness(at) @ (force / apart)[",
-         "step = _inverse_stiffness(at) @ (force / apart)[", slopes, "platform_mass"),
-        ("tension / apart + (at.found.slopes @ step)[..., 0]",
-         "tension / apart", slopes, "platform_mass"),
+        ("out = _after(at, -_inverse_stiffness(at) @ (force / apart)[",
+         "out = _after(at, _inverse_stiffness(at) @ (force / apart)[", slopes, "platform_mass"),
+        ("at.found.slopes @ step], axis=1)",
+         "0.0 * at.found.slopes @ step], axis=1)", slopes, "platform_mass"),
         ("out[:, 6 + cable, cable] += own\n", "pass\n", slopes, "cable_length_offset"),
         ("np.moveaxis(0.5 * readings",
          "np.moveaxis(readings", slopes, "platform_mass", "tracker_scale"),
