@@ -26,8 +26,8 @@ from seecr.pose import Array, transform_points
 from seecr.show.colours import COLOURS
 from seecr.show.figures import figure
 from seecr.statics.solution import Solution
+from seecr.workspace.margins import slack_zones, tension_margin
 from seecr.workspace.planar import bar_equilibria, bar_tilt, midline_point, solution_manifold
-from seecr.workspace.zones import slack_zones, tension_margin
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, PICTURES = ROOT / "docs" / "paper.md", ROOT / "docs" / "pictures" / "paper"

@@ -31,7 +31,7 @@ from seecr.effects.cable import CableWeight
 from seecr.inverse.correction import correct
 from seecr.pose import Array, pose_add, pose_difference, quat_to_matrix
 from seecr.tensions.distribution import balanced
-from seecr.workspace.zones import feasible
+from seecr.workspace.margins import feasible
 
 
 class Limits(TypedDict, total=False):

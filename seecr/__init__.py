@@ -66,9 +66,10 @@ if TYPE_CHECKING:
         bar_manifold,
         midline_points,
     )
+    from seecr.workspace.boundary import boundary, held_chance, kept_chance
     from seecr.workspace.grid import Workspace
     from seecr.workspace.maps import default_axes, with_history, workspace_map
-    from seecr.workspace.margins import boundary, held_chance, kept_chance
+    from seecr.workspace.margins import Zone, feasible, slack_zones, tension_margin
     from seecr.workspace.planar import (
         BarRest,
         bar_equilibria,
@@ -78,14 +79,13 @@ if TYPE_CHECKING:
     )
     from seecr.workspace.spans import SlackSpan, slack_spans
     from seecr.workspace.stored import StoredMap, store_map
-    from seecr.workspace.zones import Zone, feasible, slack_zones, tension_margin
 
 __version__ = "0.1.0"
 
 # Imported on first use: the compiled loop and MuJoCo take a while to load.
 _MODULES = {
     "equilibrium.saddles": ("Barrier", "barriers"),
-    "workspace.margins": ("held_chance", "kept_chance", "boundary"),
+    "workspace.boundary": ("held_chance", "kept_chance", "boundary"),
     "commands": ("Commands", "Loads",),
     "controlled.control": ("control",),
     "controlled.plant": ("SensorNoise",),
@@ -122,7 +122,7 @@ _MODULES = {
         "BarBalance", "BarManifold", "Midlines", "bar_balances", "bar_manifold", "midline_points",
     ),
     "workspace.spans": ("SlackSpan", "slack_spans"),
-    "workspace.zones": ("Zone", "feasible", "slack_zones", "tension_margin"),
+    "workspace.margins": ("Zone", "feasible", "slack_zones", "tension_margin"),
 }  # fmt: skip
 _WHERE = {name: module for module, names in _MODULES.items() for name in names}
 

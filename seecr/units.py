@@ -81,7 +81,13 @@ UNITS = (
 
 
 _SHOWN = {unit.si: unit for unit in UNITS if unit.shown}
-_TYPED = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)")
+_TYPED = re.compile(r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(\S*)")
+
+
+def number_and_unit(text: str) -> tuple[float, str] | None:
+    """A number as people type it, and what stands behind it; None if it does not begin with one."""
+    match = _TYPED.fullmatch(text.strip())
+    return None if match is None else (float(match[1]), match[2])
 
 
 def in_si(text: str, si: str) -> float | None:
@@ -91,11 +97,11 @@ def in_si(text: str, si: str) -> float | None:
         text: as people type it. si: the SI unit of the quantity.
     """
     names = {name: unit for unit in UNITS if unit.si == si for name in (unit.suffix, *unit.also)}
-    match = _TYPED.fullmatch(text.strip())
-    if match is None or match[2] not in (*names, ""):
+    typed = number_and_unit(text)
+    if typed is None or typed[1] not in (*names, ""):
         return None
-    value = float(match[1])
-    return names[match[2]].to_si(value) if match[2] else value
+    value, name = typed
+    return names[name].to_si(value) if name else value
 
 
 def in_unit(si: str) -> tuple[float, str]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import datetime
@@ -28,7 +27,7 @@ from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.result import COORDINATES, Record, Result, rows_of
-from seecr.units import UNITS
+from seecr.units import UNITS, number_and_unit
 
 
 def _load_columns(loads: Loads) -> Iterator[tuple[str, list[Any]]]:
@@ -67,8 +66,6 @@ LEAST, MOST = 1e-15, 1e15
 # Of noise: beside less, what effects do is so large that rounding leaves nothing of the rest.
 LEAST_NOISE = 1e-9
 
-_NUMBER = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(\S*)\s*")
-
 
 def parse_quantity(label: str, kind: str, text: str, least: float = LEAST) -> float:
     """A positive number with its unit, in SI.
@@ -100,10 +97,10 @@ def parse_kind(
     }  # fmt: skip
     examples = " or ".join(EXAMPLE[kind] for kind in kinds)
     words = f"{label}: expected a number with its unit ({', '.join(units)}) such as {examples}"
-    match = _NUMBER.fullmatch(text)
-    if match is None:
+    typed = number_and_unit(text)
+    if typed is None:
         raise CrosscheckError(f"{words}, got {text!r}")
-    value, name = float(match.group(1)), match.group(2)
+    value, name = typed
     if name not in units:
         got = f"unit {name!r}" if name else "no unit"
         raise CrosscheckError(f"{words}, got {got} in {text!r}")

@@ -30,14 +30,13 @@ from crosscheck.planning.planned import (
     near_slack,
     planned,
 )
-from crosscheck.planning.proposer import propose
+from crosscheck.planning.proposer import chosen_poses, propose
 from crosscheck.planning.result import Plan, Visible, all_visible
 from crosscheck.planning.room import Demand, Room, usual_tension
 from crosscheck.planning.visibility import (
     EXACT,
     Signal,
     Wanted,
-    chosen_poses,
     signal_left,
     signals,
     signals_like,

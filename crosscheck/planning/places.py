@@ -28,7 +28,7 @@ from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
 from seecr.units import short
-from seecr.workspace.zones import feasible
+from seecr.workspace.margins import feasible
 
 # Axes in which the last one is against gravity, whichever way that is in the base frame.
 

@@ -19,7 +19,7 @@ from seecr.effects import Terms, catalogue
 from seecr.effects.base import Readings
 from seecr.pose import Array, rxyz_from_quat
 from seecr.prediction.experiment import Experiment
-from seecr.workspace.zones import load_scale
+from seecr.workspace.margins import load_scale
 
 # Noise of a good tracker relative to the mean cable length (30 micrometres on a DemoBot), of its
 # angles, and of load cells relative to the mean tension.

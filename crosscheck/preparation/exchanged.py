@@ -25,7 +25,7 @@ from crosscheck.preparation.unread import rows_of_files
 from seecr.pose import Array, quat_from_rxyz
 from seecr.prediction.experiment import Prediction
 from seecr.units import short
-from seecr.workspace.zones import balance_equations
+from seecr.workspace.margins import balance_equations
 
 # An order of cables leaves so many times less than that of the file, and than any other. Effects
 # leave some of what they explain, but exchanged cables differ by decimetres and by most of a load.

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from seecr.errors import InputError
 from seecr.pose import LARGEST, Array
-from seecr.units import UNITS
+from seecr.units import UNITS, number_and_unit
 
 if TYPE_CHECKING:
     import mujoco
@@ -40,7 +40,6 @@ PASSIVE, CONSTANT = "passive", "constant_tension"
 """Names of the custom texts."""
 
 _FORCES = {unit.suffix: unit for unit in UNITS if unit.si == "N"}
-_NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(.*)")
 # A unit after a space belongs to the number before it.
 _SPACED = re.compile(rf"(?<=[\d.])\s+(?=(?:{'|'.join(_FORCES)})(?:[\s,]|$))")
 
@@ -130,10 +129,10 @@ def _tensions(text: str, names: Sequence[str], faults: list[str]) -> dict[str, f
 def _force(given: str) -> float | str:
     """A force [N] of text, or what is wrong with it."""
     expected = "expected a force such as 40N"
-    match = _NUMBER.fullmatch(given)
-    if match is None:
+    typed = number_and_unit(given)
+    if typed is None:
         return f"{expected}, got {given!r}" if given else f"{expected} after =, got none"
-    number, unit = float(match[1]), match[2]
+    number, unit = typed
     if unit not in _FORCES:
         what = f"unknown unit {unit!r}" if unit else f"{given} has no unit"
         return f"{what}; {expected}, in {', '.join(_FORCES)}"

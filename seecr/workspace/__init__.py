@@ -15,12 +15,12 @@ if TYPE_CHECKING:
         bar_manifold,
         midline_points,
     )
+    from seecr.workspace.boundary import boundary, held_chance, kept_chance
     from seecr.workspace.grid import Workspace
     from seecr.workspace.maps import default_axes, workspace_map
-    from seecr.workspace.margins import boundary, held_chance, kept_chance
+    from seecr.workspace.margins import Zone, feasible, slack_zones, tension_margin
     from seecr.workspace.spans import SlackSpan, slack_spans
     from seecr.workspace.stored import StoredMap, store_map
-    from seecr.workspace.zones import Zone, feasible, slack_zones, tension_margin
 
 __all__ = [
     "BarBalance", "BarManifold", "Midlines", "SlackSpan", "StoredMap", "Workspace", "Zone",
@@ -33,12 +33,12 @@ _MODULES = {
     "bars": (
         "BarBalance", "BarManifold", "bar_balances", "bar_manifold", "Midlines", "midline_points",
     ),
-    "margins": ("held_chance", "kept_chance", "boundary"),
+    "boundary": ("held_chance", "kept_chance", "boundary"),
     "grid": ("Workspace",),
     "maps": ("default_axes", "workspace_map"),
     "spans": ("SlackSpan", "slack_spans"),
     "stored": ("StoredMap", "store_map"),
-    "zones": ("Zone", "feasible", "slack_zones", "store_map", "tension_margin"),
+    "margins": ("Zone", "feasible", "slack_zones", "tension_margin"),
 }  # fmt: skip
 
 __getattr__ = lazily(__name__, {name: m for m, names in _MODULES.items() for name in names})

@@ -18,7 +18,7 @@ from seecr.pose import Array, cross
 from seecr.result import MOTION, Record, Result, rows_of
 from seecr.statics.solution import Status
 from seecr.units import millimetres
-from seecr.workspace.zones import is_held
+from seecr.workspace.margins import is_held
 
 # How far a grid extends: over the exit points, as far below home as above, within the joints.
 #

@@ -26,6 +26,7 @@ from seecr.pose import NORM_TOLERANCE, Array
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.prediction.model import GivenEffects
 from seecr.statics.starts import commanded_poses
+from seecr.workspace.boundary import asked_chance, check_chance, margins_at, read_once
 from seecr.workspace.grid import (
     NEVER,
     Workspace,
@@ -35,7 +36,6 @@ from seecr.workspace.grid import (
     refuse_other_joints,
     refuse_unreached,
 )
-from seecr.workspace.margins import asked_chance, check_chance, margins_at, read_once
 
 Progress = Callable[[int], None]
 """Called with the number of poses done since the last call."""

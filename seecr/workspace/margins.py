@@ -1,327 +1,366 @@
-"""Margins of a robot with effects at given poses, their probabilities, and the edge they end at."""
+"""Where a robot can hold its platform, and where its cables go slack.
+
+The static-feasible workspace (SFW) is the set of poses at which non-negative tensions balance the
+load (paper, eq 3, Figs 10 and 11). The elasticity of the cables does not change it: the SFW is
+about the tensions that are possible at a pose, not about whether the platform comes to rest there
+when it is commanded to.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seecr.arguments import finite, numbers
+from seecr.commands import Commands
+from seecr.compiled.columns import EXTERNAL_FORCE, EXTERNAL_MOMENT
+from seecr.counted import counted
+from seecr.description.joints import motion_columns, values_of_pose
 from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
-from seecr.effects.terms import Terms
 from seecr.errors import InputError
-from seecr.inverse.correction import margins_in_place
-from seecr.pose import Array
+from seecr.parallel import in_parts
+from seecr.pose import Array, all_finite, quat_rotate, transform_points
 from seecr.prediction.experiment import Experiment, effects_of
-from seecr.prediction.model import GivenEffects, Model, model_given
-from seecr.prediction.sensitivity import sensitivities
-from seecr.prediction.uncertainty import moving_covariance
-from seecr.statics.starts import Commanded, commanded_poses, commands_from
+from seecr.result import Record, Result
+from seecr.statics.solution import Solution, check_solution
+from seecr.statics.starts import commanded_poses
+from seecr.statics.tables import Tables, assemble
+from seecr.tensions.balance import balance_of, bends, driven_tables
 from seecr.tensions.distribution import tension_limits
-from seecr.workspace.zones import is_held, load_scale, tension_margin
+from seecr.tensions.max_margin import margins_inside
+
+if TYPE_CHECKING:
+    from seecr.prediction.model import GivenEffects
+
+# Part of the load that may stay unbalanced, by rounding of the tensions.
+_BALANCED = 1e-9
+# Singular values of W below this part of the largest count as zero.
+_SINGULAR = 1e-9
 
 
-def margins_at(
-    robot: Robot, poses: Array, lowest: ArrayLike, highest: ArrayLike,
-    wrenches: ArrayLike | None, effects: GivenEffects, thorough: bool = True,
-) -> Array:  # fmt: skip
-    """Margins (n,) [N]; robots with too few cables are solved for the orientation.
+@dataclass(frozen=True, repr=False)
+class Zone(Result):
+    """Consecutive poses of a trajectory with the same number of slack cables.
 
-    Theirs are those of the best orientation found, and minus infinity if there is none, after a
-    search that is ``thorough`` or not.
+    Attributes:
+        first: index of its first pose.
+        last: index of its last pose.
+        slack: number of slack cables; None where the solve did not converge.
     """
-    acting = effects_of(effects, robot)
-    if robot.n_driven >= robot.n_dof:
-        return tension_margin(
-            robot, poses, lowest=lowest, highest=highest, wrenches=wrenches, effects=acting
-        )
-    if wrenches is not None:
-        raise InputError(
-            f"{robot.name} has fewer cables than degrees of freedom, so it holds no set of "
-            "wrenches; expected none"
-        )
-    return margins_in_place(robot, poses, acting, lowest, highest, thorough)
+
+    first: int
+    last: int
+    slack: int | None
+
+    def lines(self) -> list[str]:
+        """One line: which poses, and how many cables are slack there."""
+        one, last = self.first == self.last, self.last
+        poses = f"pose {last}" if one else f"poses {self.first} to {last}"
+        count = "no answer" if self.slack is None else counted(self.slack, "slack cable")
+        return [f"{poses}: {count}"]
+
+    def as_json(self) -> Record:
+        """Its only row."""
+        return self.records()[0]
+
+    def records(self) -> Sequence[Record]:
+        """One row."""
+        return [{"first_pose": self.first, "last_pose": self.last, "slack_cables": self.slack}]
 
 
-def read_once(effects: GivenEffects, robot: Robot) -> GivenEffects:
-    """The same effects, but a model's file is read: every part of a map needs it."""
-    return model_given(effects, robot) if isinstance(effects, str | Path) else effects
-
-
-# Probabilities that poses are held and tensions stay within limits, from a model's covariance.
-
-# Number of draws of the parameters for tensions, which are linear in them.
-_LINEAR = 4096
-# Number of draws for poses, stage by stage. If the draws so far all agree, and their mean lies this
-# many of their standard deviations from the limit, the rest is left out: few draws may happen to
-# lie near each other.
-_STAGES = ((4, 15.0), (16, 6.0), (64, 4.0), (256, 0.0))
-# Rows per batch.
-_PART = 64
-_NO_COVARIANCE = (
-    "probabilities need a model with its covariance; expected a table [calibration] or [fit], "
-    "which crosscheck calibrate always writes, and add and diagnose if the data determine every "
-    "value"
-)
-
-
-def kept_chance(
-    robot: GivenRobot,
-    commands: Commanded,
-    model: Model | str | Path,
-    *,
-    lowest: ArrayLike = 0.0,
-    highest: ArrayLike = np.inf,
-) -> Array | None:
-    """The probability that all tensions stay within limits, given the uncertainty of the model.
-
-    Tensions are to first order in the parameters. A taut cable that would go slack violates a limit
-    of zero; a slack cable stays slack.
-
-    Args:
-        robot: as described, or its MJCF.
-        commands: n rows as in :func:`seecr.predict`, such as those of a correction; NaN lengths
-            mark rows without any.
-        model: as ``crosscheck calibrate`` writes it, or its file.
-        lowest, highest: (m,) or one [N].
-
-    Returns:
-        (n,), NaN for a row without equilibrium; None if the model keeps no covariance.
-
-    Raises:
-        InputError: wrong shapes, or limits that contradict each other.
-        InputFileError: no such file, or no model of this robot in it.
-
-    Example:
-        ``seecr.kept_chance(robot, poses, "model.toml", highest=50.0)``
-    """
-    robot = robot_of(robot)
-    known = moving_covariance(model_given(model, robot))
-    if known is None:
-        return None
-    terms, covariance = known
-    commands = commands_from(commands, robot)
-    low, high = tension_limits(robot, lowest, highest)
-    lost: NDArray[np.bool_] = np.zeros(len(commands), dtype=bool)
-    if commands.lengths is not None:
-        lost |= np.isnan(commands.lengths).any(axis=1)
-        plain = robot.commanded_lengths(commands.pose)
-        lengths = np.where(lost[:, None], plain, commands.lengths)
-        commands = replace(commands, lengths=lengths)
-    experiment = Experiment(robot, commands)
-    at = experiment.predict(terms.effects)
-    drawn = _drawn(terms, covariance, _LINEAR) - terms.vector
-    out = np.ones(len(commands))
-    room = 1e-9 * load_scale(robot)
-    slopes = np.zeros((len(out), robot.n_cables, 0))
-    if len(terms):
-        slopes = sensitivities(experiment, terms, at)[:, 6:]
-    for first in range(0, len(out), _PART):
-        rows = slice(first, first + _PART)
-        tensions = at.tensions[rows, None] + np.einsum("nmp,kp->nkm", slopes[rows], drawn)
-        lines, falls = tensions[..., robot.driven], robot.falls[robot.driven]
-        kept = (lines >= low / falls - room) & (lines <= high / falls + room)
-        out[rows] = kept.all(axis=2).mean(axis=1)
-    out[lost | ~at.solved] = np.nan
-    return out
-
-
-def held_chance(
+def feasible(
     robot: GivenRobot,
     poses: ArrayLike,
-    model: Model | str | Path,
     *,
+    wrench: ArrayLike | None = None,
+    wrenches: ArrayLike | None = None,
     lowest: ArrayLike = 0.0,
     highest: ArrayLike = np.inf,
-    wrenches: ArrayLike | None = None,
-) -> Array | None:
-    """The probability that poses can be held within limits, given the uncertainty of the model.
-
-    It is the part of 256 models, drawn from the covariance, that can hold the pose; of fewer, from
-    four on, if these are all far on one side. Values are clipped to their bounds. A model with
-    which a cable's equations have no solution holds nothing.
-
-    Args:
-        robot: as described, or its MJCF.
-        poses: (n, 7).
-        model: as ``crosscheck calibrate`` writes it, or its file.
-        lowest, highest, wrenches: as in :func:`seecr.tension_margin`.
-
-    Returns:
-        (n,); None if the model keeps no covariance. For robots with fewer cables than degrees of
-        freedom, the probability that the position can be held in some orientation.
-
-    Raises:
-        InputError: wrong shapes, quaternions that are no rotations, or limits that contradict each
-            other.
-        InputFileError: no such file, or no model of this robot in it.
-
-    Example:
-        ``seecr.held_chance(robot, poses, "model.toml", lowest=0.5)``
-    """
-    robot = robot_of(robot)
-    known = moving_covariance(model_given(model, robot))
-    if known is None:
-        return None
-    terms, covariance = known
-    places, limits = commanded_poses(poses, robot=robot), (lowest, highest, wrenches)
-    vectors = _drawn(terms, covariance, _STAGES[-1][0])
-    solved = robot.n_driven < robot.n_dof
-    out, rows = np.zeros(len(places)), np.arange(len(places))
-    seen = np.zeros((0, len(places)))
-    for count, sure in _STAGES:
-        drawn = [terms.with_vector(one).effects for one in vectors[len(seen) : count]]
-        # where full searches find no orientation for the first few, none is found for the others
-        # either, unless that of a neighbour is nearly one
-        hopeful = np.ones(len(rows), dtype=bool)
-        if len(seen):
-            hopeful &= np.isfinite(seen).any(axis=0)
-        more = [_margins(robot, places[rows], limits, one, hopeful) for one in drawn]
-        seen = np.concatenate([seen, more])
-        out[rows] = is_held(robot, seen).mean(axis=0)
-        near = ~(np.isin(out[rows], (0.0, 1.0)) & _far(seen, sure, solved))
-        rows, seen = rows[near], seen[:, near]
-        if len(rows) == 0:
-            break
-    return out
-
-
-def _margins(
-    robot: Robot, places: Array, limits: tuple[ArrayLike, ArrayLike, ArrayLike | None],
-    effects: GivenEffects, hopeful: NDArray[np.bool_],
-) -> Array:  # fmt: skip
-    """Margins (n,) at places; full searches are only made at those that are ``hopeful`` (n,)."""
-    out = margins_at(robot, places, *limits, effects, thorough=False)
-    again = np.flatnonzero(hopeful & np.isneginf(out))
-    if len(again) and robot.n_driven < robot.n_dof:
-        out[again] = margins_at(robot, places[again], *limits, effects)
-    return out
-
-
-def _far(margins: Array, sure: float, solved: bool) -> NDArray[np.bool_]:
-    """Whether the mean of margins (draws, n) is so many standard deviations from zero.
-
-    Infinite limits, or poses out of reach, are far from any edge. But if the orientation has to be
-    solved for, minus infinity says nothing about how near one is that can be held.
-    """
-    infinite: NDArray[np.bool_] = np.asarray(~np.isfinite(margins).all(axis=0))
-    far = np.full(len(infinite), not solved)
-    some = margins[:, ~infinite]
-    far[~infinite] = np.abs(some.mean(axis=0)) > sure * some.std(axis=0)
-    return far
-
-
-def check_chance(model: GivenEffects) -> None:
-    """Check that poses can have probabilities, before hours are spent on them.
-
-    Raises:
-        InputError: not a model with a covariance.
-    """
-    if not isinstance(model, Model) or moving_covariance(model) is None:
-        raise InputError(_NO_COVARIANCE)
-
-
-def asked_chance(
-    robot: Robot, poses: Array, model: GivenEffects, lowest: ArrayLike, highest: ArrayLike,
-    wrenches: ArrayLike | None,
-) -> Array:  # fmt: skip
-    """Like :func:`held_chance`, but a model with a covariance is required.
-
-    Raises:
-        InputError: it is not one.
-    """
-    found = None
-    if isinstance(model, Model):
-        found = held_chance(robot, poses, model, lowest=lowest, highest=highest, wrenches=wrenches)
-    if found is None:
-        raise InputError(_NO_COVARIANCE)
-    return found
-
-
-def _drawn(terms: Terms, covariance: Array, count: int) -> Array:
-    """Evenly spread draws (count, p) of a normal distribution about the terms' values, in bounds.
-
-    A value beyond its bound is set to the bound, as a fit to such data would do. Rejecting it is no
-    alternative: many effects are absent at a bound, and hardly any draw is within all bounds.
-    """
-    own = terms.vector
-    if len(own) == 0:
-        return np.zeros((count, 0))
-    # scaled to unit variances: a coefficient of the cubic stretch is off by 10^5 and a point by
-    # 10^-4 m, and rounding would leave nothing of the point's part
-    error = np.sqrt(np.diag(covariance))
-    unit = np.where(error > 0.0, error, 1.0)
-    values, vectors = np.linalg.eigh(covariance / unit / unit[:, None])
-    from scipy.special import ndtri  # both take a second to import
-    from scipy.stats import qmc
-
-    evenly = qmc.Sobol(len(covariance), seed=0).random(count)
-    drawn = ndtri(np.clip(evenly, 1e-9, 1.0 - 1e-9))
-    drawn = own + unit * (drawn * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
-    lower, upper = np.minimum(terms.lower, own), np.maximum(terms.upper, own)
-    return np.asarray(np.clip(drawn, lower, upper))
-
-
-# The edge of a workspace, along straight lines that lead out of it.
-
-
-def boundary(
-    robot: GivenRobot,
-    inside: ArrayLike,
-    outside: ArrayLike,
-    *,
-    tolerance: float = 1e-4,
-    lowest: ArrayLike = 0.0,
-    highest: ArrayLike = np.inf,
-    wrenches: ArrayLike | None = None,
     effects: GivenEffects = (),
-    at_least: float | None = None,
-) -> Array:
-    """Points on the workspace's edge, between poses that can be held and poses that cannot.
-
-    They are found by bisection along the straight line between the two positions.
+) -> NDArray[np.bool_]:
+    """Whether tensions within bounds can balance the load: W tau + w_e = 0 (paper, eq 3).
 
     Args:
-        robot: as described, or its MJCF.
-        inside, outside: (n, 7) poses, with the same orientation in each row.
-        tolerance: [m] within which the edge is found.
-        lowest, highest, wrenches: as in :func:`seecr.tension_margin`.
+        robot: as described, or its MJCF; its mass, centre of mass and gravity are the load.
+        poses: (n, 7) or (7,), actual poses of the platform.
+        wrench: (6,) or (n, 6) external force [N] at the platform origin and moment [N m].
+        wrenches: (k, 6) a set of wrenches, each in addition to ``wrench``; the load must be
+            balanced under each of them.
+        lowest: (m,) or one [N], not negative.
+        highest: (m,) or one [N]; infinite for none.
         effects: effects of the robot: a model, its file, or effects with values.
-        at_least: count poses as held if their probability is at least this, given the uncertainty
-            of a model with a covariance; by default, those that the model's own values hold.
 
     Returns:
-        (n, 7) the last poses found that can be held.
+        (n,) bool.
 
     Raises:
-        InputError: a pose is on the wrong side, the tolerance is not positive, or a probability is
-            asked for without a covariance.
+        InputError: wrong shapes, numbers that are not finite, quaternions that are no rotations,
+            limits that contradict each other, or something other than effects with values.
+        InputFileError: there is no such file, or it holds no model of this robot.
 
     Example:
-        ``seecr.boundary(robot, held, not_held, lowest=0.5)``
+        ``seecr.feasible(robot, poses, lowest=0.5, highest=50.0)``
     """
     robot = robot_of(robot)
-    if not 0.0 < tolerance < np.inf:
-        raise InputError(f"an edge's tolerance [m] must be above 0 and finite, got {tolerance:g}")
-    effects = read_once(effects, robot)
-    near = commanded_poses(inside, "inside", robot)
-    far = commanded_poses(outside, "outside", robot)
+    margin = tension_margin(
+        robot, poses, wrench=wrench, wrenches=wrenches, lowest=lowest, highest=highest,
+        effects=effects,
+    )  # fmt: skip
+    return is_held(robot, margin)
 
-    def held(poses: Array) -> NDArray[np.bool_]:
-        if at_least is not None:
-            chance = asked_chance(robot, poses, effects, lowest, highest, wrenches)
-            return np.asarray(chance >= at_least)
-        return is_held(robot, margins_at(robot, poses, lowest, highest, wrenches, effects))
 
-    if not held(near).all() or held(far).any():
-        raise InputError("boundary needs poses inside that can be held, and outside that cannot")
-    for _ in range(200):
-        if np.all(np.linalg.norm(far[:, :3] - near[:, :3], axis=1) <= tolerance):
-            break
-        middle = near.copy()
-        middle[:, :3] = 0.5 * (near[:, :3] + far[:, :3])
-        there = held(middle)[:, None]
-        near, far = np.where(there, middle, near), np.where(there, far, middle)
-    return near
+def tension_margin(
+    robot: GivenRobot,
+    poses: ArrayLike,
+    *,
+    wrench: ArrayLike | None = None,
+    wrenches: ArrayLike | None = None,
+    lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf,
+    effects: GivenEffects = (),
+) -> Array:
+    """How far inside their bounds all tensions that balance the load can stay [N].
+
+    It is exact: the largest t with lowest + t <= tau <= highest - t and W tau + w_e = 0. It is
+    negative if tensions within bounds cannot balance the load, and infinite if cables can be
+    tightened without limit. A cable with weight pulls at least about what it weighs; if a pose can
+    only be held with less, by cables that hang loosely, the margin is zero, and negative ones count
+    from what such cables weigh.
+
+    Args:
+        robot, poses, wrench, lowest, highest: as for :func:`feasible`.
+        wrenches: (k, 6) a set of wrenches, each in addition to ``wrench``; the smallest margin
+            counts. All wrenches in their convex hull can then be balanced as well.
+        effects: as there. If cables have weight or yield, their balance is not linear in the
+            tensions; it is then solved in rounds.
+
+    Returns:
+        (n,) [N]; minus infinity if W is singular or there are too few cables, and no tensions
+        within bounds balance the load.
+
+    Raises:
+        InputError, InputFileError: as for :func:`feasible`.
+
+    Example:
+        ``seecr.tension_margin(robot, poses, lowest=0.5, highest=50.0)``
+    """
+    from seecr.compiled.tensions import margins_at  # takes a while to import
+
+    robot = robot_of(robot)
+    places = commanded_poses(poses, robot=robot)
+    low, high = tension_limits(robot, lowest, highest)
+    if wrench is not None:
+        wrench = _wrench(wrench, len(places))
+    acting = effects_of(effects, robot)
+    if acting or not robot.all_driven:
+        return margins_with(robot, places, acting, lowest, highest, wrenches, wrench)
+    out, scale = np.full(len(places), np.nan), load_scale(robot)
+    by_row = wrench is not None and np.ndim(wrench) == 2
+    if not (robot.joints or by_row or robot.n_driven < robot.n_dof):
+        some = np.zeros((1, 6)) if wrenches is None else wrenches_of(wrenches)
+        some = some if wrench is None else some + wrenches_of(wrench)
+        in_parts(
+            lambda part: margins_at(
+                places[part], robot.exit_points, robot.anchor_points, robot.centre_of_mass,
+                robot.mass * robot.gravity, some, low, high, robot.length, scale, out[part],
+            ),
+            len(places),
+        )  # fmt: skip
+    left = np.flatnonzero(np.isnan(out))
+    if len(left):
+        own = np.asarray(wrench)[left] if by_row else wrench
+        out[left] = margins_from(*_loads(robot, places[left], own, wrenches), low, high, scale)
+    return out
+
+
+def margins_with(
+    robot: Robot, poses: Array, effects: GivenEffects, lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf, wrenches: ArrayLike | None = None, wrench: Array | None = None,
+) -> Array:  # fmt: skip
+    """Margins (n,) [N] of :func:`seecr.tension_margin`, of a robot with effects."""
+    low, high = tension_limits(robot, lowest, highest)
+    told = Commands(poses, lengths=robot.commanded_lengths(poses), told=True)
+    tables = assemble(Experiment(robot, told).setup(effects_of(effects, robot)))
+    tables = driven_tables(tables, robot)
+    if wrench is not None:
+        tables = _pushed(tables, wrench)
+    some = np.zeros((1, 6)) if wrenches is None else wrenches_of(wrenches)
+    if bends(tables):
+        every = [margins_inside(_pushed(tables, one), low, high) for one in some]
+        return np.asarray(np.min(every, axis=0))
+    matrices, load = balance_of(tables, low)
+    # load of -W tau = w: the signs are those of the gradient
+    loads = load[:, None]
+    if robot.joints and wrenches is not None:
+        # of a wrench only that along the joints must be balanced
+        loads = np.stack([balance_of(_pushed(tables, one), low)[1] for one in some], axis=1)
+    elif wrenches is not None:
+        loads = loads + some * np.where(robot.hinges, 1.0 / robot.length, 1.0)
+    return margins_from(matrices, np.ascontiguousarray(loads), low, high, load_scale(robot))
+
+
+def _pushed(tables: Tables, wrench: Array) -> Tables:
+    """The same tables with an additional external wrench at the platform's origin.
+
+    Args:
+        tables: of n poses. wrench: (6,) or (n, 6) [N, N m].
+    """
+    load = tables.load.copy()
+    load[:, EXTERNAL_FORCE : EXTERNAL_FORCE + 3] += wrench[..., :3]
+    load[:, EXTERNAL_MOMENT : EXTERNAL_MOMENT + 3] += wrench[..., 3:]
+    return replace(tables, load=load)
+
+
+def margins_from(matrices: Array, loads: Array, low: Array, high: Array, scale: float) -> Array:
+    """Margins (n,) [N] of the balance A tau = load, for matrices (n, d, m) and loads (n, k, d).
+
+    Torques are over the robot's length; the smallest margin of k loads counts. Rounding is measured
+    against the load ``scale`` [N].
+    """
+    from seecr.compiled.tensions import margins_of  # takes a while to import
+
+    matrices, out = np.ascontiguousarray(matrices), np.full(len(matrices), np.nan)
+    limits = low[None], high[None], np.array([scale])
+    if matrices.shape[2] >= matrices.shape[1]:
+        in_parts(
+            lambda part: margins_of(matrices[part], loads[part], *limits, out[part]),
+            len(out),
+        )
+    odd = np.flatnonzero(np.isnan(out))
+    if len(odd):
+        out[odd] = _by_rank(matrices[odd], loads[odd], low, high, scale)
+    return out
+
+
+def is_held(robot: Robot, margin: Array) -> NDArray[np.bool_]:
+    """Whether margins [N] mean that a pose can be held, to within rounding."""
+    return np.asarray(margin >= -_BALANCED * load_scale(robot))
+
+
+def load_scale(robot: Robot) -> float:
+    """Load [N] that rounding is measured against: the weight, else a thousandth of E S."""
+    return robot.weight or 1e-3 * float(np.max(robot.ea))
+
+
+def _loads(
+    robot: Robot, poses: Array, wrench: ArrayLike | None, wrenches: ArrayLike | None
+) -> tuple[Array, Array]:
+    """Matrix (n, d, m) and loads (n, k, d) of the balance under each of k wrenches."""
+    matrix, load = balance_equations(robot, poses, wrench)
+    if wrenches is None:
+        return np.array(matrix, order="C"), load[:, None]
+    every = [balance_equations(robot, poses, one)[1] for one in wrenches_of(wrenches)]
+    at_rest = balance_equations(robot, poses)[1]
+    return np.array(matrix, order="C"), np.stack(every, axis=1) + (load - at_rest)[:, None]
+
+
+def _by_rank(matrices: Array, loads: Array, low: Array, high: Array, scale: float) -> Array:
+    """Margins (n,) where W is singular: the balance is reduced to the range of W.
+
+    Minus infinity if the load is outside that range, or if numbers are not finite because a cable's
+    equations have no solution.
+    """
+    from seecr.compiled.tensions import margins_of  # takes a while to import
+
+    out = np.full(len(matrices), -np.inf)
+    sound = np.isfinite(matrices).all(axis=(1, 2)) & np.isfinite(loads).all(axis=(1, 2))
+    rows = np.flatnonzero(sound)
+    limits = low[None], high[None], np.array([scale])
+    left, sizes, _right = np.linalg.svd(matrices[rows], full_matrices=False)
+    rank = np.sum(sizes > _SINGULAR * sizes[:, :1], axis=1)
+    for r in np.unique(rank[rank > 0]):
+        own, base = rows[rank == r], left[rank == r, :, :r]
+        inside = loads[own] @ base
+        beyond = np.linalg.norm(loads[own] - inside @ base.swapaxes(1, 2), axis=2)
+        size = np.linalg.norm(loads[own], axis=2)
+        held = np.flatnonzero((beyond <= _BALANCED * size).all(axis=1))
+        reduced = np.ascontiguousarray(base.swapaxes(1, 2) @ matrices[own])[held]
+        found = np.full(len(held), np.nan)
+        margins_of(reduced, np.ascontiguousarray(inside[held]), *limits, found)
+        out[own[held]] = np.where(np.isnan(found), -np.inf, found)
+    return out
+
+
+def _wrench(value: ArrayLike, n: int) -> Array:
+    wrench = numbers(value, "wrench")
+    if wrench.shape not in ((6,), (n, 6)) or not all_finite(wrench):
+        raise InputError(f"wrench must be (6,) or ({n}, 6) finite numbers, got {wrench.shape}")
+    return wrench
+
+
+def wrenches_of(values: ArrayLike) -> Array:
+    """A set of wrenches (k, 6) [N, N m].
+
+    Raises:
+        InputError: another shape, none, or numbers that are not finite.
+    """
+    some = np.atleast_2d(finite(values, "wrenches [N, N m]"))
+    if some.size == 0:
+        raise InputError(f"wrenches: expected one or more, (k, 6) [N, N m], got {np.shape(values)}")
+    if some.ndim != 2 or some.shape[1] != 6:
+        raise InputError(f"wrenches must be (k, 6) [N, N m], got {np.shape(values)}")
+    return some
+
+
+def slack_zones(solution: Solution) -> list[Zone]:
+    """The zones of a trajectory by number of slack cables, in order (paper, Figs 7 and 11).
+
+    Args:
+        solution: of the trajectory's poses in their order.
+
+    Returns:
+        the zones, each with its rows.
+
+    Raises:
+        InputError: not a solution.
+
+    Example:
+        ``seecr.slack_zones(solution)``
+    """
+    check_solution(solution)
+    counts = [
+        int(row.sum()) if ok else None
+        for row, ok in zip(solution.slack, solution.converged, strict=True)
+    ]
+    edges = [0, *(i for i in range(1, len(counts)) if counts[i] != counts[i - 1]), len(counts)]
+    return [
+        Zone(first, after - 1, counts[first]) for first, after in pairwise(edges) if after > first
+    ]
+
+
+def wrench_matrix(robot: Robot, poses: ArrayLike) -> Array:
+    """W of eq 4 at poses (n, 7): unit vectors over moments at the platform origin, (n, 6, m)."""
+    places = commanded_poses(poses, robot=robot)
+    anchors = transform_points(places, robot.anchor_points)
+    cables = robot.exit_points - anchors
+    size = np.linalg.norm(cables, axis=-1, keepdims=True)
+    # a cable of zero length has no direction
+    unit = cables / np.where(size > 0.0, size, np.inf)
+    moment = np.cross(anchors - places[:, None, :3], unit)
+    return np.swapaxes(np.concatenate([unit, moment], axis=-1), 1, 2)
+
+
+def balance_equations(
+    robot: Robot, poses: Array, wrench: ArrayLike | None = None
+) -> tuple[Array, Array]:
+    """The balance W tau = load, (n, d, m) and (n, d), with torques over the robot's length."""
+    n = len(poses)
+    outer = np.zeros(6) if wrench is None else _wrench(wrench, n)
+    weight = robot.mass * robot.gravity
+    arm = quat_rotate(poses[:, 3:], robot.centre_of_mass)
+    load = outer + np.concatenate([np.tile(weight, (n, 1)), np.cross(arm, weight)], axis=1)
+    matrix = wrench_matrix(robot, poses)
+    if not robot.joints:
+        unit = np.where(robot.hinges, 1.0 / robot.length, 1.0)
+        return matrix * unit[:, None], -load * unit
+    # joints carry the wrench that does no work along their motions; only the rest must be balanced
+    columns = motion_columns(values_of_pose(robot, poses)[1], poses[:, :3])
+    columns = columns * np.where(robot.hinges, 1.0 / robot.length, 1.0)
+    along = np.swapaxes(columns, 1, 2)
+    return along @ matrix, -np.einsum("ndk,nk->nd", along, load)

@@ -19,7 +19,7 @@ from seecr.equilibrium.solving import METHODS
 from seecr.parallel import processors
 from seecr.pose import pose_difference
 from seecr.workspace.maps import default_axes, workspace_map
-from seecr.workspace.zones import balance_equations
+from seecr.workspace.margins import balance_equations
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.slow]
 

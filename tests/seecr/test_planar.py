@@ -13,8 +13,8 @@ from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import transform_points
 from seecr.statics.solution import Solution, Status
+from seecr.workspace.margins import feasible, slack_zones
 from seecr.workspace.planar import bar_equilibria, bar_tilt, midline_point, solution_manifold
-from seecr.workspace.zones import feasible, slack_zones
 
 EXITS = np.array([[0.0, 0.5], [1.0, 0.5]])
 PLACE = np.array([0.3, 0.0])

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from seecr.description.robot import Robot
 from seecr.pose import Array
 from seecr.tensions.distribution import balanced, tension_limits
-from seecr.workspace.zones import balance_equations
+from seecr.workspace.margins import balance_equations
 
 
 def unbalanced(

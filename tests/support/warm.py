@@ -13,7 +13,7 @@ from seecr.prediction.sensitivity import sensitivities
 from seecr.statics.tables import assemble
 from seecr.tensions.balance import straight_balance
 from seecr.tensions.distribution import can_balance, distribute, innermost
-from seecr.workspace.zones import tension_margin
+from seecr.workspace.margins import tension_margin
 
 # What a walk, a change of all and a change of each cable are needed for.
 EFFECTS = {

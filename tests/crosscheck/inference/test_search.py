@@ -17,10 +17,11 @@ from crosscheck.inference.catalogue import Catalogue, is_field, name_of, part_of
 from crosscheck.inference.evidence import Linear, MemberColumns
 from crosscheck.inference.fit import Data, fit
 from crosscheck.inference.hypothesis import scored
+from crosscheck.inference.posterior import Posterior
 from crosscheck.inference.priors import WITHIN
 from crosscheck.inference.scores import Scores
 from crosscheck.inference.search import Search
-from crosscheck.inference.verdict import Posterior, judged
+from crosscheck.inference.verdict import judged
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.read import together
 from crosscheck.preparation.prepare import prepare

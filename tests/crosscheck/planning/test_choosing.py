@@ -25,7 +25,7 @@ from crosscheck.preparation.prepare import prepare
 from seecr.description.mjcf import load_robot, model_path
 from seecr.effects import Terms
 from seecr.equilibrium.solving import solve
-from seecr.workspace.zones import feasible
+from seecr.workspace.margins import feasible
 
 pytestmark = pytest.mark.slow
 

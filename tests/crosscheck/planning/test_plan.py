@@ -18,11 +18,10 @@ from crosscheck.measurements.read import together
 from crosscheck.planning.design import choose_poses, make_plan
 from crosscheck.planning.places import detours, extensions, more_poses
 from crosscheck.planning.planned import MORE_POSES, READ, Adding, Reads, near_slack, planned
-from crosscheck.planning.proposer import NEEDED, telling_apart
+from crosscheck.planning.proposer import NEEDED, chosen_poses, telling_apart
 from crosscheck.planning.room import Room, usual_tension
 from crosscheck.planning.visibility import (
     Wanted,
-    chosen_poses,
     needed,
     signal_left,
     signals,
@@ -34,7 +33,7 @@ from seecr.effects import Terms
 from seecr.equilibrium.solving import solve
 from seecr.files import json_text
 from seecr.pose import rotvec_from_quat
-from seecr.workspace.zones import feasible
+from seecr.workspace.margins import feasible
 
 pytestmark = pytest.mark.slow
 

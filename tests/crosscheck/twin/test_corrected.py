@@ -15,7 +15,7 @@ from seecr.description.mjcf import CABLES, load_robot, model_path
 from seecr.effects import Term
 from seecr.inverse.correction import correct
 from seecr.pose import pose_difference
-from seecr.workspace.zones import feasible
+from seecr.workspace.margins import feasible
 
 
 @pytest.mark.parametrize("cable", CABLES)

@@ -20,7 +20,7 @@ from seecr.description.mjcf import CABLES, load_robot, model_names, model_path, 
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.prediction.model import load_model
-from seecr.workspace.zones import tension_margin
+from seecr.workspace.margins import tension_margin
 
 ROOT = Path(__file__).resolve().parents[3]
 DEMOBOTS = ("demobot_cogiro", "demobot_parallel")

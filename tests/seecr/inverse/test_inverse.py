@@ -13,7 +13,7 @@ import seecr
 from seecr.compiled.columns import STRAIN
 from seecr.inverse.lengths import damped
 from seecr.pose import pose_add, pose_difference, quat_to_matrix
-from seecr.workspace.zones import balance_equations
+from seecr.workspace.margins import balance_equations
 
 MANY = ("hysteresis", "creep", "exit_friction", "backlash", "cable_weight")
 TENSION_ONLY = {"tracker_frame", "tracker_target", "tracker_scale", "tension_scale"}

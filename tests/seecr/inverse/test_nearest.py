@@ -18,7 +18,7 @@ from seecr.inverse.nearest import nearest
 from seecr.inverse.nearest_problem import NearestProblem, PlatformMotion
 from seecr.inverse.nearest_sqp import solve_sqp
 from seecr.pose import Array, pose_difference, quat_from_rotvec, transform_points
-from seecr.workspace.zones import balance_equations
+from seecr.workspace.margins import balance_equations
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from seecr.statics.tables import Tables, assemble
 from seecr.tensions.balance import least_of_heavy
 from seecr.tensions.max_margin import MaxMargin, max_margin_tensions
 from seecr.tensions.rest_lengths import hold
-from seecr.workspace.zones import margins_with
+from seecr.workspace.margins import margins_with
 
 LARGE = seecr.load_robot("cogiro_large")
 SAG = seecr.load_model(seecr.model_path("cogiro_large").parent / "sag.toml", LARGE)

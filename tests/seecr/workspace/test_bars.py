@@ -14,8 +14,8 @@ from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import transform_points
 from seecr.workspace.bars import bar_balances, bar_manifold, midline_points
+from seecr.workspace.margins import balance_equations
 from seecr.workspace.planar import bar_equilibria, bar_tilt, midline_point
-from seecr.workspace.zones import balance_equations
 
 BAR = load_robot(model_path("planar_two_cable"))
 

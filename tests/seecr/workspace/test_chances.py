@@ -21,9 +21,9 @@ from seecr.show.batch_words import chance_lines, likely_lines
 from seecr.show.files import write_arrays
 from seecr.statics.solution import Solution
 from seecr.workspace import margins
+from seecr.workspace.boundary import boundary, held_chance, kept_chance, margins_at
 from seecr.workspace.maps import workspace_map
-from seecr.workspace.margins import boundary, held_chance, kept_chance, margins_at
-from seecr.workspace.zones import margins_with, tension_margin
+from seecr.workspace.margins import margins_with, tension_margin
 
 
 def drawn(model: Model, n: int) -> list[Terms]:

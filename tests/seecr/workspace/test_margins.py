@@ -12,9 +12,9 @@ from rectangle import RECTANGLE
 from seecr.description.mjcf import load_robot
 from seecr.effects import Term, Terms
 from seecr.errors import InputError, InputFileError
+from seecr.workspace.boundary import margins_at
 from seecr.workspace.maps import workspace_map
-from seecr.workspace.margins import margins_at
-from seecr.workspace.zones import feasible, is_held, tension_margin
+from seecr.workspace.margins import feasible, is_held, tension_margin
 
 COGIRO = load_robot("demobot_cogiro")
 HOME = COGIRO.reference_pose[None]

@@ -15,7 +15,7 @@ from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import quat_rotate
-from seecr.workspace.zones import Zone, feasible, slack_zones, tension_margin, wrench_matrix
+from seecr.workspace.margins import Zone, feasible, slack_zones, tension_margin, wrench_matrix
 
 pytestmark = pytest.mark.slow
 
