@@ -188,7 +188,8 @@ def of_commit(commit: str) -> dict[str, float]:
     """Microseconds a pose of an older commit, compiled anew, on the same poses, by robot."""
     with tempfile.TemporaryDirectory() as folder:
         tree, file = Path(folder) / "tree", Path(folder) / "poses.npz"
-        np.savez(file, **{name: poses_of(seecr.load_robot(name)) for name in DEMOBOTS})
+        poses: dict[str, Any] = {name: poses_of(seecr.load_robot(name)) for name in DEMOBOTS}
+        np.savez(file, **poses)
         subprocess.run(["git", "worktree", "add", "-q", "--detach", tree, commit], check=True)
         try:
             told = subprocess.run(

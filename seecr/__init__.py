@@ -66,7 +66,7 @@ if TYPE_CHECKING:
         bar_manifold,
         midline_points,
     )
-    from seecr.workspace.boundary import boundary, held_chance, kept_chance
+    from seecr.workspace.edges import boundary, held_chance, kept_chance
     from seecr.workspace.grid import Workspace
     from seecr.workspace.maps import default_axes, with_history, workspace_map
     from seecr.workspace.margins import Zone, feasible, slack_zones, tension_margin
@@ -85,7 +85,7 @@ __version__ = "0.1.0"
 # Imported on first use: the compiled loop and MuJoCo take a while to load.
 _MODULES = {
     "equilibrium.saddles": ("Barrier", "barriers"),
-    "workspace.boundary": ("held_chance", "kept_chance", "boundary"),
+    "workspace.edges": ("held_chance", "kept_chance", "boundary"),
     "commands": ("Commands", "Loads",),
     "controlled.control": ("control",),
     "controlled.plant": ("SensorNoise",),

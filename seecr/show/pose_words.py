@@ -120,7 +120,11 @@ def cable_lines(solution: Solution, spread: Spread | None = None) -> Iterator[st
     for k, name in enumerate(robot.cable_names):
         held = robot.constant_tension_N[k] > 0.0
         slack = "  slack" * bool(solution.slack[0, k])
-        slack += "" if robot.driven[k] and not held else "  passive" + ", constant tension" * held
+        slack += (
+            ""
+            if robot.driven[k] and not held
+            else "  passive" + (", constant tension" if held else "")
+        )
         tension, rest = solution.tensions[0, k] + 0.0, solution.rest_lengths[0, k]
         shown, off = f"{tension:.4f}", ""
         if spread is not None:

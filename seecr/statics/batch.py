@@ -509,8 +509,16 @@ def residual_size(gradient: Array) -> Array:
 
 
 def platform_poses(tables: Tables, deviation: Array) -> Array:
-    """Poses (n, 7) from deviations (n, 7) from the commanded ones."""
-    return deviated(tables.poses, deviation)
+    """Poses (n, 7) from deviations (n, 7) from the commanded ones.
+
+    Of the two quaternions of an orientation each has the one that is nearer to the command's,
+    whichever way a descent went around.
+    """
+    poses = deviated(tables.poses, deviation)
+    around = deviation[:, 3] < 0.0
+    if around.any():
+        poses[around, 3:] *= -1.0
+    return poses
 
 
 def deviations(tables: Tables, poses: Array) -> Array:

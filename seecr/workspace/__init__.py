@@ -15,7 +15,7 @@ if TYPE_CHECKING:
         bar_manifold,
         midline_points,
     )
-    from seecr.workspace.boundary import boundary, held_chance, kept_chance
+    from seecr.workspace.edges import boundary, held_chance, kept_chance
     from seecr.workspace.grid import Workspace
     from seecr.workspace.maps import default_axes, workspace_map
     from seecr.workspace.margins import Zone, feasible, slack_zones, tension_margin
@@ -33,7 +33,7 @@ _MODULES = {
     "bars": (
         "BarBalance", "BarManifold", "bar_balances", "bar_manifold", "Midlines", "midline_points",
     ),
-    "boundary": ("held_chance", "kept_chance", "boundary"),
+    "edges": ("held_chance", "kept_chance", "boundary"),
     "grid": ("Workspace",),
     "maps": ("default_axes", "workspace_map"),
     "spans": ("SlackSpan", "slack_spans"),

@@ -26,7 +26,7 @@ from seecr.pose import NORM_TOLERANCE, Array
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.prediction.model import GivenEffects
 from seecr.statics.starts import commanded_poses
-from seecr.workspace.boundary import asked_chance, check_chance, margins_at, read_once
+from seecr.workspace.edges import asked_chance, check_chance, margins_at, read_once
 from seecr.workspace.grid import (
     NEVER,
     Workspace,

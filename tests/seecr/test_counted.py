@@ -15,7 +15,7 @@ NOUNS = "row|pose|run|cable|line|effect|parameter|file|column|cell|command|case|
 COUNTED = re.compile(rf"\{{[^{{}}]*\}} (?:(?!on )\w+ )?(?:{NOUNS})s\b")
 # What is no number, and numbers that are never one.
 ALLOWED = {
-    "{name} rows", "{what} columns", "{rule.kind.name} readings", "{effect.name} leaves readings",
+    "{name} rows", "{what} columns", "{kind.name} readings", "{effect.name} leaves readings",
     "{MOST_POSES:.0e} poses", "{_ROWS} rows", "{tried} effects", "{m} cables",
     "{_MOST_CHANGES} poses",
 }  # fmt: skip

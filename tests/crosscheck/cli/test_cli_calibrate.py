@@ -14,7 +14,7 @@ from made_diagnoses import SLOW
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.prediction.model import Model, load_model
-from seecr.workspace.boundary import held_chance
+from seecr.workspace.edges import held_chance
 
 HIDDEN = {
     "pulley_radius": {"radius_m": 0.006},

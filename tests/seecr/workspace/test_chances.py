@@ -20,8 +20,8 @@ from seecr.prediction.model import Model, load_model
 from seecr.show.batch_words import chance_lines, likely_lines
 from seecr.show.files import write_arrays
 from seecr.statics.solution import Solution
-from seecr.workspace import margins
-from seecr.workspace.boundary import boundary, held_chance, kept_chance, margins_at
+from seecr.workspace import edges
+from seecr.workspace.edges import boundary, held_chance, kept_chance, margins_at
 from seecr.workspace.maps import workspace_map
 from seecr.workspace.margins import margins_with, tension_margin
 
@@ -84,12 +84,12 @@ def test_poses_far_from_the_limit_are_decided_by_few_models(
         tried[np.isin(poses[:, 0], at[:, 0])] += 1
         return margins_at(robot, at, *rest, **how)
 
-    monkeypatch.setattr(margins, "margins_at", counting)
+    monkeypatch.setattr(edges, "margins_at", counting)
     few = held_chance(ROBOT, poses, model, lowest=0.02)
     assert few is not None
     assert np.all(tried[(few > 0.0) & (few < 1.0)] == 256)
     assert tried.min() == 4
-    monkeypatch.setattr(margins, "_STAGES", ((256, 0.0),))
+    monkeypatch.setattr(edges, "_STAGES", ((256, 0.0),))
     every = held_chance(ROBOT, poses, model, lowest=0.02)
     assert every is not None
     np.testing.assert_allclose(few, every, atol=0.005)
@@ -99,7 +99,7 @@ def test_two_cables_hold_a_position_as_often_as_the_mass_allows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In the middle of two cables the tension is proportional to the mass, whatever else."""
-    monkeypatch.setattr(margins, "_STAGES", ((4, 15.0), (64, 0.0)))
+    monkeypatch.setattr(edges, "_STAGES", ((4, 15.0), (64, 0.0)))
     two = load_robot(model_path("planar_two_cable"))
     (tmp_path / "model.toml").write_text(
         'format = 1\n[[effect]]\nname = "platform_mass"\n[effect.parameters]\n'
@@ -236,7 +236,7 @@ offset_m = { value = 0.0, stderr = 1e-4 }
     mixed = np.random.default_rng(2).normal(size=(p, 2 * p))
     covariance = mixed @ mixed.T * error / np.linalg.norm(mixed, axis=1)
     covariance = covariance * (error / np.linalg.norm(mixed, axis=1))[:, None]
-    draws = margins._drawn(terms, covariance, 4096)
+    draws = edges._drawn(terms, covariance, 4096)
     free = np.isneginf(terms.lower)  # others are put on their bounds
     assert free.sum() > 3 and np.ptp(np.log10(error[free])) > 7.0
     expected = covariance[np.ix_(free, free)] / error[free] / error[free][:, None]

@@ -14,7 +14,7 @@ from seecr.description.mjcf import load_robot
 from seecr.errors import InputError
 from seecr.show.files import write_arrays
 from seecr.show.map_figure import map_figure
-from seecr.workspace.boundary import boundary
+from seecr.workspace.edges import boundary
 from seecr.workspace.grid import Workspace, grid_ends, own_directions
 from seecr.workspace.maps import default_axes, workspace_map
 

@@ -25,7 +25,7 @@ from seecr.pose import quat_from_rotvec
 from seecr.show.batch_words import edge_line, softest_line
 from seecr.show.files import write_arrays
 from seecr.workspace import maps
-from seecr.workspace.boundary import boundary
+from seecr.workspace.edges import boundary
 from seecr.workspace.maps import default_axes, workspace_map
 from seecr.workspace.margins import balance_equations, feasible, margins_from, tension_margin
 from seecr.workspace.planar import bar_tilt

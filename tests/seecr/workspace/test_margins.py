@@ -12,7 +12,7 @@ from rectangle import RECTANGLE
 from seecr.description.mjcf import load_robot
 from seecr.effects import Term, Terms
 from seecr.errors import InputError, InputFileError
-from seecr.workspace.boundary import margins_at
+from seecr.workspace.edges import margins_at
 from seecr.workspace.maps import workspace_map
 from seecr.workspace.margins import feasible, is_held, tension_margin
 
