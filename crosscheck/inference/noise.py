@@ -321,6 +321,7 @@ class NoisePrior:
         rho, scale = noise.rho[self.kinds], noise.scale[self.kinds]
         no_noise = (rho >= priors.SLOW) | (scale > priors.MISJUDGED_MOST)
         misjudged = self.misjudged(noise)
+        # the odds are of a noise that was rather misjudged than not, and that goes along
         goes_by_place = (misjudged > 0.5) * (rho > 0.0) * place / (1.0 + place)
         return float(np.max(np.maximum(misjudged * no_noise, goes_by_place), initial=0.0))
 
@@ -328,7 +329,7 @@ class NoisePrior:
         """(2, kinds) ln density of ln(noise/stated) and rho, as stated and misjudged.
 
         A stated noise is that of a sensor, whose readings from pose to pose hardly know of one
-        another: rho has the density 2 (1 - rho).
+        another. So rho has the density 2 (1 - rho), the plainest one that is 0 at rho = 1.
         """
         off, alike = np.log(noise.scale[self.kinds]), noise.rho[self.kinds]
 

@@ -511,8 +511,7 @@ def residual_size(gradient: Array) -> Array:
 def platform_poses(tables: Tables, deviation: Array) -> Array:
     """Poses (n, 7) from deviations (n, 7) from the commanded ones.
 
-    Of the two quaternions of an orientation each has the one that is nearer to the command's,
-    whichever way a descent went around.
+    Two quaternions, q and -q, are the same orientation. Poses have the one nearer to the command's.
     """
     poses = deviated(tables.poses, deviation)
     around = deviation[:, 3] < 0.0

@@ -1,4 +1,4 @@
-"""How probably poses can be held, and the boundary of the workspace where they just can."""
+"""The boundary of the workspace, and the probability that poses near it can be held."""
 
 from __future__ import annotations
 
