@@ -39,10 +39,6 @@ FIELD_WIDTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 """The same for fields, in units of the noise: below 0.3 they do not show, above 100 they are seen
 whatever the prior."""
 
-PLACE = 3.0
-"""Prior standard deviation of a smooth error over the place that passes for noise, in units of the
-stated noise: scatters within dwells that were taken for accuracies were 3 to 6 times too small."""
-
 LARGEST = 5.0 * WIDTHS[-1]
 """No effect of more expected sizes is listed as found: five standard deviations of the widest
 prior. The lines of one real robot were truly 20 expected sizes longer than stated."""

@@ -29,7 +29,7 @@ from crosscheck.inference.fields import smooth_over_place
 from crosscheck.inference.fit import TRACKER, Data, Fit, fit, unfitted
 from crosscheck.inference.hypothesis import Hypothesis, scored, wider
 from crosscheck.inference.noise import Noise, NoisePrior
-from crosscheck.inference.priors import EQUAL, FEW, MAY_BE_UNKNOWN, MISJUDGED, PLACE, WITHIN
+from crosscheck.inference.priors import EQUAL, FEW, FIELD_WIDTHS, MAY_BE_UNKNOWN, MISJUDGED, WITHIN
 from crosscheck.inference.scores import LARGE, Scores, ranked
 from seecr.effects import Knowledge, Term
 from seecr.pose import Array
@@ -58,6 +58,8 @@ _LOSING = 2
 _REFITS = 2
 # The key of a smooth function of the place that stands for noise.
 _PLACE = "~place"
+# Its prior width: that field's which is as large as noise is that was misjudged, 3 to 6 times.
+_AS_LARGE = FIELD_WIDTHS[2]
 
 
 @dataclass(eq=False)
@@ -537,9 +539,9 @@ class Search:
             scale, rho = best.fit.noise.scale.copy(), best.fit.noise.rho.copy()
             scale[kind], rho[kind] = 1.0, 0.0
             every = replace(self.every, fields={_PLACE: columns})
-            start = PLACE * columns
+            start = _AS_LARGE * columns
             found = fit(self.data, best.fit.state, widths, start, noise=Noise(scale, rho))
-            other = scored(every, best.key | {_PLACE}, found, {**best.widths, _PLACE: PLACE})
+            other = scored(every, best.key | {_PLACE}, found, {**best.widths, _PLACE: _AS_LARGE})
             # what the sensor adds to it is as large as stated
             as_stated = 1.0 - prior.misjudged(found.noise)[prior.kinds == kind]
             share = float(np.log(MISJUDGED * np.maximum(as_stated, 1e-300)[0]))
