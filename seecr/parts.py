@@ -9,15 +9,20 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Iterator, Mapping
+from concurrent.futures import Executor
+from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from seecr.errors import InputError, InputFileError
+from seecr.counted import counted
+from seecr.errors import ExecutorError, InputError, InputFileError
 from seecr.files import digits_of, plain, reason_of, written
 from seecr.folders import MANIFEST, folder_lock
+from seecr.parallel import as_done
 from seecr.result import Record
+
+T = TypeVar("T")
 
 FOLDER = "parts"
 _AGAIN = "remove it, and the next call computes it again"
@@ -39,12 +44,9 @@ class ParquetParts:
     def __init__(self, out: Path | None, mark: str) -> None:
         self._folder = None if out is None else out / FOLDER
         self._mark, self._of = mark.encode(), mark.rpartition(".")[2]
-
-    def files(self) -> dict[str, Path]:
+        there = () if self._folder is None else self._folder.glob("*-*.parquet")
+        self.files = {path.stem.partition("-")[0]: path for path in there}
         """The files of all parts by their keys."""
-        if self._folder is None:
-            return {}
-        return {path.stem.partition("-")[0]: path for path in self._folder.glob("*-*.parquet")}
 
     def read(self, key: str) -> Record | None:
         """What was said of a part; None where there is none.
@@ -52,7 +54,7 @@ class ParquetParts:
         Raises:
             InputFileError: the part is damaged, or another one.
         """
-        path = self.files().get(key)
+        path = self.files.get(key)
         if path is None:
             return None
         import pyarrow
@@ -81,7 +83,42 @@ class ParquetParts:
         said = {self._mark: json.dumps({"key": key, "summary": plain(summary)})}
         with written(self._folder / f"{key}.parquet") as (part,):
             parquet.write_table(rows.replace_schema_metadata(said), part)
-            part.replace(self._folder / f"{key}-{digits_of(part)}.parquet")
+            self.files[key] = part.replace(self._folder / f"{key}-{digits_of(part)}.parquet")
+
+    def complete(
+        self, tasks: Mapping[str, T], function: Callable[[T], tuple[Any, Record]],
+        executor: Executor | None, tell: Callable[[str, Record], None], noun: str,
+    ) -> dict[str, Record]:  # fmt: skip
+        """Compute the parts that are missing.
+
+        Args:
+            tasks: what each part is computed from, by its key.
+            function: gives a part's rows, as a table of pyarrow, and what is said of them. A part
+                without rows, None, is not kept.
+            executor: as for :func:`seecr.parallel.as_done`.
+            tell: called with the key of each part that was computed, and what is said of it.
+            noun: what a task is called, for the error.
+
+        Returns:
+            what is said of the parts computed now, by their keys.
+
+        Raises:
+            ExecutorError: the executor ended before its work; the parts that are done stay.
+        """
+        keys, found = list(tasks), dict[str, Record]()
+        try:
+            with closing(as_done(function, list(tasks.values()), executor)) as results:
+                for i, (rows, said) in results:
+                    if rows is not None:
+                        self.keep(keys[i], rows, said)
+                    found[keys[i]] = said
+                    tell(keys[i], said)
+        except ExecutorError as error:
+            kept = f"; {len(found)} of {counted(len(keys), noun)} done"
+            if self._folder is not None:
+                kept += f" and kept in {self._folder.parent}: call it again for the others"
+            raise ExecutorError(f"{error}{kept}") from None
+        return found
 
 
 @contextmanager

@@ -122,7 +122,7 @@ seecr.statics.starts: commanded_poses
 seecr.units: millimetres
 seecr.version: full_version
 seecr.workspace.grid: own_directions
-seecr.workspace.maps: MOST_POSES axis_of
+seecr.workspace.maps: MOST_POSES MOST_STORED axis_of
 """.strip().splitlines()
     for module, _, names in [line.partition(": ")]
     for name in names.split()

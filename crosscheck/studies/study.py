@@ -5,7 +5,6 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -22,9 +21,8 @@ from crosscheck.twin.make import make_twin
 from seecr.arguments import check_kind, silent
 from seecr.counted import counted
 from seecr.equilibrium.solving import solve
-from seecr.errors import ExecutorError, SeecrError
+from seecr.errors import SeecrError
 from seecr.files import path_of, plain
-from seecr.parallel import as_done
 from seecr.parts import parts_in
 from seecr.result import Record, Result
 from seecr.version import full_version
@@ -151,23 +149,12 @@ def studied(
     with parts_in(folder, MARK, FILES) as parts:
         found: dict[str, Any] = {case.key: parts.read(case.key) for case in every}
         missing = {case.key: case for case in every if found[case.key] is None}
-        todo = list(missing.values())
-        if len(todo) < len(every):
-            progress(len(every) - len(todo), "")
+        if len(missing) < len(every):
+            progress(len(every) - len(missing), "")
         one = partial(run_study_case, data, full_version())
-        done = 0
-        try:
-            with closing(as_done(one, todo, executor)) as results:
-                for i, (rows, summary) in results:
-                    if rows is not None:
-                        parts.keep(todo[i].key, rows, summary)
-                    found[todo[i].key] = summary
-                    done += 1
-                    progress(1, todo[i].name)
-        except ExecutorError as error:
-            kept = f"; {done} of {counted(len(todo), 'case')} done"
-            kept += "" if folder is None else f" and kept in {folder}: call it again for the others"
-            raise ExecutorError(f"{error}{kept}") from None
+        found |= parts.complete(
+            missing, one, executor, lambda key, _said: progress(1, missing[key].name), "case"
+        )
     rows = [found[case.key] for case in every]
     return Study(every, rows, sum(FAILED not in found[key] for key in missing), within)
 

@@ -140,26 +140,31 @@ def check_places(places: ArrayLike, robot: Robot) -> None:
         )
 
 
-def _check_count(option: str, poses: int) -> None:
+def _check_count(option: str, poses: int, most: int = MOST_POSES, cure: str = "") -> None:
     """That there are not more poses than can be solved.
 
     Raises:
         InputError: there are.
     """
-    if poses > MOST_POSES:
-        raise InputError(f"{option}: expected at most {MOST_POSES:.0e} poses, got {poses:.1e}")
+    if poses > most:
+        raise InputError(f"{option}: expected at most {most:.0e} poses, got {poses:.1e}{cure}")
 
 
 def axes_of(
-    texts: Sequence[str], robot: Robot, directions: NDArray[np.float64] | None = None
-) -> list[NDArray[np.float64]]:
+    texts: Sequence[str], robot: Robot, directions: NDArray[np.float64] | None = None,
+    most: int = MOST_POSES, cure: str = "",
+) -> list[NDArray[np.float64]]:  # fmt: skip
     """The axes of a grid, along x, y and z or along directions (3, 3) in rows.
+
+    Args:
+        texts: each as :func:`axis_of` takes it. robot: as described. directions: see above.
+        most: poses that are accepted. cure: what to do about more, for the error.
 
     Raises:
         InputError: one that is none, or far outside the robot; more poses than can be solved.
     """
     axes = [axis_of(text, "--grid") for text in texts]
-    _check_count("--grid", math.prod(map(len, axes)))
+    _check_count("--grid", math.prod(map(len, axes)), most, cure)
     places = np.array([[axis[k] for axis in axes] for k in (0, -1)])
     check_places(places if directions is None else places @ directions, robot)
     return axes

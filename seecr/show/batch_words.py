@@ -26,6 +26,7 @@ from seecr.statics.solution import Solution
 from seecr.units import in_si, millimetres, newtons, short
 from seecr.workspace.grid import Workspace
 from seecr.workspace.spans import SlackSpan
+from seecr.workspace.stored import StoredMap
 
 # A probability below this deserves attention.
 _LIKELY = 0.95
@@ -203,18 +204,19 @@ def likely_lines(found: Workspace, at_least: float | None) -> Iterator[str]:
         )
 
 
-def beyond_line(found: Workspace, reach: DataReach | None) -> Iterator[str]:
+def beyond_line(found: Workspace | StoredMap, reach: DataReach | None) -> Iterator[str]:
     """How much of the workspace is far from the data that the model was fitted to."""
     if reach is None:
         return
-    places = found.places[found.feasible]
-    away = reach.outside(places, found.robot.length)
-    if np.any(away > 0.0):
+    if isinstance(found, StoredMap):
+        count, most = found.sum("beyond"), max(part["beyond_m"] for part in found.parts)
+    else:
+        count, most = found.beyond(reach)
+    if count:
         yield (
             "beyond the data that the model was fitted to: "
-            f"{counted(int(np.sum(away > 0.0)), 'pose')} of those that can be held "
-            f"{'is' if np.sum(away > 0.0) == 1 else 'are'} "
-            f"up to {millimetres(away.max(), 3)} outside"
+            f"{counted(count, 'pose')} of those that can be held "
+            f"{'is' if count == 1 else 'are'} up to {millimetres(most, 3)} outside"
         )
 
 
@@ -227,9 +229,9 @@ def softest_line(found: Workspace) -> Iterator[str]:
         yield f"softest of these at {found.place(at)}: {direction}, {soft}"
 
 
-def sag_lines_of(found: Workspace, effects: Collection[str]) -> Iterator[str]:
+def sag_lines_of(elastic: bool, effects: Collection[str]) -> Iterator[str]:
     """What "slack" means on an elastic map of a model with these effects, if cables have weight."""
-    if found.elastic and "cable_weight" in effects:
+    if elastic and "cable_weight" in effects:
         yield SAGS
 
 

@@ -15,6 +15,7 @@ from seecr.description.joints import locked, off_joints, shifts
 from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.pose import Array, cross
+from seecr.prediction.model import DataReach
 from seecr.result import MOTION, Record, Result, rows_of
 from seecr.statics.solution import Status
 from seecr.units import millimetres
@@ -181,6 +182,24 @@ def steps_of(axis: Array) -> Array:
     """How much of an axis belongs to each of its values [m]; 1 if it has a single one."""
     step = np.abs(np.diff(axis))
     return 0.5 * (np.r_[step, 0.0] + np.r_[0.0, step]) if len(step) else np.ones(1)
+
+
+def size_unit(axes: Sequence[Array]) -> str:
+    """The unit of a part of a grid, after a blank; "" of a single pose's grid."""
+    return ("", " m", " m^2", " m^3")[sum(len(axis) > 1 for axis in axes)]
+
+
+def region_words(
+    robot: Robot, axes: Sequence[Array], orientation: Array, directions: Array | None
+) -> str:
+    """Where a grid is, in words; whether its lowest poses stand on the robot's floor."""
+    ends = [(float(axis.min()), float(axis.max())) for axis in axes]
+    names = "xyz" if directions is None else "uvw"
+    parts = [f"{k} {between(*end)} m" for k, end in zip(names, ends, strict=True)]
+    lowest = np.array([low for low, _ in ends])
+    z = lowest[2] if directions is None else lowest @ directions[:, 2]
+    stands = abs(float(z) - robot.standing_height(orientation)) <= 1e-9 * robot.length
+    return f"region: {', '.join(parts)}{', down to the floor' if stands else ''}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -360,6 +379,11 @@ class Workspace(Result):
         cells = np.einsum("i,j,k->ijk", *sides)
         return float(cells[every].sum()), float(cells[some].sum())
 
+    def beyond(self, reach: DataReach) -> tuple[int, float]:
+        """How many poses that can be held lie outside a model's data, and how far at most [m]."""
+        away = reach.outside(self.places[self.feasible], self.robot.length)
+        return int(np.sum(away > 0.0)), float(away.max(initial=0.0))
+
     @property
     def softest_at(self) -> tuple[int, ...] | None:
         """Index of the pose with the smallest stiffness among those that can be held."""
@@ -373,9 +397,8 @@ class Workspace(Result):
 
         What the grid leaves open is told, if it is more than the size's last digit.
         """
-        along = sum(len(axis) > 1 for axis in self.axes)
-        unit = {1: " m", 2: " m^2", 3: " m^3"}.get(along)
-        if unit is None:
+        unit = size_unit(self.axes)
+        if not unit:
             return ""
         size, (low, high) = f"{self.size(poses):.4g}", self.size_between(poses)
         if size == f"{low:.4g}" == f"{high:.4g}":
@@ -420,13 +443,7 @@ class Workspace(Result):
     @property
     def region(self) -> str:
         """Where the grid is, in words; whether its lowest poses stand on the robot's floor."""
-        ends = [(float(axis.min()), float(axis.max())) for axis in self.axes]
-        parts = [f"{k} {between(*end)} m" for k, end in zip(self.axis_names, ends, strict=True)]
-        lowest = np.array([low for low, _ in ends])
-        z = lowest[2] if self.directions is None else lowest @ self.directions[:, 2]
-        above = float(z) - self.robot.standing_height(self.orientation)
-        stands = abs(above) <= 1e-9 * self.robot.length
-        return f"region: {', '.join(parts)}{', down to the floor' if stands else ''}"
+        return region_words(self.robot, self.axes, self.orientation, self.directions)
 
     def records(self) -> list[Record]:
         """One row per pose of the grid."""

@@ -41,7 +41,9 @@ Progress = Callable[[int], None]
 """Called with the number of poses done since the last call."""
 
 MOST_POSES = 10_000_000
-"""Of a grid or line; more would take days, and all memory."""
+"""Of a grid or line in memory, where a pose of a map takes a hundred bytes."""
+MOST_STORED = 10_000_000_000
+"""Of a grid in files: a day of one processor, and a terabyte."""
 # Poses that are solved at a time: of all numbers that are kept of a pose, most are not results.
 _PART = 78 * BLOCK
 # Tasks of an executor that a grid is divided into, so that many workers end at about one time; a
