@@ -23,8 +23,8 @@ COMPILED = "seecr.compiled."
 
 def run_in_python(patch: pytest.MonkeyPatch) -> None:
     """Let every compiled function run as the Python that it is written in."""
-    for module in pkgutil.iter_modules(seecr.compiled.__path__):
-        importlib.import_module(COMPILED + module.name)
+    for found in pkgutil.iter_modules(seecr.compiled.__path__):
+        importlib.import_module(COMPILED + found.name)
     for module in [
         m for name, m in sys.modules.items() if name.startswith(("seecr", "crosscheck"))
     ]:
@@ -40,12 +40,19 @@ def plant(patch: pytest.MonkeyPatch, name: str, old: str, new: str) -> None:
     path = Path(module.__file__)
     text = path.read_text(encoding="utf-8")
     assert text.count(old) == 1, f"{path.name}: expected {old!r} once, got {text.count(old)} times"
-    before, after = (_functions(compile(t, path, "exec")) for t in (text, text.replace(old, new)))
-    changed = [key for key in before if before[key].co_code != after[key].co_code
-               or before[key].co_consts != after[key].co_consts
-               or before[key].co_names != after[key].co_names]  # fmt: skip
-    planted = [key for key in changed if _set_code(patch, module, key, after[key])]
-    assert planted, f"{path.name}: {old!r} is in no function"
+    before, after = (compile(t, path, "exec") for t in (text, text.replace(old, new)))
+    assert plant_code(patch, module, before, after), f"{path.name}: {old!r} is in no function"
+
+
+def plant_code(
+    patch: pytest.MonkeyPatch, module: ModuleType, before: CodeType, after: CodeType
+) -> list[str]:
+    """Give the functions of a module that differ their code of ``after``; says which."""
+    was, now = _functions(before), _functions(after)
+    changed = [key for key in was if was[key].co_code != now[key].co_code
+               or was[key].co_consts != now[key].co_consts
+               or was[key].co_names != now[key].co_names]  # fmt: skip
+    return [key for key in changed if _set_code(patch, module, key, now[key])]
 
 
 def _functions(code: CodeType, place: str = "") -> dict[str, CodeType]:
