@@ -1,10 +1,10 @@
 # The tasks of this repository; `make` lists them. They use .venv, which `make setup` makes.
 BIN := .venv/bin
 
-.PHONY: help setup quick test sweep score bench docs paper pictures suite ci
+.PHONY: help setup quick test sweep score bench reproduce docs paper pictures suite ci
 
 help: ## list the tasks
-	@sed -n 's/^\([a-z]*\): .*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 8
+	@sed -n 's/^\([a-z]*\): .*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12
 
 setup: ## a virtual environment with this checkout in it, and the hooks that run before a commit
 	python3 -m venv .venv
@@ -30,6 +30,9 @@ score: ## how good the diagnosis is, on three hundred new cases: docs/figures.js
 bench: ## how fast it is, beside other ways: docs/figures.json and docs/performance.md
 	$(BIN)/python -m pytest -m benchmark -n 0 -s
 	$(BIN)/python scripts/bench.py --before 2a123ab2 --out docs/figures.json --page docs/performance.md
+
+reproduce: ## all of these numbers from one commit, or SHORT=1 a tenth; fails if one has moved
+	$(BIN)/python scripts/reproduce.py $(if $(SHORT),--short)
 
 docs: ## write the pages and pictures made from the sources, and build the site: build/site/index.html
 	$(BIN)/python scripts/draw_effects.py

@@ -77,13 +77,15 @@ for name, poses in np.load(sys.argv[1]).items():
 """
 
 
-def robots() -> Iterator[tuple[str, seecr.Robot]]:
-    """The shipped robots with some stiffnesses, and suspended ones with six to twelve cables."""
-    for name, stiffnesses in SHIPPED:
+def robots(short: bool = False) -> Iterator[tuple[str, seecr.Robot]]:
+    """The shipped robots with some stiffnesses, and suspended ones with six to twelve cables; in
+    ``short`` the DemoBots alone.
+    """
+    for name, stiffnesses in SHIPPED[: len(DEMOBOTS)] if short else SHIPPED:
         robot = seecr.load_robot(seecr.model_path(name))
         for ea in stiffnesses:
             yield name, replace(robot, ea=np.full(robot.n_cables, ea)) if ea else robot
-    for m in (6, 8, 10, 12):
+    for m in () if short else (6, 8, 10, 12):
         yield f"ring of {m}", ring(m)
 
 
@@ -227,17 +229,18 @@ def table(head: str, rows: list[list[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def figures(before: str | None) -> dict[str, Any]:
-    """What docs/figures.json has of the speed."""
-    poses, each, memory = stored()
+def figures(before: str | None, short: bool) -> dict[str, Any]:
+    """What docs/figures.json has of the speed; in short only how robots compare."""
     times = {name: ratios(name) for name in DEMOBOTS}
+    compared = {"ratios": times, "robots": [row(*robot) for robot in robots(short)]}
+    if short:
+        return compared
+    poses, each, memory = stored()
     for name, older in (of_commit(before) if before else {}).items():
         times[name]["before"] = older
     return {
         "processors": processors(), "poses": POSES, "before": before,
-        "robots": [row(*robot) for robot in robots()],
-        "maps": [maps(name) for name in DEMOBOTS],
-        "ratios": times,
+        **compared, "maps": [maps(name) for name in DEMOBOTS],
         "stored": {"poses": poses, "microseconds": each, "gigabytes": memory},
     }  # fmt: skip
 
@@ -273,14 +276,15 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="file of figures whose part `speed` is replaced")
     parser.add_argument("--page", type=Path, help="write it as this page, too")
     parser.add_argument("--before", help="a commit to compare with")
+    parser.add_argument("--short", action="store_true", help="two robots, no maps and no page")
     given = parser.parse_args()
-    found = figures(given.before)
-    page = page_of(found)
+    found = figures(given.before, given.short)
+    page = json.dumps(found, indent=1) if given.short else page_of(found)
     print(page)
     if given.out:
         every = json.loads(given.out.read_text(encoding="utf-8")) if given.out.exists() else {}
         write_text(given.out, json.dumps(every | {"speed": found}, indent=1) + "\n")
-    if given.page:
+    if given.page and not given.short:
         write_text(given.page, page)
 
 
