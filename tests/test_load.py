@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from load import run
+from load import RESULTS, run
 
 from seecr.folders import MANIFEST
 
@@ -15,4 +15,4 @@ def test_commands_at_once_leave_one_result_and_nothing_over(tmp_path: Path) -> N
     ends, left, results = run(8, 4, tmp_path)
     assert ends == ["0"] * 8, ends
     assert left == set()
-    assert results == {"out/sweep.json", "out/sweep.csv", f"out/{MANIFEST}"}
+    assert results == {f"out/{name}" for name in (*RESULTS, MANIFEST)}
