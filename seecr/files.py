@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import hashlib
+import itertools
 import json
 import math
 import os
@@ -245,20 +246,45 @@ def json_text(document: Any, indent: int | None = 1) -> str:
 
 
 def json_pieces(document: Mapping[str, Any]) -> Iterator[str]:
-    """The same in pieces, with a newline at the end: an iterator's items are written one by one."""
-    opening = "{\n "
-    for key, value in document.items():
-        yield f"{opening}{json.dumps(key, ensure_ascii=False)}: "
-        if isinstance(value, Iterator):
-            before = "["
-            for item in value:
-                yield f"{before}\n  {_indented(item, 2)}"
-                before = ","
-            yield "[]" if before == "[" else "\n ]"
-        else:
-            yield _indented(value, 1)
-        opening = ",\n "
-    yield "\n}\n"
+    """The same in pieces, with a newline at the end, so that long arrays are never one text.
+
+    An iterator's items are written one by one, and so many rows of an array at a time.
+    """
+    yield from _pieces(document, 0)
+    yield "\n"
+
+
+# Rows of an array that are made to text at once.
+_ROWS = 10_000
+
+
+def _pieces(value: Any, depth: int) -> Iterator[str]:
+    """A value's JSON as it stands within others."""
+    start, brackets = "\n" + " " * (depth + 1), "[]"
+    if isinstance(value, Mapping):
+        brackets, parts = "{}", _members(value, depth + 1)
+    elif isinstance(value, Iterator):
+        parts = (_pieces(item, depth + 1) for item in value)
+    elif isinstance(value, np.ndarray) and value.ndim and len(value) > _ROWS:
+        some = (value[k : k + _ROWS] for k in range(0, len(value), _ROWS))
+        # without the brackets of these rows
+        parts = (iter([_indented(rows, depth)[1:].strip()[:-1].rstrip()]) for rows in some)
+    else:
+        yield _indented(value, depth)
+        return
+    opening = brackets[0]
+    for part in parts:
+        yield opening + start
+        yield from part
+        opening = ","
+    yield brackets if opening == brackets[0] else start[:-1] + brackets[1]
+
+
+def _members(table: Mapping[str, Any], depth: int) -> Iterator[Iterator[str]]:
+    for key, value in table.items():
+        yield itertools.chain(
+            [f"{json.dumps(str(key), ensure_ascii=False)}: "], _pieces(value, depth)
+        )
 
 
 def _indented(value: Any, depth: int) -> str:

@@ -73,14 +73,14 @@ def command(
     if _are_models(robot, data):
         return _compare_two(robot, data[0], out, model_out, fail_on, as_json)
     from crosscheck import Limits, Sigma, compare, exceeded, load_limits, load_measurements
+    from crosscheck.show.misfit import drawn_words
     from crosscheck.show.pictures import write_page
     from seecr import load_model, with_history
-    from seecr.files import json_text, write_text
+    from seecr.cli.arguments import robot_at
+    from seecr.files import json_pieces, write_text
     from seecr.folders import staged
 
     limits = (load_limits(limits_file) if limits_file else Limits()).but(errors)
-    from seecr.cli.arguments import robot_at
-
     machine = robot_at(robot)
     measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     own = load_model(model, machine) if model is not None else None
@@ -96,8 +96,8 @@ def command(
         stated = {k: v for k, v in vars(limits).items() if v is not None}
         head = {"made": made, "exit_status": status, "limits": stated, "exceeded": beyond}
         notes = own.notes if own else ()
-        text = json_text({**head, **found.as_json(), "model_notes": list(notes)})
-        write_text(folder / "comparison.json", text + "\n")
+        document = {**head, **found.as_json(), "model_notes": list(notes)}
+        write_text(folder / "comparison.json", json_pieces(document))
         progress("drawing the page" if no_recording else "drawing the page, recording", 0.5)
         with choices.figures_in(figures):
             write_page(found, folder / "comparison.html", made)
@@ -106,8 +106,11 @@ def command(
 
                 write_comparison_recording(found, folder / "comparison.rrd")
         progress("all is written", 1.0)
+    if said := drawn_words(found.problem.data.n_rows):
+        click.echo(said, err=True)
     if as_json:
-        click.echo(text)
+        for piece in json_pieces(document):
+            click.echo(piece, nl=False)
         return status
     from crosscheck.show.comparison import print_comparison
 

@@ -52,6 +52,7 @@ def command(
     from crosscheck import DiagnosisVerdict, Sigma, Tolerance, diagnose, load_measurements
     from crosscheck.model.write import check_place
     from crosscheck.show.diagnosis import print_diagnosis
+    from crosscheck.show.misfit import drawn_words
     from crosscheck.show.pictures import write_page
     from seecr import load_model, new_model, with_history
     from seecr.description.fingerprint import fingerprint
@@ -85,6 +86,8 @@ def command(
                 from crosscheck.show.error_recordings import write_diagnosis_recording
 
                 write_diagnosis_recording(found, folder / "diagnosis.rrd")
+        if found.path is not None and (said := drawn_words(found.path.problem.data.n_rows)):
+            click.echo(said, err=True)
         note = "" if model_out is None else keep_found(found, model_out)
     if as_json:
         click.echo(text)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,11 +18,12 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from crosscheck.comparison.quantities import cable_errors, cable_lengths, channels, travel
 from crosscheck.fit.problem import KINDS, TENSION, Kind, Problem
 from crosscheck.show.figures import MANY, blank, dots, grid, image, styled
-from crosscheck.show.misfit import Drawn, Misfit
+from crosscheck.show.misfit import Drawn, Misfit, drawn_words
 from seecr.counted import counted
 from seecr.pose import Array
 from seecr.prediction.experiment import Prediction
@@ -119,7 +120,7 @@ def _dots(axes: Axes, shown: Misfit, stage: Drawn, view: tuple[int, int], kind: 
 
 
 def _arrows(axes: Axes, shown: Misfit, stage: Drawn, view: tuple[int, int]) -> None:
-    rows = shown.rows[:: rows_per_arrow(shown.problem)]
+    rows = shown.rows[:: rows_per_arrow(shown)]
     axes.quiver(
         *shown.place[rows][:, view].T, *shown.errors(stage.state)[rows][:, view].T,
         angles="xy", scale_units="xy", scale=1.0 / shown.magnify, units="inches", width=0.017,
@@ -127,9 +128,9 @@ def _arrows(axes: Axes, shown: Misfit, stage: Drawn, view: tuple[int, int]) -> N
     )  # fmt: skip
 
 
-def rows_per_arrow(problem: Problem) -> int:
-    """Arrows are drawn for one row in so many."""
-    return int(np.ceil(problem.use.sum() / _MOST_ARROWS))
+def rows_per_arrow(shown: Misfit) -> int:
+    """Arrows are drawn for one of so many rows that are drawn."""
+    return int(np.ceil(len(shown.rows) / _MOST_ARROWS))
 
 
 def _frame(axes: Axes, place: Array, view: tuple[int, int]) -> None:
@@ -146,18 +147,20 @@ def _frame(axes: Axes, place: Array, view: tuple[int, int]) -> None:
 
 
 def caption(problem: Problem, stage: Drawn) -> str:
-    """What arrows and dots mean."""
-    shown, every = Misfit(problem, stage.state), rows_per_arrow(problem)
+    """What arrows and dots mean, and of which rows they are."""
+    shown = Misfit(problem, stage.state)
+    every, few = rows_per_arrow(shown), drawn_words(problem.data.n_rows)
     parts = []
     if shown.magnify:
         which = "each pose" if every == 1 else f"one pose in {every}"
+        which += " of those drawn" if few else ""
         parts.append(
             f"Arrows: measured minus predicted position at {which}; an error of 1 mm is drawn as "
             f"an arrow of {shown.magnify:g} mm."
         )
     if (kind := _kind_of_dots(shown)) is not None:
         parts.append(f"Dots: the {kind.name} error.")
-    return " ".join(parts)
+    return " ".join([*parts, few] if few else parts)
 
 
 # More rows of panels than this are too many to look at: the worst are shown.
@@ -196,9 +199,18 @@ class Wall:
         """(n, k) what remains with these effects."""
         return self.measured - self.predicted
 
+    def at(self, rows: NDArray[np.int64]) -> Wall:
+        """Some of its rows of measurements."""
+        against = [(name, values[rows]) for name, values in self.abscissae]
+        shown, part = self.measured[rows], self.predicted[rows]
+        return replace(self, measured=shown, predicted=part, abscissae=against)
+
 
 def walls_of(problem: Problem, before: Drawn, after: Drawn) -> list[Wall]:
-    """Cable lengths where the whole pose was read, else its readings; tensions where read."""
+    """Cable lengths where the whole pose was read, else its readings; tensions where read.
+
+    Of the rows that are drawn.
+    """
     raw = before.state.raw
     change = raw - after.state.raw
     prediction = after.state.prediction
@@ -226,7 +238,8 @@ def walls_of(problem: Problem, before: Drawn, after: Drawn) -> list[Wall]:
             Wall("Errors of tension", [names[k] for k in seen], shown[:, seen], part[:, seen],
                  level, "N", against)
         )  # fmt: skip
-    return out
+    rows = Misfit(problem, before.state).drawn
+    return [wall.at(rows) for wall in out]
 
 
 def _of_cables(problem: Problem, prediction: Prediction) -> list[tuple[str, Array]]:

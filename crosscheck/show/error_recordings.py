@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from numpy.typing import NDArray
 
 from crosscheck.comparison.quantities import channels
 from crosscheck.comparison.result import Comparison
@@ -24,14 +25,14 @@ from crosscheck.fit.state import State
 from crosscheck.show.blocks import Bold
 from crosscheck.show.comparison import pose_errors_text, verdict_text
 from crosscheck.show.diagnosis import diagnosis_text, pose_of_step_text, step_text
-from crosscheck.show.misfit import Misfit, predicted_poses
+from crosscheck.show.misfit import Misfit, drawn_words, predicted_poses
 from seecr.compiled.columns import REST
 from seecr.pose import Array
 from seecr.show import colours, layout, plots
 from seecr.show.colours import Rgba
 from seecr.show.plots import Legend, legend_of
 from seecr.show.scene import Scene, States, extent
-from seecr.show.stream import MODEL_STEP, Index, Recording, pose_index, recording_file
+from seecr.show.stream import MODEL_STEP, POSE, Index, Recording, pose_index, recording_file
 from seecr.units import short
 
 VERDICT, NOW = "text/verdict", "text/now"
@@ -66,11 +67,11 @@ def _scene_view(shown: Misfit, name: str, aspect: float) -> rrb.Spatial3DView:
 
 def _pose_by_pose(recording: Recording, scene: Scene, shown: Misfit, state: State) -> rr.TimeColumn:
     """What was measured and a model at each pose, and the maps, on which a ring follows."""
-    problem, states = shown.problem, states_of(state)
-    index = pose_index(problem.data.n_rows)
-    measured = np.where(problem.use[:, None], shown.measured, np.nan)
+    rows, states = shown.drawn, states_of(state, shown.drawn)
+    index = rr.TimeColumn(POSE, sequence=rows)
+    measured = np.where(shown.problem.use[:, None], shown.measured, np.nan)[rows]
     scene.platform("measured", index, measured, MEASURED)
-    predicted = np.where(states.known[:, None], predicted_poses(state), np.nan)
+    predicted = np.where(states.known[:, None], predicted_poses(state)[rows], np.nan)
     scene.platform("model", index, predicted, colours.SEECR, solid=True)
     scene.cables("model", index, states)
     maps(recording, pose_index(1), shown, [shown.first])
@@ -93,27 +94,28 @@ def write_comparison_recording(found: Comparison, path: str | Path) -> None:
         _words_alone(path, name, verdict_text(found, (), ()))
         return
     shown = Misfit(problem, found.state)
-    n, kinds = problem.data.n_rows, shown.kinds
-    with recording_file(path, name, _comparison_layout(found, shown, name)) as recording:
+    kinds = shown.kinds
+    with recording_file(path, name, _comparison_layout(shown, name)) as recording:
         top = colours.round_up(float(np.nanmax(found.state.prediction.tensions, initial=0.0)))
         scene = Scene(recording, problem.robot, shown.seen, top)
         scene.surroundings()
         arrows(recording, pose_index(1), shown, [found.state], scene.size)
         index = _pose_by_pose(recording, scene, shown, found.state)
-        starts = problem.experiment.commands.starts
         for kind in kinds:
             shades = colours.cable_colours(len(channels(problem)[0][kind.columns]))
-            for k, reading, values in _errors_of(found, kind):
+            for k, reading, values in _errors_of(shown, kind):
                 entity, colour = f"plot/{kind.name}/reading_{k + 1}", shades[k]
-                plots.line_by_runs(recording, entity, index, values, starts, reading, colour, 1.5)
-        recording.texts(NOW, index, [pose_errors_text(found, k) for k in range(n)])
+                plots.line_by_runs(
+                    recording, entity, index, values, shown.starts, reading, colour, 1.5
+                )
+        recording.texts(NOW, index, [pose_errors_text(found, k) for k in shown.drawn.tolist()])
         recording.text(VERDICT, verdict_text(found, kinds, misfit_words(shown)))
 
 
-def _comparison_layout(found: Comparison, shown: Misfit, name: str) -> rrb.Blueprint:
+def _comparison_layout(shown: Misfit, name: str) -> rrb.Blueprint:
     many, legends = len(shown.kinds), []
     for kind in shown.kinds:
-        _numbers, names, curves = zip(*_errors_of(found, kind), strict=True)
+        _numbers, names, curves = zip(*_errors_of(shown, kind), strict=True)
         legends.append(legend_of([np.stack(curves, axis=1)], names, _HALF))
     root = rrb.Horizontal(
         _scene_view(shown, name, 0.76),
@@ -128,14 +130,14 @@ def _comparison_layout(found: Comparison, shown: Misfit, name: str) -> rrb.Bluep
     return layout.blueprint(root)
 
 
-def _errors_of(found: Comparison, kind: Kind) -> list[tuple[int, str, Array]]:
-    """Number, name and errors (n,) of each reading of one kind; NaN where one does not count.
+def _errors_of(shown: Misfit, kind: Kind) -> list[tuple[int, str, Array]]:
+    """Number, name and errors (k,) of each reading of one kind; NaN where one does not count.
 
     The name is that in a plot whose title states the kind.
     """
-    names = channels(found.problem)[0][kind.columns]
-    read = found.problem.counted[:, kind.columns]
-    raw = np.where(read, found.state.raw[:, kind.columns], np.nan) * kind.factor
+    names = channels(shown.problem)[0][kind.columns]
+    read = shown.problem.counted[shown.drawn, kind.columns]
+    raw = np.where(read, shown.first.raw[shown.drawn, kind.columns], np.nan) * kind.factor
     return [
         (k, name.removeprefix("tension of ").removeprefix("rotation "), raw[:, k])
         for k, name in enumerate(names)
@@ -210,11 +212,11 @@ def _over_poses(recording: Recording, scene: Scene, stages: Sequence[Stage], sho
     """The measured poses one by one, under the first and the last model."""
     index = _pose_by_pose(recording, scene, shown, stages[-1].state)
     if len(stages) > 1:
-        scene.platform("first", index, predicted_poses(shown.first), colours.PINK)
+        scene.platform("first", index, predicted_poses(shown.first)[shown.drawn], colours.PINK)
     for kind in shown.kinds:
         _model_plots(recording, index, stages, shown, kind)
-    problem, n = shown.problem, shown.problem.data.n_rows
-    texts = [pose_of_step_text(problem, stages, shown.kinds, k) for k in range(n)]
+    rows = shown.drawn.tolist()
+    texts = [pose_of_step_text(shown.problem, stages, shown.kinds, k) for k in rows]
     recording.texts(NOW, index, texts)
 
 
@@ -222,13 +224,12 @@ def _model_plots(
     recording: Recording, index: rr.TimeColumn, stages: Sequence[Stage], shown: Misfit, kind: Kind
 ) -> None:
     """The error of each pose under each model; over the steps, that on all test runs."""
-    starts = shown.problem.experiment.commands.starts
     for k, stage in enumerate(stages):
-        sizes = shown.sizes(stage.state, kind)
+        sizes = shown.sizes(stage.state, kind)[shown.drawn]
         shade = colours.VERMILION if k == 0 else _BETWEEN[(k - 1) % len(_BETWEEN)]
         shade = colours.SKY if 0 < k == len(stages) - 1 else shade
         entity = f"plot/{kind.name}/model_{k}"
-        plots.line_by_runs(recording, entity, index, sizes, starts, stage.label, shade, 1.5)
+        plots.line_by_runs(recording, entity, index, sizes, shown.starts, stage.label, shade, 1.5)
     entity = f"plot/{kind.name}/left_out"
     steps = rr.TimeColumn(MODEL_STEP, sequence=range(len(stages)))
     rms = [kind.factor * (stage.held_out.rms[kind.key] or 0.0) for stage in stages]
@@ -238,7 +239,7 @@ def _model_plots(
 
 def _model_legend(stages: Sequence[Stage], shown: Misfit, kind: Kind) -> Legend:
     """Its corner only: a longer axis would leave little room for the one curve over the steps."""
-    sizes = [shown.sizes(stage.state, kind) for stage in stages]
+    sizes = [shown.sizes(stage.state, kind)[shown.drawn] for stage in stages]
     legend = legend_of([np.stack(sizes, axis=1)], [stage.label for stage in stages], _PLOT)
     return replace(legend, values=None)
 
@@ -246,18 +247,18 @@ def _model_legend(stages: Sequence[Stage], shown: Misfit, kind: Kind) -> Legend:
 # --- arrows and maps -----------------------------------------------------------------------------
 
 
-def states_of(state: State) -> States:
-    """The model's platform and cables at every row; NaN without equilibrium."""
+def states_of(state: State, rows: NDArray[np.int64] | slice) -> States:
+    """The model's platform and cables at some rows; NaN without equilibrium."""
     prediction = state.prediction
     pose = np.where(prediction.solved[:, None], prediction.pose, np.nan)
     lengths = prediction.tables.cables[..., REST]
-    return States(pose, prediction.tensions, lengths, prediction.slack)
+    return States(pose[rows], prediction.tensions[rows], lengths[rows], prediction.slack[rows])
 
 
 def _row_of_each(states: Sequence[State], k: int) -> States:
     """One row under several models."""
-    some = [states_of(state) for state in states]
-    return States(*(np.stack([getattr(one, name)[k] for one in some]) for name in vars(some[0])))
+    some = [states_of(state, slice(k, k + 1)) for state in states]
+    return States(*(np.concatenate([getattr(one, n) for one in some]) for n in vars(some[0])))
 
 
 def _shades(misfit: Misfit, state: State, kind: Kind) -> colours.Colours:
@@ -325,7 +326,7 @@ def panels(misfit: Misfit, legends: Sequence[Legend]) -> rrb.Tabs:
 
 def cursor(recording: Recording, index: Index, misfit: Misfit) -> None:
     """A ring around the dot of the current row, on every map."""
-    points = _flat(misfit, misfit.place)
+    points = _flat(misfit, misfit.place)[misfit.drawn]
     for kind in misfit.kinds:
         entity = f"map/{kind.name}/here"
         recording.rows(entity, index, rr.Points2D.columns(positions=points))
@@ -358,16 +359,17 @@ def map_views(misfit: Misfit) -> list[rrb.Spatial2DView]:
 
 
 def misfit_words(misfit: Misfit) -> Sequence[str]:
-    """The meaning of arrows and colours, in a sentence or two."""
-    kind = misfit.kinds[0]
+    """The meaning of arrows and colours, in a sentence or two, and which rows are drawn."""
+    kind, which = misfit.kinds[0], drawn_words(misfit.problem.data.n_rows)
+    which = which and f" {which}"
     scale = f"from dark (none) to yellow ({misfit.top(kind):g} {kind.unit} or more)"
     if not misfit.magnify:
-        return [f"Dots are measured poses, coloured by their {kind.name} error {scale}."]
+        return [f"Dots are measured poses, coloured by their {kind.name} error {scale}.{which}"]
     return [
         "Arrows at the measured poses point from the predicted to the measured position; they are "
         "drawn ",
         Bold(misfit.scale),
-        f" and coloured {scale}.",
+        f" and coloured {scale}.{which}",
     ]
 
 

@@ -19,6 +19,9 @@ from seecr.show.colours import round_up
 _ARROW, _LARGEST = 0.13, 98.0
 # Colours end at this percentile of the errors.
 _TOP = 95.0
+# So many rows are drawn at most. A recorded pose takes 30 kB of memory while it is written, and no
+# plot has as many points side by side.
+_MOST_DRAWN = 5_000
 # A side is flat if it is shorter than this part of the longest one.
 _FLAT = 0.02
 
@@ -60,10 +63,36 @@ class Misfit:
         """Kinds of reading in the data."""
         return kinds_read(self.problem)
 
+    @cached_property
+    def drawn(self) -> NDArray[np.int64]:
+        """Indices of the rows that are drawn: all, or of too many those that
+        :func:`drawn_words` names.
+        """
+        every = np.arange(self.problem.data.n_rows)
+        if len(every) <= _MOST_DRAWN:
+            return every
+        half = _MOST_DRAWN // 2
+        largest = np.argsort(-self._power, kind="stable")[:half]
+        rest = np.delete(every, largest)
+        evenly = rest[np.linspace(0, len(rest) - 1, half).astype(np.int64)]
+        return np.sort(np.concatenate([largest, evenly]))
+
     @property
     def rows(self) -> NDArray[np.int64]:
-        """Indices of the rows that count."""
-        return np.flatnonzero(self.problem.use)
+        """Indices of the drawn rows that count."""
+        return self.drawn[self.problem.use[self.drawn]]
+
+    @property
+    def starts(self) -> NDArray[np.bool_]:
+        """(k,) drawn rows before which, since the drawn row before, a run starts."""
+        run = np.cumsum(self.problem.experiment.commands.starts)[self.drawn]
+        return np.asarray(np.diff(run, prepend=-1) > 0)
+
+    @cached_property
+    def _power(self) -> Array:
+        """(n,) sum of squares of each row's errors that count, in units of the noise."""
+        power = np.bincount(self.problem.row_of, self.first.white**2, self.problem.data.n_rows)
+        return np.asarray(power, float)
 
     @property
     def place(self) -> Array:
@@ -133,9 +162,18 @@ class Misfit:
     @property
     def worst_row(self) -> int:
         """The row with the largest error, in units of the noise."""
-        table = np.zeros(self.problem.measured.shape)
-        table[self.problem.row_of, self.problem.column_of] = self.first.white
-        return int(np.argmax((table**2).sum(axis=1)))
+        return int(np.argmax(self._power))
+
+
+def drawn_words(count: int) -> str:
+    """Which of so many rows are drawn, in a sentence; "" if all are."""
+    if count <= _MOST_DRAWN:
+        return ""
+    half = _MOST_DRAWN // 2
+    return (
+        f"Drawn are {_MOST_DRAWN} of {count} rows: the {half} with the largest errors in units of "
+        f"the noise, and {half} evenly spaced among the others."
+    )
 
 
 def predicted_poses(state: State) -> Array:

@@ -76,8 +76,8 @@ def test_dots_are_on_the_png_too_where_they_are_and_as_large(tmp_path: Path, poi
 
 @pytest.mark.parametrize(("rows", "every"), [(1, 1), (250, 1), (251, 2), (1000, 4)])
 def test_arrows_are_thinned_out(rows: int, every: int) -> None:
-    problem: Any = SimpleNamespace(use=np.ones(rows, dtype=bool))
-    assert rows_per_arrow(problem) == every
+    shown: Any = SimpleNamespace(rows=np.arange(rows))
+    assert rows_per_arrow(shown) == every
 
 
 def light(colour: np.ndarray) -> float:

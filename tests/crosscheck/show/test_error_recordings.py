@@ -15,13 +15,15 @@ from crosscheck.diagnosis.path import Stage
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.words import removed
 from crosscheck.fit.problem import KINDS, POSITION
+from crosscheck.show import misfit
+from crosscheck.show.error_figures import caption
 from crosscheck.show.error_recordings import (
     bars_share,
     states_of,
     write_comparison_recording,
     write_diagnosis_recording,
 )
-from crosscheck.show.misfit import Misfit, predicted_poses
+from crosscheck.show.misfit import Misfit, Standing, predicted_poses
 from crosscheck.show.texts import escaped
 from seecr.units import short
 
@@ -170,7 +172,7 @@ def test_plots_over_poses_are_each_models_errors(
 def test_cables_are_those_of_the_last_model(
     back: Readback, stages: list[Stage], shown: Misfit
 ) -> None:
-    states = states_of(stages[-1].state)
+    states = states_of(stages[-1].state, slice(None))
     taut = back.column("/scene/model/cables/taut", "LineStrips3D:strips", "pose")
     pulls = (~states.slack).sum(axis=1)
     assert [len(strips) for strips in taut] == pulls.tolist()
@@ -241,6 +243,24 @@ def test_comparison_names_the_worst_and_the_verdict(compared: Path, comparison: 
     worst = comparison.worst[0]
     assert f"| {worst.row} | {worst.line} |" in text
     assert f"| {short(1e3 * comparison.rms['position_rms_m'])} | 0.0300 |" in text  # type: ignore[operator]
+
+
+def test_of_too_many_rows_those_with_the_largest_errors_are_drawn_and_some_others(
+    comparison: Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The recording says so, and keeps the poses' numbers, which are those of every other file."""
+    monkeypatch.setattr(misfit, "_MOST_DRAWN", 20)
+    write_comparison_recording(comparison, tmp_path / "thin.rrd")
+    back, count = Readback(tmp_path / "thin.rrd"), len(comparison.problem.data)
+    words = f"Drawn are 20 of {count} rows: the 10 with the largest errors in units of the noise"
+    assert words in back.static("/text/verdict", "TextDocument:text")[0]
+    texts = [row[0] for row in back.column("/text/now", "TextDocument:text")]
+    drawn = [int(text.split()[2]) for text in texts]
+    assert len(drawn) == 20 and drawn == sorted(set(drawn))
+    assert {row.row for row in comparison.worst} < set(drawn)
+    raw = comparison.state.raw[drawn, 0]
+    assert back.scalars("/plot/position/reading_1") == pytest.approx(1e3 * raw)
+    assert words in caption(comparison.problem, Standing("it", comparison.state))
 
 
 def test_cables_go_by_their_names(back: Readback, shown: Misfit) -> None:

@@ -219,3 +219,18 @@ def test_what_lengths_mean_and_where_runs_begin_are_read_as_they_were(
     assert again.told == told
     np.testing.assert_array_equal(again.starts_here, commands.starts_here)
     assert bool(text) == (told or stands is not None)
+
+
+def test_json_of_long_arrays_in_pieces_is_that_of_the_whole(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("seecr.files._ROWS", 7)
+    table = np.arange(69.0).reshape(23, 3)
+    table[3, 1] = np.nan
+    document = {
+        "rows": {"error": table, "line": table[:, 0], "names": np.array(["a\nb"] * 8), "none": {}},
+        "few": table[:2], "text": "x", "no": (),
+    }  # fmt: skip
+    pieces = list(json_pieces(document))
+    assert "".join(pieces) == json_text(document) + "\n"
+    assert max(map(len, pieces)) < len(json_text(table)) // 2
