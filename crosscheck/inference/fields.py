@@ -117,13 +117,13 @@ def fields_about(fit: Fit) -> list[tuple[Varying, Array]]:
     return [(what, columns) for part in parts for what, columns in part() if np.any(columns)]
 
 
-def smooth_over_place(fit: Fit, kind: int) -> Array:
-    """(N, k) a smooth function of the place for each channel of one kind of readings.
+def over_place(fit: Fit, kind: int, length: float) -> Array:
+    """(N, k) a function of the place for each channel of one kind of readings.
 
-    It is a Gaussian process that is forgotten after half the range of an axis.
+    It is a Gaussian process that is forgotten after so many times half the range of an axis.
     """
     problem = fit.data.problem
-    shapes = waves(fit.state.prediction.pose[:, :3], 1.0)[problem.row_of]
+    shapes = waves(fit.state.prediction.pose[:, :3], length)[problem.row_of]
     columns = per_channel(fit.data, shapes)
     return columns[:, np.any(columns[fit.data.chain.kind == kind], axis=0)]
 

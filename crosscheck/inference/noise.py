@@ -312,17 +312,24 @@ class NoisePrior:
         chance = np.exp(parts[1] - np.logaddexp.reduce(parts, axis=0))
         return np.asarray(chance * (self.stated & ~self.bound))
 
+    @staticmethod
+    def log_misjudged(size: float) -> float:
+        """ln prior density that a statement was misjudged by this factor, up to a constant."""
+        off = np.log(size) / priors.MISJUDGED_BY
+        return float(np.log(priors.MISJUDGED) - 0.5 * off**2 - np.log(priors.MISJUDGED_BY))
+
     def is_unknown(self, noise: Noise, place: float = 0.0) -> float:
         """Probability that what a fit takes for noise is something unknown.
 
-        It is if it is larger than stated and slow, or larger than anybody misjudges; or, by the
-        odds ``place``, if it goes along from row to row because it goes by the place.
+        It is if it is larger than stated and slow, or if what a row foretells of the next one is
+        larger than anybody misjudges; or, by the odds ``place``, if it goes by the place. What is
+        white is noise, however large.
         """
         rho, scale = noise.rho[self.kinds], noise.scale[self.kinds]
-        no_noise = (rho >= priors.SLOW) | (scale > priors.MISJUDGED_MOST)
+        no_noise = (rho >= priors.SLOW) | (rho * scale > priors.MISJUDGED_MOST)
         misjudged = self.misjudged(noise)
-        # the odds are of a noise that was rather misjudged than not, and that goes along
-        goes_by_place = (misjudged > 0.5) * (rho > 0.0) * place / (1.0 + place)
+        # the odds are of a noise that was rather misjudged than not
+        goes_by_place = (misjudged > 0.5) * place / (1.0 + place)
         return float(np.max(np.maximum(misjudged * no_noise, goes_by_place), initial=0.0))
 
     def _parts(self, noise: Noise) -> Array:

@@ -73,8 +73,9 @@ this, as that of trackers is (0.85 at most of those looked at). What decays by h
 more, a third of a run, belongs to the run and not to the sensor: it is something unknown."""
 
 MISJUDGED_MOST = 10.0
-"""Nobody misjudges a noise by more than this: what is larger is something unknown, whatever its
-colour. Scatters within dwells that were taken for accuracies were 3 to 6 times too small."""
+"""Nobody misjudges a noise by more than this: if the part of it that the row before foretells is
+larger, it is something unknown. Scatters within dwells that were taken for accuracies were 3 to 6
+times too small. White noise foretells nothing, and is never unknown."""
 
 COMPARABLE = 0.5
 """A field that explains this part of what the best one does may be the true one as well: an effect

@@ -25,11 +25,11 @@ from crosscheck.fit.registration import registered, registered_each
 from crosscheck.fit.state import State, can_be
 from crosscheck.inference.about import About, inside
 from crosscheck.inference.catalogue import Catalogue, Key, bare, is_field, name_of, part_of
-from crosscheck.inference.fields import smooth_over_place
+from crosscheck.inference.fields import over_place
 from crosscheck.inference.fit import TRACKER, Data, Fit, fit, unfitted
 from crosscheck.inference.hypothesis import Hypothesis, scored, wider
 from crosscheck.inference.noise import Noise, NoisePrior
-from crosscheck.inference.priors import EQUAL, FEW, FIELD_WIDTHS, MAY_BE_UNKNOWN, MISJUDGED, WITHIN
+from crosscheck.inference.priors import EQUAL, FEW, MAY_BE_UNKNOWN, MISJUDGED, UNKNOWN, WITHIN
 from crosscheck.inference.scores import LARGE, Scores, ranked
 from seecr.effects import Knowledge, Term
 from seecr.pose import Array
@@ -56,10 +56,10 @@ _FITS, _ROUNDS = 8, 4
 _LOSING = 2
 # Most fits of one hypothesis: the second with the prior widths that the first asks for.
 _REFITS = 2
-# The key of a smooth function of the place that stands for noise.
-_PLACE = "~place"
-# Its prior width: that field's which is as large as noise is that was misjudged, 3 to 6 times.
-_AS_LARGE = FIELD_WIDTHS[2]
+# The key of a function of the place that stands for noise, and after which parts of half the range
+# of an axis it is forgotten: any that a cubic follows, and the finest that a grid of a dozen places
+# along an axis shows.
+_PLACE, _SMOOTH, _ROUGH = "~place", 1.0, 0.15
 
 
 @dataclass(eq=False)
@@ -525,28 +525,41 @@ class Search:
     def odds_of_place(self) -> float:
         """Odds that what the best hypothesis takes for noise goes by the place and not by row.
 
-        A noise larger than stated that goes along from row to row may be the sensor's, or a smooth
-        error over the workspace, which nobody calls noise. Both have as many numbers and are as
-        probable beforehand. They differ in what they foretell of near places in other runs.
+        A noise larger than stated may be the sensor's, or an error over the workspace, which nobody
+        calls noise. They differ in what they foretell of near places in other runs. If it goes
+        along from row to row, a smooth error is as probable beforehand. A rough one, of which even
+        neighbours hardly know, is as rare as anything unknown.
         """
         best, prior = self.best, NoisePrior.of(self.data.problem)
-        misjudged, odds = prior.misjudged(best.fit.noise), 0.0
-        widths = {name_of(k): w for k, w in best.widths.items() if not is_field(k)}
-        for kind, p in zip(prior.kinds, misjudged, strict=True):
-            if best.field is not None or p < MAY_BE_UNKNOWN or best.fit.noise.rho[kind] == 0.0:
-                continue
-            columns = smooth_over_place(best.fit, int(kind))
-            scale, rho = best.fit.noise.scale.copy(), best.fit.noise.rho.copy()
-            scale[kind], rho[kind] = 1.0, 0.0
-            every = replace(self.every, fields={_PLACE: columns})
-            start = _AS_LARGE * columns
-            found = fit(self.data, best.fit.state, widths, start, noise=Noise(scale, rho))
-            other = scored(every, best.key | {_PLACE}, found, {**best.widths, _PLACE: _AS_LARGE})
-            # what the sensor adds to it is as large as stated
-            as_stated = 1.0 - prior.misjudged(found.noise)[prior.kinds == kind]
-            share = float(np.log(MISJUDGED * np.maximum(as_stated, 1e-300)[0]))
-            odds = max(odds, float(np.exp(min(other.score + share - best.score, 50.0))))
+        odds = 0.0
+        for kind, p in zip(prior.kinds, prior.misjudged(best.fit.noise), strict=True):
+            if best.field is None and p >= MAY_BE_UNKNOWN:
+                odds = max(
+                    odds, self._odds_of(_ROUGH, prior, int(kind)) * np.exp(UNKNOWN) / MISJUDGED
+                )
+                if best.fit.noise.rho[kind] > 0.0:
+                    odds = max(odds, self._odds_of(_SMOOTH, prior, int(kind)))
         return odds
+
+    def _odds_of(self, length: float, prior: NoisePrior, kind: int) -> float:
+        """Odds of a function of the place beside noise as stated, of the same prior probability.
+
+        Args:
+            length: after which part of half the range it is forgotten. prior: of the noise.
+            kind: number of the kind of reading.
+        """
+        best = self.best
+        widths = {name_of(k): w for k, w in best.widths.items() if not is_field(k)}
+        columns = over_place(best.fit, kind, length)
+        scale, rho = best.fit.noise.scale.copy(), best.fit.noise.rho.copy()
+        size, scale[kind], rho[kind] = float(scale[kind]), 1.0, 0.0
+        every = replace(self.every, fields={_PLACE: columns})
+        found = fit(self.data, best.fit.state, widths, size * columns, noise=Noise(scale, rho))
+        other = scored(every, best.key | {_PLACE}, found, {**best.widths, _PLACE: size})
+        # what the sensor adds to it is as large as stated
+        as_stated = 1.0 - prior.misjudged(found.noise)[prior.kinds == kind][0]
+        share = np.log(max(as_stated, 1e-300)) + prior.log_misjudged(size)
+        return float(np.exp(min(other.score + share - best.score, 50.0)))
 
     def needed(self, some: Iterable[str]) -> float:
         """ln evidence that members add beside all others, about the fit of all effects together."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from made_data import COGIRO, measured, term
 
 from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.measurements.data import Measurements
+from crosscheck.measurements.data import Measurements, Sigma
 from seecr.description.mjcf import load_robot, model_path
 from seecr.description.robot import Robot
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
@@ -159,6 +160,22 @@ def test_what_one_kind_of_reading_shows_alone_is_no_noise_and_no_outliers(change
     found = diagnose(robot, data, only=("pulley_radius", "tracker_frame", "stiffness"))
     assert found.verdict == "unknown_effect" and not found.missing
     assert found.chances is not None and found.chances.unknown > 0.95
+
+
+@pytest.mark.parametrize("hidden", [(), ("pulley_radius",)], ids=str)
+def test_white_noise_is_nothing_unknown_however_much_too_small_it_is_stated(
+    hidden: tuple[str, ...],
+) -> None:
+    robot = robot_named("cogiro")
+    data = measured(robot, [term(robot, name, **PULLEY) for name in hidden], seed=3)
+    stated = Sigma(data.sigma.position_m / 25.0, data.sigma.orientation_rad / 25.0)
+    found = diagnose(robot, replace(data, sigma=stated), only=("pulley_radius", "stiffness"))
+    assert found.verdict == ("effects_found" if hidden else "no_effect_missing")
+    assert tuple(f.effect for f in found.missing) == hidden
+    assert any(
+        re.search(r"noise of the position: 2[3-7]\.\d\d times the assumed", note)
+        for note in found.notes
+    )
 
 
 @pytest.mark.parametrize(("change", "only"), BESIDE, ids=named)

@@ -188,15 +188,17 @@ def test_only_a_statement_can_be_misjudged() -> None:
     assert not prior_of("dwell_scatter", Sigma(1e-3, 1e-3)).misjudged(noise).any()
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.85])
-def test_noise_of_several_times_its_stated_size_is_no_unknown_effect(rho: float) -> None:
+@pytest.mark.parametrize(("size", "rho"), [(3.5, 0.0), (3.5, 0.85), (30.0, 0.0), (30.0, 0.2)])
+def test_noise_of_several_times_its_stated_size_is_no_unknown_effect(
+    size: float, rho: float
+) -> None:
     prior = prior_of("stated", Sigma(1e-3, 1e-3))
-    large = Noise(np.array([3.5, 1.0, 1.0]), np.array([rho, 0.0, 0.0]))
+    large = Noise(np.array([size, 1.0, 1.0]), np.array([rho, 0.0, 0.0]))
     assert prior.is_unknown(large) < 0.05
 
 
 def test_what_is_beyond_any_noise_is_unknown() -> None:
     prior = prior_of("stated", Sigma(1e-3, 1e-3))
-    beyond = Noise(np.array([30.0, 1.0, 1.0]), np.zeros(3))
+    beyond = Noise(np.array([30.0, 1.0, 1.0]), np.array([0.5, 0.0, 0.0]))
     slow = Noise(np.array([3.5, 1.0, 1.0]), np.array([0.96, 0.0, 0.0]))
     assert prior.is_unknown(beyond) > 0.95 and prior.is_unknown(slow) > 0.5
