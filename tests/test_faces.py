@@ -84,7 +84,7 @@ TRADE = {
     for line in """
 crosscheck.measurements.data: parse_kind parse_quantity
 crosscheck.model.write: check_place state_of
-crosscheck.planning.write: NAME box_of planned_files
+crosscheck.planning.write: box_of planned_files
 crosscheck.studies.cases: read_cases
 crosscheck.studies.study: studied
 crosscheck.suite.cases: select

@@ -41,17 +41,14 @@ def command(
     Exit status: 0 written, 1 not written because the prediction of test runs does not improve,
     2 bad input, 3 rows without an equilibrium or a fit that does not converge.
     """
-    from crosscheck import Sigma, calibrate, load_measurements
+    from crosscheck import calibrate
     from crosscheck.model.write import check_place, state_of
     from crosscheck.show.models import print_calibration
 
     choices.check_effects(only, exclude)  # a wrong name is told before any file is read
-    from seecr.cli.arguments import robot_at
-
-    machine = robot_at(robot)
+    machine, measured = choices.measured_by(robot, data, sigmas)
     before = state_of(model)
     old = choices.model_or_new(model, machine)
-    measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
     check_place(model)
     with result_in(out, "calibration.json") as keep:
         say_duration("calibrate", measured.n_rows, "rows", as_json)

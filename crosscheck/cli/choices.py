@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from copy import copy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ from seecr.cli import results
 from seecr.cli.options import FILE, columns, fix, option, passive, together, words_option
 
 if TYPE_CHECKING:
-    from crosscheck import Addition, Calibrated
+    from crosscheck import Addition, Calibrated, Comparison, Diagnosis, Measurements, Plan
     from seecr import Model, Robot
     from seecr.files import Made
 
@@ -64,17 +64,37 @@ def check_effects(*names: Sequence[str]) -> None:
         effect_named(name)
 
 
-@contextmanager
-def figures_in(folder: Path | None) -> Iterator[None]:
-    """Figures that are drawn meanwhile are kept there, if anywhere; all of them or none."""
-    if folder is None:
-        yield
-        return
+def measured_by(
+    robot: Path, data: Sequence[Path], sigmas: Sequence[str]
+) -> tuple[Robot, Measurements]:
+    """The robot and the measurements of a command, with the noise of ``--sigma``."""
+    from crosscheck import Sigma, load_measurements
+    from seecr.cli.arguments import robot_at
+
+    machine = robot_at(robot)
+    return machine, load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
+
+
+def keep_page(
+    found: Comparison | Diagnosis | Plan, folder: Path, name: str, text: Iterable[str], made: Made,
+    figures: Path | None, recorded: bool = False,
+) -> None:  # fmt: skip
+    """Write a result's files into a folder: its JSON, its page and, if any, its recording.
+
+    The page's figures are kept elsewhere too, if anywhere: all of them or none.
+    """
     from crosscheck.show.figures import keeping
+    from crosscheck.show.pictures import write_page
+    from seecr.files import write_text
     from seecr.folders import staged
 
-    with staged(folder, "--figures") as unfinished, keeping(unfinished):
-        yield
+    write_text(folder / f"{name}.json", text)
+    with ExitStack() as meanwhile:
+        if figures is not None:
+            meanwhile.enter_context(keeping(meanwhile.enter_context(staged(figures, "--figures"))))
+        write_page(found, folder / f"{name}.html", made)
+        if recorded:
+            found.save_recording(folder / f"{name}.rrd")
 
 
 def model_or_new(path: Path, robot: Robot) -> Model:

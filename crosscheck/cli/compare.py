@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import click
+from click.core import ParameterSource
 
 from crosscheck.cli import choices
 from crosscheck.cli.following import Given, after_comparison
@@ -72,17 +73,15 @@ def command(
     """
     if _are_models(robot, data):
         return _compare_two(robot, data[0], out, model_out, fail_on, as_json)
-    from crosscheck import Limits, Sigma, compare, exceeded, load_limits, load_measurements
-    from crosscheck.show.misfit import drawn_words
-    from crosscheck.show.pictures import write_page
+    from crosscheck import Limits, compare, exceeded, load_limits
+    from crosscheck.show.comparison import print_comparison
+    from crosscheck.show.residuals import drawn_words
     from seecr import load_model, with_history
-    from seecr.cli.arguments import robot_at
-    from seecr.files import json_pieces, write_text
+    from seecr.files import json_pieces
     from seecr.folders import staged
 
     limits = (load_limits(limits_file) if limits_file else Limits()).but(errors)
-    machine = robot_at(robot)
-    measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
+    machine, measured = choices.measured_by(robot, data, sigmas)
     own = load_model(model, machine) if model is not None else None
     made = made_by(machine.source, *data, model)
     names, sometimes = ["comparison.json", "comparison.html"], ["comparison.rrd"]
@@ -97,14 +96,9 @@ def command(
         head = {"made": made, "exit_status": status, "limits": stated, "exceeded": beyond}
         notes = own.notes if own else ()
         document = {**head, **found.as_json(), "model_notes": list(notes)}
-        write_text(folder / "comparison.json", json_pieces(document))
         progress("drawing the page" if no_recording else "drawing the page, recording", 0.5)
-        with choices.figures_in(figures):
-            write_page(found, folder / "comparison.html", made)
-            if not no_recording:
-                from crosscheck.show.error_recordings import write_comparison_recording
-
-                write_comparison_recording(found, folder / "comparison.rrd")
+        text = json_pieces(document)
+        choices.keep_page(found, folder, "comparison", text, made, figures, not no_recording)
         progress("all is written", 1.0)
     if said := drawn_words(found.problem.data.n_rows):
         click.echo(said, err=True)
@@ -112,8 +106,6 @@ def command(
         for piece in json_pieces(document):
             click.echo(piece, nl=False)
         return status
-    from crosscheck.show.comparison import print_comparison
-
     for note in notes:
         click.echo(f"note: {note}")
     print_comparison(choices.untold(found), beyond, limits != Limits(), out)
@@ -141,22 +133,16 @@ def _are_models(robot: Path, data: Sequence[Path]) -> bool:
             "expected ROBOT.xml DATA.csv..., or two models (A.toml B.toml) or diagnoses "
             f"(diagnosis.json) of one robot; got {' '.join(map(str, files))}"
         )
-    _check_options(bool(models))
-    return bool(models)
-
-
-def _check_options(models: bool) -> None:
-    """Refuse options of the other way of ``compare``."""
     context = click.get_current_context()
-    default = click.core.ParameterSource.DEFAULT
     for param in context.command.params:
-        of_either = param.name in _EITHER or not param.expose_value
-        if not isinstance(param, click.Option) or param.name is None or of_either:
+        name = param.name or ""
+        if name in _EITHER or not param.expose_value or not isinstance(param, click.Option):
             continue
-        given = context.get_parameter_source(param.name) not in (default, None)
-        if given and (param.name in _THEIRS) != models:
-            way = "two models" if param.name in _THEIRS else "ROBOT.xml DATA.csv..."
+        given = context.get_parameter_source(name) not in (ParameterSource.DEFAULT, None)
+        if given and (name in _THEIRS) != bool(models):
+            way = "two models" if name in _THEIRS else "ROBOT.xml DATA.csv..."
             raise click.UsageError(f"{param.opts[0]} is for compare {way}; leave it out")
+    return bool(models)
 
 
 def _compare_two(
@@ -177,7 +163,8 @@ def _compare_two(
     made = made_by(before, now)
     with staged(out, names=["models.json"], read=[before, now], made=made) as folder:
         found = compare_models(before, now)
-        status = 1 if (fail_on and found.differs) or _unwritten(found.pooled, model_out) else 0
+        unwritten = model_out is not None and found.pooled is None
+        status = 1 if (fail_on and found.differs) or unwritten else 0
         text = json_text({"made": made, "exit_status": status, **found.as_json()})
         write_text(folder / "models.json", text + "\n")
     if model_out is not None and found.pooled is not None:
@@ -191,7 +178,3 @@ def _compare_two(
     model = ("--model", kept) if kept.suffix.lower() == ".toml" else ()
     click.echo(following("crosscheck", "compare", "ROBOT.xml", "DATA.csv", *model))
     return status
-
-
-def _unwritten(pooled: object, model_out: Path | None) -> bool:
-    return model_out is not None and pooled is None

@@ -66,7 +66,12 @@ def command(
     rests elsewhere, 2 bad input, 3 a pose for which a scheme has no command, or that has no rest.
     """
     from crosscheck import Timing, Winches, control_in_time
-    from crosscheck.show.control import timed_figure, timed_json, trace_csv
+    from crosscheck.show.control import (
+        timed_figure,
+        timed_json,
+        trace_csv,
+        write_timed_recording,
+    )
     from seecr.cli.arguments import model_at, robot_at
     from seecr.files import json_text, with_toml, write_text
     from seecr.folders import staged
@@ -107,11 +112,8 @@ def command(
             write_text(folder / f"{name}.csv", trace_csv(one))
         if figure != "none":
             timed_figure(folder / f"control.{figure}", result)
-        if not no_recording:
-            from crosscheck.show.control import write_timed_recording
-
-            for name, one in result.schemes.items():
-                write_timed_recording(one, folder / f"{name}.rrd")
+        for name, one in ({} if no_recording else result.schemes).items():
+            write_timed_recording(one, folder / f"{name}.rrd")
     then = following("seecr", "correct", robot, poses)
     lines = [*wanted.notes, *result.lines(), f"Results in {out}/", then]
     click.echo(text if as_json else "\n".join(lines))

@@ -49,23 +49,19 @@ def command(
     Exit status: 0 with a verdict, or without one for lack of data; 1 a verdict of --fail-on, 2 bad
     input, 3 rows without an equilibrium.
     """
-    from crosscheck import DiagnosisVerdict, Sigma, Tolerance, diagnose, load_measurements
+    from crosscheck import DiagnosisVerdict, Tolerance, diagnose
     from crosscheck.model.write import check_place
     from crosscheck.show.diagnosis import print_diagnosis
-    from crosscheck.show.misfit import drawn_words
-    from crosscheck.show.pictures import write_page
+    from crosscheck.show.residuals import drawn_words
     from seecr import load_model, new_model, with_history
     from seecr.description.fingerprint import fingerprint
-    from seecr.files import json_text, write_text
+    from seecr.files import json_text
     from seecr.folders import staged
 
     gates = [DiagnosisVerdict.named(word) for word in fail_on]
     tolerance = Tolerance.parsed(tolerances)
     choices.check_effects(only, exclude)  # a wrong name is told before any file is read
-    from seecr.cli.arguments import robot_at
-
-    machine = robot_at(robot)
-    measured = load_measurements(data, machine, sigma=Sigma.parsed(sigmas))
+    machine, measured = choices.measured_by(robot, data, sigmas)
     own = load_model(model, machine) if model is not None else new_model(machine)
     if model_out is not None:
         check_place(model_out)
@@ -79,13 +75,8 @@ def command(
                 tolerance=tolerance,
             )  # fmt: skip
         text = json_text({"made": made, "robot": fingerprint(machine), **found.as_json()})
-        write_text(folder / "diagnosis.json", text + "\n")
-        with choices.figures_in(figures):
-            write_page(found, folder / "diagnosis.html", made)
-            if not no_recording and found.path is not None:
-                from crosscheck.show.error_recordings import write_diagnosis_recording
-
-                write_diagnosis_recording(found, folder / "diagnosis.rrd")
+        recorded = not no_recording and found.path is not None
+        choices.keep_page(found, folder, "diagnosis", text + "\n", made, figures, recorded)
         if found.path is not None and (said := drawn_words(found.path.problem.data.n_rows)):
             click.echo(said, err=True)
         note = "" if model_out is None else keep_found(found, model_out)

@@ -92,11 +92,10 @@ def command(
         raise click.UsageError(f"expected POSES.csv or --rows N, got {got}")
     from crosscheck import Sigma, choose_poses, load_commands, make_plan, write_plan
     from crosscheck.measurements.data import parse_quantity
-    from crosscheck.planning.write import NAME, box_of, planned_files
-    from crosscheck.show.pictures import write_page
+    from crosscheck.planning.write import box_of, planned_files
     from crosscheck.show.plan import print_plan
     from seecr.cli.arguments import check_places, robot_at
-    from seecr.files import json_text, with_toml, write_text
+    from seecr.files import json_text, with_toml
     from seecr.folders import staged
 
     machine = robot_at(robot)
@@ -110,10 +109,8 @@ def command(
     made = made_by(machine.source, poses)
     where = planned_files(out, poses)
     with staged(out, read=with_toml(poses), made=made, **where) as folder:
-        if given is None:
-            say_duration("choose", rows or 0, "poses to choose", as_json)
-        else:
-            say_duration("plan", given.n_rows, "rows", as_json)
+        many = ("choose", rows or 0, "poses to choose")
+        say_duration(*(many if given is None else ("plan", given.n_rows, "rows")), as_json)
         with progress_share("planning") as progress:
             asked: dict[str, Any] = {
                 "reads": reads, "limits": (lowest, highest), "box": room, "tilt": turn,
@@ -127,9 +124,7 @@ def command(
         files = write_plan(plan, folder, own=given is None)
         head = {"made": made, "exit_status": status}
         text = json_text({**head, **plan.as_json(), "files": list(files)})
-        write_text(folder / NAME, text + "\n")
-        with choices.figures_in(figures):
-            write_page(plan, folder / "plan.html", made)
+        choices.keep_page(plan, folder, "plan", text + "\n", made, figures)
     if as_json:
         click.echo(text)
     else:

@@ -94,8 +94,10 @@ def command(
     (and nothing exceeded a threshold).
     """
     from crosscheck import load_thresholds, user_cases
+    from crosscheck.show.suite import print_run
     from crosscheck.suite.cases import select
     from crosscheck.suite.run import every_shipped, shipped_like
+    from crosscheck.suite.write import RESULTS
     from seecr.cli.arguments import robot_at
     from seecr.parallel import processors
 
@@ -116,7 +118,14 @@ def command(
     say_duration("run", sum(map(len, chosen)), "poses", as_json, at_once=at_once)
     with executor_of(scheduler) as executor:
         run = _run(chosen, thresholds, seed, at_once, not no_recordings, out, executor)
-    _tell(run, out, not no_recordings, as_json)
+    for note in run.notes:
+        click.echo(f"note: {note}", err=True)
+    if as_json:
+        click.echo((out / RESULTS).read_text(encoding="utf-8"), nl=False)
+    else:
+        print_run(run, out)
+        if run.results and not no_recordings:
+            click.echo(following("rerun", out / f"{run.results[0].case.name}.rrd"))
     return run.outcome.exit_status
 
 
@@ -155,22 +164,6 @@ def _run(
 
 def _record(result: CaseResult, folder: Path) -> str:
     """Write the recording of a case into a folder; its name."""
-    from crosscheck.show.case_recording import write_case_recording
-
     name = f"{result.case.name}.rrd"
-    write_case_recording(result, folder / name)
+    result.save_recording(folder / name)
     return name
-
-
-def _tell(run: Run, out: Path, recordings: bool, as_json: bool) -> None:
-    from crosscheck.show.suite import print_run
-    from crosscheck.suite.write import RESULTS
-
-    for note in run.notes:
-        click.echo(f"note: {note}", err=True)
-    if as_json:
-        click.echo((out / RESULTS).read_text(encoding="utf-8"), nl=False)
-        return
-    print_run(run, out)
-    if recordings and run.results:
-        click.echo(following("rerun", out / f"{run.results[0].case.name}.rrd"))

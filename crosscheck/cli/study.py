@@ -12,7 +12,7 @@ from seecr.cli.progress import executor_of, progress_bar
 from seecr.cli.results import made_by
 
 if TYPE_CHECKING:
-    from crosscheck import Study, Tolerance
+    from crosscheck import Tolerance
 
 
 @options.command(
@@ -58,7 +58,7 @@ def command(
     \b
     Exit status: 0 all well, 2 bad input, 3 a case without a result, or workers that ended.
     """
-    from crosscheck.show.study import study_figure
+    from crosscheck.show.study import print_study, study_figure
     from crosscheck.studies.cases import read_cases
     from crosscheck.studies.study import studied
     from seecr.columns.csv import table_text
@@ -82,15 +82,12 @@ def command(
         write_text(folder / names[1], text + "\n")
         if figure != "none":
             study_figure(found, folder / f"study.{figure}")
-    click.echo(text) if as_json else _tell(found, out)
+    if as_json:
+        click.echo(text)
+    else:
+        print_study(found)
+        click.echo(f"Results in {out}/")
     return status
-
-
-def _tell(found: Study, out: Path) -> None:
-    from crosscheck.show.study import print_study
-
-    print_study(found)
-    click.echo(f"Results in {out}/")
 
 
 def _limits(sizes: tuple[str, ...]) -> Tolerance | None:

@@ -13,11 +13,10 @@ from crosscheck.cli import choices
 from seecr.cli import options
 from seecr.cli.following import following, typed
 from seecr.cli.progress import progress_bar
-from seecr.cli.results import made_by, untold
+from seecr.cli.results import made_by, tell
 
 if TYPE_CHECKING:
     from crosscheck import Twin
-    from seecr.files import Made
 
 
 @options.command(
@@ -107,13 +106,14 @@ def command(
             "--effect already sets how many effects are hidden; leave out --effects"
         )
     from crosscheck import Sigma, load_commands, make_twin
+    from crosscheck.twin import FILES
+    from seecr.cli.arguments import robot_at
+    from seecr.files import json_text
 
     files = list(dict.fromkeys(name for name in names if ".py" in name))
     own = dict(zip(files, introduce_all(files), strict=True))
     names = tuple(own.get(name, name) for name in names)
     noise = Sigma.parsed(sigmas)
-    from seecr.cli.arguments import robot_at
-
     machine = robot_at(robot)
     commands = load_commands(poses, machine, sigma=noise) if poses is not None else None
     # whatever is hidden, the bar shows the same: rows of one kind, done or not
@@ -124,24 +124,21 @@ def command(
             progress=lambda rows, now: advance(0, "measuring"),
         )  # fmt: skip
         advance(1, "measured")
-    _tell(twin, out, made_by(twin.robot.source, poses) if as_json else None)
+    tell(twin.notes)
+    if as_json:
+        made = made_by(twin.robot.source, poses)
+        document = {"made": made, **twin.as_json(), "folder": str(out), "files": list(FILES)}
+        click.echo(json_text(document, indent=2))
+    else:
+        _tell_made(twin, out)
     return 0
 
 
-def _tell(twin: Twin, out: Path, made: Made | None) -> None:
-    """What was made, as JSON where it is told how it was made."""
+def _tell_made(twin: Twin, out: Path) -> None:
     from crosscheck.twin import FILES
     from seecr.cli.following import given_effects
     from seecr.counted import counted
-    from seecr.files import json_text
 
-    files = list(FILES)
-    for note in untold(twin.notes):
-        click.echo(f"note: {note}", err=True)
-    if made is not None:
-        document = {"made": made, **twin.as_json(), "folder": str(out), "files": files}
-        click.echo(json_text(document, indent=2))
-        return
     sigma, own = twin.answer.sigma, given_effects()
     noise = f"{1e3 * sigma['position_m']:.3g} mm"
     if "orientation_rad" in sigma:
@@ -150,7 +147,7 @@ def _tell(twin: Twin, out: Path, made: Made | None) -> None:
         noise += f", {sigma['tension_N']:.2g} N"
     rows, runs = counted(twin.measured.n_rows, "row"), counted(len(twin.measured.runs), "run")
     click.echo(f"{rows} of {twin.robot.name} in {runs}; noise {noise}")
-    click.echo(f"written to {out}: {', '.join(files)}")
+    click.echo(f"written to {out}: {', '.join(FILES)}")
     click.echo(f"to see what is hidden: {typed('crosscheck', 'twin', '--open', out, *own)}")
     click.echo(following("crosscheck", "diagnose", out / "robot.xml", out / "measured.csv"))
 

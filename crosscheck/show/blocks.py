@@ -198,8 +198,7 @@ class Page:
 
 def section(title: str, *blocks: Block | None) -> Panel | None:
     """A section of those blocks that are there; None if there are none."""
-    some = [block for block in blocks if block is not None]
-    return Panel(title, some) if some else None
+    return Panel(title, some) if (some := present(*blocks)) else None
 
 
 def present(*blocks: Block | None) -> list[Block]:
@@ -241,8 +240,8 @@ def in_units(values: Iterable[float], si: str) -> list[str]:
 
 def kinds_with(every: Iterable[Rms]) -> list[Kind]:
     """The kinds of reading of which some errors are known."""
-    some = list(every)
-    return [kind for kind in KINDS if any(rms.get(kind.key) is not None for rms in some)]
+    known = {key for rms in every for key, value in rms.items() if value is not None}
+    return [kind for kind in KINDS if kind.key in known]
 
 
 def heads_of(kinds: Iterable[Kind]) -> list[str]:
@@ -250,16 +249,15 @@ def heads_of(kinds: Iterable[Kind]) -> list[str]:
     return [f"#{kind.name} [{kind.unit}]" for kind in kinds]
 
 
-def rms_cells(kinds: Iterable[Kind], rms: Rms) -> list[str | None]:
+def rms_cells(kinds: Sequence[Kind], rms: Rms) -> list[str | None]:
     """Errors in the units of the heads."""
-    values = [(kind.factor, rms.get(kind.key)) for kind in kinds]
-    return [None if value is None else four_digits(factor * value) for factor, value in values]
+    return size_cells(kinds, [rms.get(kind.key) for kind in kinds])
 
 
-def size_cells(kinds: Iterable[Kind], sizes: Iterable[float]) -> list[str | None]:
+def size_cells(kinds: Iterable[Kind], sizes: Iterable[float | None]) -> list[str | None]:
     """Sizes of errors (SI), one per kind, in the units of the heads."""
     return [
-        four_digits(kind.factor * size) if np.isfinite(size) else None
+        None if size is None or not np.isfinite(size) else four_digits(kind.factor * size)
         for kind, size in zip(kinds, sizes, strict=True)
     ]
 
@@ -279,5 +277,4 @@ def rms_table(rows: Sequence[tuple[str, Rms, str]]) -> TextTable:
 
 def cut(lines: Sequence[str], most: int, file: str) -> list[str]:
     """The first lines, and how many more a file has."""
-    more = len(lines) - most
-    return [*lines[:most], *([f"and {more} more in {file}"] if more > 0 else [])]
+    return [*lines[:most], *[f"and {len(lines) - most} more in {file}"] * (len(lines) > most)]

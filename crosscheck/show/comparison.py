@@ -27,13 +27,12 @@ from crosscheck.show.blocks import (
     section,
     size_cells,
 )
-from crosscheck.show.misfit import Standing
+from crosscheck.show.error_figures import map_section, wall_section
 from crosscheck.show.residuals import (
+    Standing,
     association_section,
     facts_of,
-    map_section,
     title_of,
-    wall_section,
 )
 from crosscheck.show.texts import kinds_table, markdown, printed, row_heading, unused
 from seecr.counted import counted

@@ -40,16 +40,11 @@ from crosscheck.show.blocks import (
     rms_table,
     section,
 )
+from crosscheck.show.effect_figures import confusion_of, draw_confusion, robot_figure, waterfall
+from crosscheck.show.error_figures import map_section, wall_section
 from crosscheck.show.findings import PLAUSIBLE, candidate_blocks, candidate_lines, card, in_brief
-from crosscheck.show.residuals import (
-    association_section,
-    facts_of,
-    map_section,
-    title_of,
-    wall_section,
-)
+from crosscheck.show.residuals import association_section, facts_of, title_of
 from crosscheck.show.texts import kinds_table, markdown, printed, row_heading, unused
-from seecr.description.robot import Robot
 from seecr.show.colours import AFTER, BEFORE, CALM, TINT
 from seecr.units import short
 
@@ -115,27 +110,27 @@ def _finding(finding: MissingEffect) -> Items:
 
 def page_of_diagnosis(found: Diagnosis) -> Page:
     """The page of a diagnosis: the verdict, what to do, then figures and tables."""
-    of = f" of {title_of(found.path.problem)}" if found.path is not None else ""
-    path = found.path
-    sight = [] if found.sight is None else [Line(" ".join(found.sight.lines()), "dim")]
-    tests = [Checks(some)] if (some := checks(found)) else []
+    path, tests = found.path, checks(found)
+    of = "" if path is None else f" of {title_of(path.problem)}"
     # beside a drawing with no effect in it there is room for what to do
     steps = found.measure_further
-    next_steps = [Items(steps)] if steps and found.missing else []
     blocks = present(
         None if path is None else _waterfall(found, path),
         _no_search(found),
-        section("What to measure next", *next_steps),
+        section("What to measure next", Items(steps) if steps and found.missing else None),
         None if path is None else section("The data", _facts(found, path.problem)),
         section("Missing effects, in the order in which they were added",
                 *(card(found, k, one) for k, one in enumerate(found.missing, 1))),
-        section("What speaks for it, and what against", *tests),
-        section("What these data can show", *sight),
+        section("What speaks for it, and what against", Checks(tests) if tests else None),
+        section("What these data can show",
+                None if found.sight is None else Line(" ".join(found.sight.lines()), "dim")),
         *([] if path is None else _errors(found, path)),
         association_section("What the unexplained error depends on", found.where),
         section("What else was tried, and why it is not listed", *candidate_blocks(found)),
-        None if path is None else _confusion(found),
+        _confusion(found),
     )  # fmt: skip
+    cables = () if path is None else path.problem.robot.cable_names
+    picture = None if path is None else robot_figure(path.problem.robot, found.missing)
     return Page(
         title=f"{found.verdict.heading}{of}",
         heading=f"Diagnosis{of}",
@@ -143,23 +138,15 @@ def page_of_diagnosis(found: Diagnosis) -> Page:
         name=found.verdict.heading,
         meaning=found.verdict.meaning,
         sentence=found.reason,
-        lead=[in_brief(one, path.problem.robot.cable_names) for one in found.missing]
-        if path is not None
-        else [],
+        lead=[in_brief(one, cables) for one in found.missing],
         then=() if found.missing else steps,
-        picture=None if path is None else _robot(path.problem.robot, found.missing),
+        picture=None if picture is None else Figure(picture, wide=False),
         blocks=blocks,
         notes=found.notes,
         footer="A named effect is the best explanation of those tried, not a proven cause: carry "
         "out its independent check. Errors are rms of single components, in the base frame. The "
         "same numbers, in SI: diagnosis.json.",
     )
-
-
-def _robot(robot: Robot, missing: Sequence[MissingEffect]) -> Figure:
-    from crosscheck.show.effect_figures import robot_figure
-
-    return Figure(robot_figure(robot, missing), wide=False)
 
 
 def _facts(found: Diagnosis, problem: Problem) -> Block:
@@ -185,8 +172,6 @@ def _no_search(found: Diagnosis) -> Line | None:
 
 
 def _waterfall(found: Diagnosis, path: ModelPath) -> Panel | None:
-    from crosscheck.show.effect_figures import waterfall
-
     added = ", after each effect was added" if found.missing else ""
     estimated = "the estimated " if noise_is_other(found) else ""
     together = (
@@ -213,23 +198,18 @@ def _errors(found: Diagnosis, path: ModelPath) -> list[Block | None]:
     if added:
         key += [" \N{NO-BREAK SPACE} ", Dot(AFTER), f"what remains with {' + '.join(added)}"]
     more = " Scale and colours are the same before and after." if found.missing else ""
+    title = "Where the errors are" if calm else "Where the model fails"
+    noise = "assumed noise" if noise_is_other(found) else "noise"
     return [
-        map_section(
-            "Where the errors are" if calm else "Where the model fails",
-            problem, before, last, more,
-        ),
+        map_section(title, problem, before, last, more),
         wall_section(
-            "What the error looks like", problem, before, last, alone, [*key, ". "],
-            "assumed noise" if noise_is_other(found) else "noise",
+            "What the error looks like", problem, before, last, alone, [*key, ". "], noise
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _confusion(found: Diagnosis) -> Panel | None:
-    from crosscheck.show.effect_figures import confusion_of, draw_confusion
-
-    confusion = confusion_of(found)
-    if confusion is None:
+    if (confusion := confusion_of(found)) is None:
         return None
     words: list[str] = [
         "Percentage of the row's signal, over its expected sizes, that the column could imitate "
@@ -255,33 +235,26 @@ def checks(found: Diagnosis) -> list[Check]:
     if path is None or chances is None or w is None:
         return []
     scales, _rhos = path.search.best.fit.noise.by_kind(path.problem)
-    sizes = ", ".join(
-        f"{short(value)} times the assumed one ({kind})" for kind, value in scales.items()
-    )
-    unknown = chances.unknown
+    sizes = [f"{short(value)} times the assumed one ({kind})" for kind, value in scales.items()]
     out = [
-        Check("size of the noise", max(scales.values()) < _AS_STATED, sizes),
+        Check("size of the noise", max(scales.values()) < _AS_STATED, ", ".join(sizes)),
         Check(
             "neighbouring rows", not w.structured,
             f"their correlation is {short(max(w.lag_errors, w.neighbour_errors))} standard errors "
             f"from zero; white noise stays below {STRUCTURED:g}",
         ),
-        Check(
-            "something unknown", unknown < 1.0 - SURE,
-            f"probability {probability_words(unknown)}",
-        ),
+        Check("something unknown", chances.unknown < 1.0 - SURE,
+              f"probability {probability_words(chances.unknown)}"),
         Check("effects tried", None, f"{path.tried}, in {len(path.search.cache)} models"),
     ]  # fmt: skip
-    listed = path.stages
-    if not any(stage.added for stage in listed):
+    added = [stage for stage in path.stages if stage.added]
+    if not added:
         return out
-    better, blocks = _better_runs(listed)
+    better, blocks = _better_runs(path.stages)
     worst, largest = max(
-        (float(np.max(np.abs(stage.fit.terms[stage.added].sizes))), stage.added)
-        for stage in listed
-        if stage.added
+        (float(np.max(np.abs(stage.fit.terms[stage.added].sizes))), stage.added) for stage in added
     )
-    fit = listed[-1].fit
+    fit = path.last.fit
     labels = np.array(fit.terms.labels)[fit.at_bound].tolist()
     bound = list(dict.fromkeys(effect for effect, _name in labels))
     return [
@@ -337,8 +310,7 @@ def step_text(
     """The k-th model: its errors, and its last effect; ``line`` is that of the worst pose in the
     data.
     """
-    stage = stages[k]
-    fitted = stage.rms
+    stage, fitted = stages[k], stages[k].rms
     errors = [
         (stage.held_out.rms[kind.key], fitted[kind.key], found.floor.get(kind.key) or 0.0)
         for kind in kinds
@@ -350,13 +322,10 @@ def step_text(
     elif found.candidates and len(stages) == 1:
         rows = [(row.effect, str(row.why_not)) for row in found.candidates[:_MOST_CANDIDATES]]
         more = [TextTable(["tried", "why not listed"], rows)]
-    blocks = [
-        kinds_table(kinds, errors, ("test runs", "fitted runs", "noise")),
-        *more,
-        Line(f"The box shows the worst pose, line {line} of the data."),
-    ]
+    table = kinds_table(kinds, errors, ("test runs", "fitted runs", "noise"))
+    box = Line(f"The box shows the worst pose, line {line} of the data.")
     title = f"Step {k} of {len(stages) - 1}: {stage.label}"
-    return markdown([Panel(title, blocks)])
+    return markdown([Panel(title, [table, *more, box])])
 
 
 def pose_of_step_text(

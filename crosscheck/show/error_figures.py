@@ -16,14 +16,15 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, Normalize
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from crosscheck.comparison.quantities import cable_errors, cable_lengths, channels, travel
 from crosscheck.fit.problem import KINDS, TENSION, Kind, Problem
+from crosscheck.show.blocks import Figure, Line, Panel, Words, pieces, section
 from crosscheck.show.figures import MANY, blank, dots, grid, image, styled
-from crosscheck.show.misfit import Drawn, Misfit, drawn_words
+from crosscheck.show.residuals import Drawn, Misfit, drawn_words
 from seecr.counted import counted
 from seecr.pose import Array
 from seecr.prediction.experiment import Prediction
@@ -38,6 +39,14 @@ _COLOURS = ListedColormap(colormaps["viridis_r"](np.linspace(0.42, 1.0, 128)))
 
 # A title of more letters than these does not fit above a panel: the effects are counted instead.
 _LONGEST = 48
+
+
+def map_section(
+    title: str, problem: Problem, before: Drawn, after: Drawn, more: str = ""
+) -> Panel | None:
+    """Where the errors are."""
+    figure = Figure(failure_map(problem, before, after))
+    return section(title, figure, Line(caption(problem, before) + more, "dim"))
 
 
 def failure_map(problem: Problem, before: Drawn, after: Drawn) -> str:
@@ -69,7 +78,7 @@ def _height(place: Array, view: tuple[int, int], columns: int) -> float:
     return float(np.clip(8.6 / columns * (high + 0.3 * wide) / (1.3 * wide), 1.1, _MOST_HEIGHT))
 
 
-def _draw(figure: Figure, panels: Any, shown: Misfit, stages: list[Drawn]) -> None:
+def _draw(figure: Drawing, panels: Any, shown: Misfit, stages: list[Drawn]) -> None:
     """Draw the panels, and the bar of their colours if there are any."""
     kind, dots = _kind_of_dots(shown), None
     for column, stage in enumerate(stages):
@@ -289,6 +298,23 @@ def length_changes(problem: Problem, prediction: Prediction) -> Array:
         lengths = problem.robot.nominal_lengths(travel(problem, prediction).pose)
     before = np.concatenate([lengths[:1], lengths[:-1]])
     return np.asarray(np.where(first[:, None], np.nan, lengths - before))
+
+
+def wall_section(
+    title: str, problem: Problem, before: Drawn, after: Drawn, alone: str, key: Words = (),
+    noise: str = "noise",
+) -> Panel | None:  # fmt: skip
+    """What the errors of each cable look like, with a key to their colours; ``alone`` is that of
+    errors that no effect accounts for.
+    """
+    walls = [Figure(draw_wall(wall, alone)) for wall in walls_of(problem, before, after)]
+    words = (
+        f"Grey background: two standard deviations of the {noise}. A constant suggests an offset, "
+        "a slope over the length a gain, a sine an eccentric drum, a curve over time creep, and a "
+        "step between reeled in and paid out friction or backlash."
+    )
+    hint = Line((*pieces(key), words), "dim")
+    return section(title, hint, *walls) if walls else None
 
 
 def draw_wall(wall: Wall, alone: str = BEFORE) -> str:

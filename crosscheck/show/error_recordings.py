@@ -25,7 +25,7 @@ from crosscheck.fit.state import State
 from crosscheck.show.blocks import Bold
 from crosscheck.show.comparison import pose_errors_text, verdict_text
 from crosscheck.show.diagnosis import diagnosis_text, pose_of_step_text, step_text
-from crosscheck.show.misfit import Misfit, drawn_words, predicted_poses
+from crosscheck.show.residuals import Misfit, drawn_words, predicted_poses
 from seecr.compiled.columns import REST
 from seecr.pose import Array
 from seecr.show import colours, layout, plots

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from operator import attrgetter
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
@@ -30,6 +29,12 @@ from seecr.files import Made, write_text
 from seecr.show.pictures import Pictures
 from seecr.version import full_version
 
+WithPage: TypeAlias = Comparison | Diagnosis | Plan
+"""A result that has a page."""
+_PAGES: dict[type, Callable[[Any], Page]] = {
+    Comparison: page_of_comparison, Diagnosis: page_of_diagnosis, Plan: page_of_plan,
+}  # fmt: skip
+
 # --- pages ----------------------------------------------------------------------------------------
 
 _TAGS = {
@@ -50,9 +55,7 @@ _MIDDLE = Markup('<span class="middle"><i style="{}: 50%; width: {:.1f}%"></i></
 _UNLINKED = (blocks.Code, blocks.Bold, blocks.Small)
 
 
-def write_page(
-    found: Comparison | Diagnosis | Plan, path: str | Path, made: Made | None = None
-) -> None:
+def write_page(found: WithPage, path: str | Path, made: Made | None = None) -> None:
     """Write a result as one self-contained page; how it came about stands at the page's foot.
 
     Raises:
@@ -61,7 +64,7 @@ def write_page(
     write_text(Path(path), render(found, made), failure="cannot write the page")
 
 
-def render(found: Comparison | Diagnosis | Plan, made: Made | None = None) -> str:
+def render(found: WithPage, made: Made | None = None) -> str:
     """The page's text."""
     environment = Environment(
         loader=PackageLoader("crosscheck.show", "."),
@@ -71,23 +74,15 @@ def render(found: Comparison | Diagnosis | Plan, made: Made | None = None) -> st
         lstrip_blocks=True,
     )
     glossary = Linker()
-    kind = attrgetter("__class__.__name__")
-    environment.filters |= {"html": _html, "cell": _cell, "kind": kind}
-    environment.filters["running"] = lambda words: _html(words, glossary)
+    environment.filters |= {
+        "html": _html, "cell": _cell, "kind": lambda block: type(block).__name__,
+        "running": lambda words: _html(words, glossary),
+    }  # fmt: skip
     page = environment.get_template("page.html.jinja").render(
-        page=_page_of(found), version=full_version(), made="" if made is None else made.words,
-        glossary=glossary,
+        page=_PAGES[type(found)](found), version=full_version(),
+        made="" if made is None else made.words, glossary=glossary,
     )  # fmt: skip
     return page.lstrip()
-
-
-def _page_of(found: Comparison | Diagnosis | Plan) -> Page:
-    """The page of a result, with its figures drawn."""
-    if isinstance(found, Diagnosis):
-        return page_of_diagnosis(found)
-    if isinstance(found, Plan):
-        return page_of_plan(found)
-    return page_of_comparison(found)
 
 
 def _html(words: Words, glossary: Linker | None = None) -> Markup:
@@ -116,10 +111,10 @@ def _cell(cell: Cell) -> Markup:
 # --- what draws which result ----------------------------------------------------------------------
 
 
-def _figure_of(found: Comparison | Diagnosis | Plan, name: str) -> Any:
+def _figure_of(found: WithPage, name: str) -> Any:
     """A figure of the result's page by the name that --figures gives its file; the first for ""."""
     with collecting() as drawn:
-        _page_of(found)
+        _PAGES[type(found)](found)
     if not drawn:
         raise InputError("nothing can be drawn: without readings or a verdict a page has no figure")
     if name and name not in drawn:
@@ -128,18 +123,14 @@ def _figure_of(found: Comparison | Diagnosis | Plan, name: str) -> Any:
 
 
 def _record(found: Comparison | Diagnosis | CaseResult, path: Any) -> None:
-    from crosscheck.show.case_recording import write_case_recording
-    from crosscheck.show.error_recordings import (
-        write_comparison_recording,
-        write_diagnosis_recording,
-    )
+    from crosscheck.show import case_recording, error_recordings
 
     if isinstance(found, Comparison):
-        write_comparison_recording(found, path)
+        error_recordings.write_comparison_recording(found, path)
     elif isinstance(found, Diagnosis):
-        write_diagnosis_recording(found, path)
+        error_recordings.write_diagnosis_recording(found, path)
     else:
-        write_case_recording(found, path)
+        case_recording.write_case_recording(found, path)
 
 
 def _record_run(found: Run, path: Any) -> None:

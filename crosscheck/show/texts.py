@@ -139,8 +139,7 @@ def _words(words: Words) -> str:
 
 def _table(block: TextTable) -> str:
     """A table; without heads its first row is the head, as Markdown needs one."""
-    every: list[Sequence[Cell]] = [*([block.heads] if block.heads else []), *block.rows]
-    heads, *rows = every
+    heads, *rows = [block.heads, *block.rows] if block.heads else block.rows
     names = [_cell(head).removeprefix("\\#") for head in heads]
     lines = [_row(names), "|" + " --- |" * len(names), *(_row(map(_cell, row)) for row in rows)]
     return "\n".join(lines)
@@ -185,10 +184,7 @@ def kinds_table(
     value.
     """
     rows = [
-        [
-            f"{kind.name} [{kind.unit}]",
-            *(short(None if value is None else kind.factor * value) for value in row),
-        ]
+        [f"{kind.name} [{kind.unit}]", *(short(v if v is None else kind.factor * v) for v in row)]
         for kind, row in zip(kinds, values, strict=True)
     ]
     return TextTable([corner, *names], rows)

@@ -43,8 +43,8 @@ from crosscheck.show.findings import (
     parameter_table,
     untried,
 )
-from crosscheck.show.misfit import Misfit, views_of
 from crosscheck.show.pictures import render
+from crosscheck.show.residuals import Misfit, views_of
 from seecr import load_robot
 from seecr.effects import Term, Terms, layout_of
 from seecr.pose import transform_points

@@ -15,7 +15,7 @@ from crosscheck.diagnosis.path import Stage
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.words import removed
 from crosscheck.fit.problem import KINDS, POSITION
-from crosscheck.show import misfit
+from crosscheck.show import residuals
 from crosscheck.show.error_figures import caption
 from crosscheck.show.error_recordings import (
     bars_share,
@@ -23,7 +23,7 @@ from crosscheck.show.error_recordings import (
     write_comparison_recording,
     write_diagnosis_recording,
 )
-from crosscheck.show.misfit import Misfit, Standing, predicted_poses
+from crosscheck.show.residuals import Misfit, Standing, predicted_poses
 from crosscheck.show.texts import escaped
 from seecr.units import short
 
@@ -249,7 +249,7 @@ def test_of_too_many_rows_those_with_the_largest_errors_are_drawn_and_some_other
     comparison: Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The recording says so, and keeps the poses' numbers, which are those of every other file."""
-    monkeypatch.setattr(misfit, "_MOST_DRAWN", 20)
+    monkeypatch.setattr(residuals, "_MOST_DRAWN", 20)
     write_comparison_recording(comparison, tmp_path / "thin.rrd")
     back, count = Readback(tmp_path / "thin.rrd"), len(comparison.problem.data)
     words = f"Drawn are 20 of {count} rows: the 10 with the largest errors in units of the noise"
