@@ -1,4 +1,4 @@
-"""Pages and pictures that are made from the sources are current, and what pages point to exists."""
+"""Pages, pictures and figures made from the sources are current; what pages point to exists."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import re
 from pathlib import Path
 
+import bench
 import draw_effects
 import draw_floors
 import link_words
@@ -14,6 +15,7 @@ import make_commands
 import make_effects
 import numpy as np
 import pytest
+import score
 
 import crosscheck
 import seecr
@@ -150,3 +152,66 @@ def test_tasks_are_listed() -> None:
     assert listed >= {"setup", "quick", "test", "bench", "docs", "suite", "ci"}
     for script in re.findall(r"scripts/\w+\.py", text):
         assert (ROOT / script).exists(), script
+
+
+PAGE = (Path(__file__).parents[1] / "docs" / "robots.md").read_text(encoding="utf-8")
+ROWS = [line for line in PAGE.splitlines() if line.startswith("| ") and " | from | " not in line]
+
+
+def test_the_head_counts_the_rows() -> None:
+    total, read, rest = map(int, re.findall(r"(?:the|:|and) (\d+) (?:robots|are|of)", PAGE)[:3])
+    refused = [row for row in ROWS if "| refused |" in row]
+    resting = [row for row in ROWS if "| rests, " in row]
+    assert (total, read, rest) == (len(ROWS), len(ROWS) - len(refused), len(resting))
+    assert (total, rest) >= (79, 45)
+
+
+def test_whoever_does_not_rest_has_a_reason_and_the_others_agree_with_mujoco() -> None:
+    """Two equilibria, which both physics confirm, are no disagreement."""
+    for row in ROWS:
+        *_cells, home, agreement, remark = (cell.strip() for cell in row.strip("|").split("|"))
+        if home.startswith("rests"):
+            agree, _of, poses = agreement.partition(";")[0].split()
+            both = re.search(r"(\d+) two stable equilibria", agreement)
+            assert int(agree) + (int(both[1]) if both else 0) == int(poses), row
+        else:
+            assert len(remark) > 20, row
+
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+
+
+def test_the_page_quotes_the_figures() -> None:
+    found = json.loads((DOCS / "figures.json").read_text(encoding="utf-8"))["diagnosis"]
+    page = (DOCS / "diagnosis.md").read_text(encoding="utf-8")
+    quoted = page.partition(f"{score.BEGIN}\n")[2].partition(f"\n{score.END}")[0]
+    assert quoted == score.page_of(found), "run: make score"
+
+
+def test_the_page_of_speed_is_that_of_the_figures() -> None:
+    found = json.loads((DOCS / "figures.json").read_text(encoding="utf-8"))["speed"]
+    page = (DOCS / "performance.md").read_text(encoding="utf-8")
+    assert page == bench.page_of(found), "run: make bench"
+
+
+@pytest.mark.parametrize(
+    ("hidden", "named", "false"),
+    [
+        ("stiffness", [["platform_mass", "stiffness"]], 0),
+        ("stiffness", [["platform_mass"]], 1),
+        ("exit_friction", [["winch_side_length"]], 0),  # friction is on a cable behind the exit
+        ("winch_side_length", [["exit_friction"]], 1),
+    ],
+)
+def test_a_name_is_false_where_nothing_it_stands_for_is_hidden(
+    hidden: str, named: list[list[str]], false: int
+) -> None:
+    row = {"hidden": {hidden: 8.0}, "named": named}
+    assert len(score.false_names(row)) == false
+
+
+def test_every_number_that_steers_says_where_it_comes_from() -> None:
+    text = Path(score.priors.__file__).read_text(encoding="utf-8")
+    names = re.findall(r"^([A-Z_, ]+) = ", text, re.MULTILINE)
+    assert len([n for line in names for n in line.split(", ")]) <= 25
+    assert len(re.findall(r'^"""', text, re.MULTILINE)) >= len(names)

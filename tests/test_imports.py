@@ -220,17 +220,13 @@ def test_a_package_runs_as_its_command(package: str) -> None:
 @pytest.mark.parametrize(
     ("imported", "heavy"),
     [
-        (
-            "seecr, crosscheck, crosscheck.cli, seecr.cli, seecr.description.robot",
-            "numba mujoco rerun matplotlib pyarrow scipy",
-        ),
+        ("seecr, crosscheck, crosscheck.cli, seecr.cli, seecr.description.robot",
+         "numba mujoco rerun matplotlib pyarrow scipy"),
         # what few data need takes most of a second
-        (
-            "crosscheck.comparison.residuals, crosscheck.diagnosis.diagnose",
-            "scipy.stats scipy.signal",
-        ),
+        ("crosscheck.comparison.residuals, crosscheck.diagnosis.diagnose",
+         "scipy.stats scipy.signal"),
     ],
-)
+)  # fmt: skip
 def test_importing_is_light(imported: str, heavy: str) -> None:
     code = f"import sys, {imported}; print(*(sys.modules.keys() & {heavy.split()}))"
     run = subprocess.run(

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import ast
-import re
 from importlib import import_module
 
-from sources import ROOT, modules, name_of, tree_of
+from sources import modules, name_of, tree_of
 
 import crosscheck
 import seecr
@@ -48,11 +47,3 @@ def test_no_module_has_the_name_of_what_its_package_gives() -> None:
         if path.with_name(f"{name}.py").exists() or path.with_name(name).is_dir()
     ]
     assert hidden == []
-
-
-def test_what_each_has_is_told_as_per() -> None:
-    folders = ("seecr", "crosscheck", "docs", "scripts", "models")
-    files = [p for f in folders for kind in ("py", "md") for p in (ROOT / f).rglob(f"*.{kind}")]
-    odd = re.compile(r"(?:\bone|\b[mµ]?s|\bor so|z|chi2|\bothers) a (?:pose|cable|row|reading)\b")
-    found = {p.name: odd.findall(p.read_text(encoding="utf-8")) for p in files}
-    assert {name: words for name, words in found.items() if words} == {}

@@ -121,19 +121,6 @@ def test_figure_9_shows_where_equal_tensions_of_a_pair_pull(
     assert titles == ["H on", "V on", "V 25 mm left of"]
 
 
-def test_curves_of_what_explains_figure_12_have_no_kinks_of_few_points(
-    kept: list[Any], tmp_path: Path
-) -> None:
-    far = explain_figure_12.explain(("nonlinear_elasticity",))
-    explain_figure_12.picture(tmp_path / "explained.png", [far])
-    (ax,) = kept[0].axes
-    curve, dots = (line.get_xydata() for line in ax.lines[:2])
-    over = np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
-    assert np.linalg.norm(np.diff(curve, axis=0) / over, axis=1).max() < 0.05
-    place, one = explain_figure_12.placing(far.names), far.at / far.size
-    np.testing.assert_allclose(dots, [place(one), place(2.0 * one)], atol=1e-6)
-
-
 @pytest.mark.slow
 def test_the_papers_counts_are_those_of_fsolve() -> None:
     counts = {(name[8:], method): (calls, lost) for name, method, calls, _, lost in

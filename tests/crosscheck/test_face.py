@@ -176,23 +176,8 @@ def test_frames_hold_what_the_csv_holds() -> None:
     assert np.array_equal(frame["tension_2_N"].to_numpy(), data.tensions[:, 1])
 
 
-def test_a_twin_does_not_tell() -> None:
-    twin = crosscheck.make_twin(ROBOT, 1, effects=("platform_mass",), points=4)
-    assert "platform_mass" not in str(twin) + twin._repr_html_()
-
-
 def test_a_run_tells_what_mujoco_leaves_out() -> None:
     run = result_of("Run")
     assert isinstance(run, crosscheck.Run) and "note: " not in str(run)
     odd = replace(run, results=[replace(run.results[0], ignored=("contacts",))])
     assert str(odd) == f"{run}\nnote: {odd.notes[0]}" and "contacts" in odd.notes[0]
-
-
-def test_bad_input_is_told_as_by_the_commands(tmp_path: Path) -> None:
-    gone = tmp_path / "gone.csv"
-    with pytest.raises(seecr.InputFileError, match=r"gone\.csv: no such file"):
-        crosscheck.diagnose(ROBOT, gone)
-    with pytest.raises(seecr.SeecrError, match=r"gone\.xml"):
-        crosscheck.compare(tmp_path / "gone.xml", gone)
-    with pytest.raises(seecr.InputFileError, match=r"gone\.toml"):
-        crosscheck.add_effect(ROBOT, data_file(), "stiffness", tmp_path / "gone.toml")

@@ -131,12 +131,6 @@ def far_from_10_mm() -> Term:
     return Term.of(robot(), "pulley_radius", radius_m=0.05)
 
 
-def test_a_fit_comes_to_an_end() -> None:
-    ready = prepare(robot(), readings(radius_m=0.01), Terms())
-    data = Data.of(ready.problem, Terms())
-    assert fit(data, data.state(Terms([far_from_10_mm()]))).settled
-
-
 @pytest.mark.usefixtures("one_step")
 def test_a_fit_knows_that_it_came_to_no_end() -> None:
     ready = prepare(robot(), readings(radius_m=0.01), Terms())
@@ -283,14 +277,6 @@ def test_a_fit_that_cannot_be_solved_adds_nothing() -> None:
     huge = term(ROBOT, "external_wrench", force_z_N=1e9)
     with pytest.raises(UnsolvedError, match="external_wrench: some rows could not be solved at"):
         add_effects(ROBOT, data, [huge])
-
-
-def test_the_added_effect_is_found_by_its_name_and_the_model_has_all() -> None:
-    found = addition()
-    assert found.own.term.name == "stiffness" and found.own.term.vector == [1.2]
-    assert found.terms.names == ("pulley_radius", "stiffness")
-    assert found.lines()[-2:] == ["warning: odd", "note: said"]
-    assert found.as_json()["added"] == ["stiffness", "creep"]
 
 
 def test_warnings_of_several_parameters_are_in_the_plural() -> None:

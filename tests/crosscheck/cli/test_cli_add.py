@@ -108,32 +108,20 @@ def test_what_is_there_already_is_only_fitted_again_when_asked(both, tmp_path):
 @pytest.mark.parametrize(
     ("effect", "name", "said"),
     [
-        (
-            "exit_point_error",
-            "few.csv",
-            "few.csv: exit_point_error cannot be fitted to these data: has 24 parameters, but the "
-            "data have only 10 rows",
-        ),
-        (
-            "thermal_expansion",
-            "measured.csv",
-            "thermal_expansion cannot be fitted to these data: needs the temperature, column "
-            "temperature_C",
-        ),
-        (
-            "tension_scale",
-            "measured.csv",
-            "tension_scale cannot be fitted to these data: needs measured tensions",
-        ),
+        ("exit_point_error", "few.csv",
+         "few.csv: exit_point_error cannot be fitted to these data: has 24 parameters, but the "
+         "data have only 10 rows"),
+        ("thermal_expansion", "measured.csv",
+         "thermal_expansion cannot be fitted to these data: needs the temperature, column "
+         "temperature_C"),
+        ("tension_scale", "measured.csv",
+         "tension_scale cannot be fitted to these data: needs measured tensions"),
         ("creep", "timeless.csv", "needs the time of each row, column t_s"),
         ("stiffness", "still.csv", "all commands are the same"),
-        (
-            "pulley_radus",
-            "measured.csv",
-            "no effect 'pulley_radus'; known, nearest first: pulley_radius, ",
-        ),
+        ("pulley_radus", "measured.csv",
+         "no effect 'pulley_radus'; known, nearest first: pulley_radius, "),
     ],
-)
+)  # fmt: skip
 def test_what_the_data_cannot_carry_is_refused(both, tmp_path, effect, name, said):
     data = measured(load_robot(both[0]))
     write_measurements(tmp_path / "measured.csv", data)
@@ -172,19 +160,6 @@ def test_values_on_a_bound_are_warned_of():
     found = add_effect(robot, mirrored, "pulley_radius")
     assert found.own.at_bound[0] and not found.pays
     assert any("radius_m stopped at a bound" in w for w in found.warnings)
-
-
-def test_an_outlying_row_is_left_out_and_named():
-    robot = soft_cogiro()
-    data = measured(robot, [term(robot, "stiffness", factor=1.4)])
-    position = data.position.copy()
-    position[20, 1] += 0.01
-    found = add_effect(robot, replace(data, position=position), "stiffness")
-    line = f"not included in these errors: line {data.line[20]}"
-    assert any(note.startswith("outliers, given little weight and") for note in found.notes)
-    assert any(note.endswith(line) for note in found.notes)
-    value, error = found.own.term.vector[0], found.own.stderr[0]
-    assert abs(value - 1.4) < 4 * error and error < 0.05
 
 
 def test_effects_that_go_together_are_named():

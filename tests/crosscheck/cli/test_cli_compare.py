@@ -110,24 +110,18 @@ def test_the_model_is_taken_up(stiff: Files, tmp_path: Path, out: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (
-            "ROBOT DATA --max-position 0.5",
-            "--max-position: expected a number with its unit (m, cm, mm, um, µm)",
-        ),
+        ("ROBOT DATA --max-position 0.5",
+         "--max-position: expected a number with its unit (m, cm, mm, um, µm)"),
         ("ROBOT DATA --max-orientation 1mm", "got unit 'mm'"),
         ("ROBOT DATA --max-tension 1N", "has no tension readings"),
         ("none.xml DATA", "none.xml"),
         ("ROBOT none.csv", "none.csv"),
-        (
-            "ROBOT DATA --model none.toml",
-            "none.toml: no such file; expected a model as crosscheck add writes it",
-        ),
-        (
-            "ROBOT DATA --model other.toml",
-            "made for another robot: other with 2 cables; demobot_cogiro has 8",
-        ),
+        ("ROBOT DATA --model none.toml",
+         "none.toml: no such file; expected a model as crosscheck add writes it"),
+        ("ROBOT DATA --model other.toml",
+         "made for another robot: other with 2 cables; demobot_cogiro has 8"),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_compared_writes_nothing(
     stiff: Files, out: Path, words: str, said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

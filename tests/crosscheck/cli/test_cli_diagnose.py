@@ -8,8 +8,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import made_diagnoses as made
 import numpy as np
@@ -17,7 +15,6 @@ import pytest
 from click.testing import Result
 from made_data import case, refused, run, term
 
-from crosscheck.cli.diagnose import keep_found
 from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.fit.reasons import DiagnosisVerdict, Unfit
 from crosscheck.fit.state import State
@@ -106,15 +103,6 @@ def test_a_model_that_cannot_be_solved_gives_no_verdict_with_the_reason(
     assert not found.converged
 
 
-def test_verdicts_are_the_words_of_the_file_with_a_heading_and_a_meaning() -> None:
-    assert DiagnosisVerdict("effects_found") is DiagnosisVerdict.EFFECTS_FOUND
-    assert [v.heading for v in DiagnosisVerdict] == [
-        "No effect missing", "Effects found", "Many effects", "Unknown effect", "No verdict",
-    ]  # fmt: skip
-    assert all(v.meaning for v in DiagnosisVerdict)
-    assert json.dumps(made.pulleys().as_json()["verdict"]) == '"effects_found"'
-
-
 QUICK = ("--only", "pulley_radius,stiffness", "--no-recording")
 
 
@@ -201,17 +189,3 @@ def test_all_that_a_diagnosis_lists_is_added_at_once(
 def test_gates_are_named(planar: Planar, tmp_path: Path) -> None:
     said = refused("diagnose", *planar, "--fail-on", "unkown_effect", "--out", tmp_path / "o")
     assert "no verdict 'unkown_effect'; expected one of, nearest first: unknown_effect, " in said
-
-
-def test_a_part_of_many_effects_is_written_with_a_word_on_its_values(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Values "that explain most by themselves, not those above" told nobody which to use."""
-    monkeypatch.setattr("crosscheck.save_model", lambda _path, _model: None)
-    found: Any = SimpleNamespace(
-        model=object(), missing=[SimpleNamespace(effect="tracker_frame")], refitted=(),
-        verdict=DiagnosisVerdict.EFFECTS_FOUND,
-    )  # fmt: skip
-    assert keep_found(found, tmp_path / "m.toml").endswith("m.toml: tracker_frame")
-    found.verdict = DiagnosisVerdict.MANY_EFFECTS
-    assert "predicts best; those above" in keep_found(found, tmp_path / "m.toml")

@@ -36,18 +36,13 @@ def test_one_effect_has_its_formula_and_its_size_for_a_robot() -> None:
         ("drum_gain", "gain [no unit], one per cable"),
         ("exit_point_error", ", x y z per cable"),
         ("stiffness", "factor [no unit]: absent at 1, expected size 0.3\n"),
-        (
-            "pulley_radius",
-            "radius [mm]: absent at 0, expected size 2 % of the mean cable length\n",
-        ),
-        (
-            "pulley_radius",
-            "expected sizes depend on the robot: --robot ROBOT.xml gives their numbers",
-        ),
+        ("pulley_radius", "radius [mm]: absent at 0, expected size 2 % of the mean cable length\n"),
+        ("pulley_radius",
+         "expected sizes depend on the robot: --robot ROBOT.xml gives their numbers"),
         ("creep", "time [s]: modifies the others, starts at 100"),
         ("frame_compliance", "sideways [mm/N]"),
     ],
-)
+)  # fmt: skip
 def test_parameters_have_units_and_sizes_for_people(name: str, said: str) -> None:
     """Also without a robot: a size is a number, or a formula of it."""
     assert said in run("effects", name).stdout

@@ -19,7 +19,6 @@ from called import ran
 from crosscheck.cli import COMMANDS
 from crosscheck.suite import effects as effect_suite
 from crosscheck.suite import run as suite
-from crosscheck.suite.cases import shipped_cases
 from crosscheck.twin.robot import TRUE_EFFECTS
 from seecr import model_path
 from seecr.cli.group import LazyGroup
@@ -265,15 +264,6 @@ def test_help_is_quick_and_imports_nothing_heavy():
     for name, (_, line) in COMMANDS.items():
         assert name in done.stdout
         assert line.split(",")[0].split(":")[0][:20] in done.stdout
-
-
-def test_run_help_names_the_robots_of_all_shipped_cases():
-    words = " ".join(run("--help").stdout.split()).replace("- ", "-").lower()
-    names = {case.model.stem.removeprefix("demobot_") for case in shipped_cases()}
-    planar = {name: "planar" for name in names if name.startswith("planar")}
-    told = {"off_centre": "centre of mass off", **planar}
-    assert len(names) == 13
-    assert [n for n in names if told.get(n, n.replace("_", "-")) not in words] == []
 
 
 def test_version_no_command_and_unknown_command():

@@ -21,20 +21,6 @@ from seecr.cli.group import LazyGroup
 from seecr.cli.progress import progress_bar, progress_share, say_duration
 
 
-@click.command()
-@options.out("results")
-@options.as_json
-def shared(out: object, as_json: bool) -> None:
-    click.echo(f"{out} {as_json}")
-
-
-def test_shared_options() -> None:
-    runner = CliRunner()
-    assert runner.invoke(shared, []).stdout == "results False\n"
-    assert runner.invoke(shared, ["--out", "here", "--json"]).stdout == "here True\n"
-    assert runner.invoke(shared, ["--out"]).exit_code == 2
-
-
 @pytest.mark.parametrize(
     ("kind", "text", "words"),
     [

@@ -1,4 +1,4 @@
-"""What a user may get wrong at the crosscheck command: one sentence, status 2, nothing written."""
+"""What a user may get wrong at the crosscheck command, and what of a robot is left out."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ import shlex
 import warnings
 from pathlib import Path
 
+import made_diagnoses as made
 import pytest
 from made_data import refused, run
 
 import crosscheck
 import seecr
+from crosscheck.measurements.write import write_measurements
+from seecr.description.mjcf import load_robot, model_path
 from seecr.errors import SeecrError
 
 pytestmark = pytest.mark.slow
@@ -31,20 +34,14 @@ IMPORT = "import poses log.csv --robot ROBOT --commands DATA"
             )
             for size in ("1e-300mm", "1e-9mm", "1e300mm")
         ),
-        (
-            "compare ROBOT tiny.csv",
-            "position_m must be a positive number [m] between 1e-09 and 1e+15",
-        ),
+        ("compare ROBOT tiny.csv",
+         "position_m must be a positive number [m] between 1e-09 and 1e+15"),
         ("compare ROBOT huge.csv", "column meas_x_m: expected a number, or an empty cell"),
         ("compare ROBOT DATA --model NOISE", "is not a model, it has sigma; expected a model as"),
-        (
-            "compare ROBOT DATA --limits none.toml",
-            "none.toml: is empty; expected a TOML file with lines such as",
-        ),
-        (
-            "compare ROBOT DATA --sigma position=0.1mm --sigma position=1mm",
-            "--sigma position=1mm: expected one for the position, got two; leave one out",
-        ),
+        ("compare ROBOT DATA --limits none.toml",
+         "none.toml: is empty; expected a TOML file with lines such as"),
+        ("compare ROBOT DATA --sigma position=0.1mm --sigma position=1mm",
+         "--sigma position=1mm: expected one for the position, got two; leave one out"),
         (f"{IMPORT} --clock nan", "nan is not a finite number"),
         (f"{IMPORT} --rest-for inf", "inf is not a finite number"),
         (f"{IMPORT} --rest-for -1", "expected a number above 0, got '-1'"),
@@ -52,10 +49,8 @@ IMPORT = "import poses log.csv --robot ROBOT --commands DATA"
         (f"{IMPORT} --unit parsec", "--unit: expected one of m, cm, mm, um, got 'parsec'"),
         # quaternions of noughts
         (IMPORT, "the body is seen in 0 rows; expected at least 5"),
-        (
-            "add stiffness ROBOT DATA --model m.toml --all-from d.json",
-            "expected EFFECT or --all-from, not both; got stiffness and",
-        ),
+        ("add stiffness ROBOT DATA --model m.toml --all-from d.json",
+         "expected EFFECT or --all-from, not both; got stiffness and"),
         ("add --all-from gone.json ROBOT DATA --model m.toml", "gone.json: no such file"),
         *(
             (
@@ -84,7 +79,7 @@ IMPORT = "import poses log.csv --robot ROBOT --commands DATA"
             for column in ("cmd_x", "meas_x", "meas_y")
         ),
     ],
-)
+)  # fmt: skip
 def test_a_mistake_is_one_sentence(
     stiff: Files, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str, said: str
 ) -> None:
@@ -233,3 +228,42 @@ def test_measurements_are_not_replaced_by_those_of_a_twin(stiff: Files, tmp_path
     (tmp_path / "plan.json").write_text('{"files": ["add-payload.csv"]}')
     assert "no command wrote it" in refused("plan", robot, "--rows", 8, "--out", tmp_path)
     assert poses.read_text() == "cmd_x_m\n0.4\n"
+
+
+FEW = ("--only", "stiffness,platform_mass")
+
+
+@pytest.fixture(scope="module")
+def rough(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A planar robot whose slide has an end, and readings of it."""
+    folder = tmp_path_factory.mktemp("rough")
+    xml, data = folder / "rough.xml", folder / "measured.csv"
+    text = model_path("planar_vertical").read_text(encoding="utf-8")
+    old = '<joint name="x" type="slide"'
+    assert text.count(old) == 1
+    xml.write_text(text.replace(old, f'{old} range="-1 1"'), encoding="utf-8")
+    write_measurements(data, made.readings(radius_m=0.01))
+    return xml, data
+
+
+@pytest.mark.usefixtures("unpaged")
+@pytest.mark.parametrize(
+    ("command", "options"),
+    [
+        (["compare"], ["--no-recording"]),
+        (["diagnose"], ["--no-recording", *FEW]),
+        (["add", "pulley_radius"], ["--model", "MODEL"]),
+        (["calibrate"], ["--model", "MODEL", *FEW]),
+        (["plan"], []),
+    ],
+    ids=["compare", "diagnose", "add", "calibrate", "plan"],
+)
+def test_a_command_tells_it_once(
+    rough: tuple[Path, Path], tmp_path: Path, command: list[str], options: list[str]
+) -> None:
+    places = [str(tmp_path / "m.toml") if word == "MODEL" else word for word in options]
+    got = run(*command, *rough, *places, "--out", tmp_path / "out")
+    assert got.exit_code in (0, 1), got.output
+    assert got.stdout.count("left out here") == 0
+    (note,) = load_robot(rough[0]).notes
+    assert got.stderr.splitlines().count(f"note: {note}") == 1

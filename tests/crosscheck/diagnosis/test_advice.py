@@ -13,7 +13,7 @@ from made_diagnoses import nothing
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.quantities import EVERYWHERE, QuantityKind
 from crosscheck.diagnosis import advice as what_next
-from crosscheck.diagnosis.advice import check_of, measure_next, measured_directly
+from crosscheck.diagnosis.advice import check_of, measure_next
 from crosscheck.diagnosis.path import ModelPath
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.inference.fields import Varying
@@ -118,23 +118,9 @@ def test_what_shows_as_a_hose_is_taken_off_first(found: ModelPath) -> None:
     assert others == measure_next(found, [], unknown, (), seen=[Varying.READINGS])
 
 
-def test_without_a_lead_the_same_poses_are_repeated(found: ModelPath) -> None:
-    assert advice(found) == (
-        "repeat the same poses forward, back and an hour later, to see what the error depends on"
-    )
-
-
 def test_where_nothing_is_missing_the_plan_is_named(found: ModelPath) -> None:
     (line,) = measure_next(found, [], DiagnosisVerdict.NO_EFFECT_MISSING, ())
     assert "crosscheck plan" in line
-
-
-def test_checks_say_what_to_expect_in_units_for_people() -> None:
-    robot = soft_cogiro()
-    assert "9.9 mm" in check_of(term(robot, "pulley_radius", radius_m=0.0099), robot)
-    check = check_of(term(robot, "exit_point_error", error_3_y_m=0.004), robot)
-    assert "error_3_y" in check and "4" in check
-    assert measured_directly("platform_mass") == "weigh the platform"
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ from crosscheck.diagnosis.result import (
     doubt_of,
     remainder_of,
 )
-from crosscheck.diagnosis.words import hints_of, one_of, removed
+from crosscheck.diagnosis.words import hints_of, removed
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.inference.fields import Varying
@@ -215,19 +215,6 @@ def test_values_that_the_data_confirm_are_not_doubted() -> None:
 
 
 # Sentences of a diagnosis that are made of lists
-
-
-@pytest.mark.parametrize(
-    ("members", "words"),
-    [
-        (["a"], "a"),
-        (["a", "b"], "a or b"),
-        (["a", "b", "c"], "a, b or c"),
-        (["a", "b", "c", "d", "e"], "a, b or one of 3 others"),
-    ],
-)
-def test_effects_of_which_it_is_one(members: list[str], words: str) -> None:
-    assert one_of(members) == words
 
 
 def test_what_is_probable_and_not_listed_is_a_hint() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_data import case, measured, run
+from made_data import measured
 from made_diagnoses import POINTS, SIGMA, SLOW, readings, robot
 
 from crosscheck.add import add_effect
@@ -133,13 +133,3 @@ def test_a_diagnosis_beside_a_known_stiffness_names_the_mass_alone() -> None:
         (found,) = diagnose(robot(), data, [given], exclude=SLOW).missing
         assert found.effect == "platform_mass" and not found.rivals
         assert abs(found.values[0] - heavy.vector[0]) < 3.0 * found.stderr[0] < 0.03
-
-
-def test_from_the_command_line(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    xml, data = case(tmp_path, {"pulley_radius": {"radius_m": 0.01}}, points=4)
-    model = tmp_path / "model.toml"
-    line = "parameters.radius_m = { value = 0.03, fixed = true }"
-    model.write_text(f'[[effect]]\nname = "pulley_radius"\n{line}\n')
-    result = run("add", "stiffness", xml, data, "--model", model, "--force")
-    assert result.exit_code == 0, result.output
-    assert line in model.read_text() and 'name = "stiffness"' in model.read_text()

@@ -9,7 +9,7 @@ from pathlib import Path
 import made_recordings as made_of
 import numpy as np
 import pytest
-from made_data import run, soft_cogiro, soft_xml
+from made_data import soft_cogiro
 
 from crosscheck.importing import ImportChoices, import_case
 from crosscheck.importing.dwells import find_dwells
@@ -132,14 +132,3 @@ def test_what_cannot_be_told_is_left_alone():
     uneven = np.random.default_rng(1).uniform(0.0, 1.0, (40, 3))
     held, rests = going_round(uneven, 7.0)
     assert find_clock(held, uneven, rests).shift == pytest.approx(7.0, abs=0.1)
-
-
-def test_from_the_command_line(made, tmp_path):
-    commands = made_of.commands_csv(tmp_path / "c.csv", made, clock=37.3)
-    log = made_of.poses_csv(tmp_path / "a.csv", made)
-    robot = tmp_path / "robot.xml"
-    robot.write_text(soft_xml())
-    done = run("import", "poses", log, "--robot", robot, "--commands", commands,
-               "--out", tmp_path / "case")  # fmt: skip
-    assert done.exit_code == 0, done.stderr
-    assert "a.csv: the tracker's clock shows 37." in done.stdout

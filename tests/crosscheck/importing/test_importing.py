@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import made_recordings as made_of
 import numpy as np
@@ -17,8 +16,7 @@ from scipy.spatial.transform import Rotation
 import crosscheck
 from crosscheck.importing import import_case
 from crosscheck.importing.choices import ImportChoices
-from crosscheck.importing.dwells import find_dwells
-from crosscheck.importing.logs import Logged, Stream
+from crosscheck.importing.logs import Logged
 from crosscheck.importing.poses import aligning, body_of_markers
 from crosscheck.measurements.dwells import mean_error
 from seecr.errors import InputError, InputFileError
@@ -356,48 +354,6 @@ def test_what_only_the_last_digit_shows_is_not_stated(tmp_path, flicker, digits)
     assert f"{hidden} not stated: within a dwell only the last digit changes" in " ".join(
         found.notes
     )
-
-
-def test_a_swing_that_dies_out_is_no_rest():
-    t = np.arange(0.0, 10.0, 0.01)
-    swing = 0.05 * np.exp(-t / 0.8) * np.cos(8.0 * t)
-    rng = np.random.default_rng(0)
-    position = np.stack([swing, 0 * t, 0 * t], axis=1) + 1e-5 * rng.standard_normal((len(t), 3))
-    dwells = find_dwells(Stream(None, t, np.arange(len(t)), position), np.zeros(0))
-    assert len(dwells) == 1 and 2.5 < dwells.begin_s[0] < 7.0
-    assert np.abs(dwells.position).max() < 1e-4
-
-
-@pytest.mark.parametrize("begin", [0.0, 1234.5, 1.7e9])
-def test_rounded_times_do_not_make_an_interval_longer(begin: float) -> None:
-    """Differences of 0.1 s were a little more or less, and with it five of them than 0.5 s."""
-    t = begin + np.round(np.arange(0.0, 30.0, 0.1), 6)
-    place = np.stack([np.repeat(np.arange(10.0), 30), 0 * t, 0 * t], axis=1)
-    place[[29, 59, 89]] += 0.5
-    dwells = find_dwells(Stream(None, t, np.arange(len(t)), place), np.zeros(0))
-    assert len(dwells) == 10
-    with pytest.raises(InputFileError, match=r"got one every 0.11 s; log faster, give --rest-for"):
-        find_dwells(Stream(Path("log"), 1.1 * t, np.arange(len(t)), place), np.zeros(0))
-
-
-@pytest.mark.parametrize("rate", [10, 100])
-def test_samples_that_are_lost_do_not_end_a_rest(rate: int) -> None:
-    """Nor do they turn a move into one: between two rests a second of it is lost."""
-    t = np.arange(0.0, 20.0, 1.0 / rate)
-    rng = np.random.default_rng(0)
-    moved = np.clip((t - 9.0) / 2.0, 0.0, 1.0)
-    position = np.stack([moved, 0 * t, 0 * t], axis=1) + 1e-4 * rng.standard_normal((len(t), 3))
-    whole = find_dwells(Stream(None, t, np.arange(len(t)), position), np.zeros(0))
-    lost = position.copy()
-    lost[[3 * rate, 5 * rate, 5 * rate + 1, 14 * rate]] = np.nan
-    lost[(t > 9.5) & (t < 10.5)] = np.nan
-    lost[(t > 16.0) & (t < 16.4)] = np.nan
-    found = find_dwells(Stream(None, t, np.arange(len(t)), lost), np.zeros(0))
-    assert len(found) == len(whole) == 2
-    assert found.begin_s == pytest.approx(whole.begin_s, abs=0.3)
-    assert found.end_s == pytest.approx(whole.end_s, abs=0.3)
-    assert found.position == pytest.approx(whole.position, abs=2e-4)
-    assert np.all(found.samples <= whole.samples)
 
 
 def test_the_command_writes_a_case_and_names_the_next_one(made, commands, tmp_path):

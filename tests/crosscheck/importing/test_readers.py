@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from crosscheck.cli.importing import command
 from crosscheck.importing.capture import read_motive, read_vicon, rotations
+from crosscheck.importing.choices import ImportChoices
 from crosscheck.importing.logs import FileRows, unit_quaternions
 from crosscheck.importing.poses import read_poses
+from crosscheck.importing.take import READERS
 from seecr.errors import InputError, InputFileError
 
 
@@ -223,13 +228,6 @@ def test_segments_and_markers_are_read_in_metres(tmp_path: Path) -> None:
     assert found.markers["box:two"][1] == pytest.approx([0.041, 0.051, 0.061])
 
 
-def test_a_rotation_of_unknown_meaning_is_refused_unless_nobody_needs_it(tmp_path: Path) -> None:
-    path = nexus(tmp_path, NEXUS)
-    with pytest.raises(InputFileError, match="three numbers of a rotation can mean several things"):
-        read_vicon(path)
-    assert read_vicon(path, bodies_too=False).bodies == {}
-
-
 def test_blocks_of_other_frames_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputFileError, match="expected the frames of the first block again"):
         read_vicon(nexus(tmp_path, NEXUS.replace("12,0,11", "13,0,11")), "xyz")
@@ -296,6 +294,26 @@ def test_motives_euler_angles_turn_about_moving_axes(tmp_path: Path, order: str,
 def test_frames_over_their_rate_are_times_where_there_is_none(tmp_path: Path) -> None:
     export = read_motive(euler_take(tmp_path, "XYZ", time="TimeCode"))
     assert export.t_s.tolist() == [0.0, 0.2]
+
+
+PAGE = (Path(__file__).resolve().parents[3] / "docs" / "import.md").read_text(encoding="utf-8")
+SAMPLES = re.findall(r"```text\n(.*?)```", PAGE, re.DOTALL)
+
+
+def test_every_option_and_format_is_on_the_page():
+    options = [p.opts[0] for p in command.params if isinstance(p, click.Option)]
+    assert [name for name in options if name not in PAGE and name not in ("--json",)] == []
+    assert all(f"`{form}`" in PAGE for form in READERS)
+
+
+@pytest.mark.parametrize(("form", "sample"), list(zip(("motive", "vicon"), SAMPLES, strict=True)))
+def test_samples_of_the_page_are_read(form, sample, tmp_path):
+    file = tmp_path / "sample.csv"
+    file.write_text(sample)
+    export = READERS[form](file, ImportChoices(rotation="vector")).upright()
+    ((position, quat),) = export.bodies.values()
+    assert position[1] == pytest.approx([0.2, 0.25, 0.1])
+    assert quat[1] == pytest.approx([1.0, 0.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("order", ["XYX", "Angles", "XY"])

@@ -242,12 +242,6 @@ BAD = {
 }  # fmt: skip
 
 
-def test_several_missing_parameters_are_named_together(robot, tmp_path):
-    path = tmp_path / "m.toml"
-    path.write_text('[[effect]]\nname = "centre_of_mass"\n[effect.parameters]\nshift_x_m = 0.002\n')
-    assert "parameters shift_y_m, shift_z_m are missing; expected a line" in error_of(path, robot)
-
-
 @pytest.mark.parametrize("kind", BAD)
 def test_bad_models_are_refused_with_their_line(kind, robot, saved):
     old, new, words = BAD[kind]
@@ -264,25 +258,24 @@ def test_the_line_is_that_of_the_effect_meant(robot, saved):
     )
 
 
-def test_winches_are_zeroed_where_somebody_can_stand(robot, saved):
-    values = "expansion_1_per_K = 1e-5\nzero_temperature_C = 199\n"
-    extra = f'\n[[effect]]\nname = "thermal_expansion"\n[effect.parameters]\n{values}'
-    saved.write_text(saved.read_text() + extra)
-    assert "zero_temperature_C: 199 is out of bounds; expected -40 to 60" in error_of(saved, robot)
-
-
 @pytest.mark.parametrize(
-    "values, words",
+    ("name", "values", "words"),
     [
-        ("shift_m = -1e300\nrotation_rad = 0.0", "shift_x_m: -1e+300 is out of bounds; expected -"),
-        (
-            "shift_m = 0.0\nrotation_rad = 90.0",
-            "rotation_x_rad: 90 is out of bounds; expected -6.28",
-        ),
+        ("centre_of_mass", "shift_x_m = 0.002",
+         "parameters shift_y_m, shift_z_m are missing; expected a line"),
+        # winches are zeroed where somebody can stand
+        ("thermal_expansion", "expansion_1_per_K = 1e-5\nzero_temperature_C = 199",
+         "zero_temperature_C: 199 is out of bounds; expected -40 to 60"),
+        ("tracker_target", "shift_m = -1e300\nrotation_rad = 0.0",
+         "shift_x_m: -1e+300 is out of bounds; expected -"),
+        ("tracker_target", "shift_m = 0.0\nrotation_rad = 90.0",
+         "rotation_x_rad: 90 is out of bounds; expected -6.28"),
     ],
-)
-def test_values_are_of_a_size_that_a_robot_can_have(robot, saved, values, words):
-    extra = f'\n[[effect]]\nname = "tracker_target"\n[effect.parameters]\n{values}\n'
+)  # fmt: skip
+def test_values_are_all_there_and_of_a_size_that_a_robot_can_have(
+    robot, saved, name, values, words
+):
+    extra = f'\n[[effect]]\nname = "{name}"\n[effect.parameters]\n{values}\n'
     saved.write_text(saved.read_text() + extra)
     assert words in error_of(saved, robot)
 

@@ -85,14 +85,6 @@ def test_of_one_file_another_may_differ_by_a_plausible_size() -> None:
     assert found.usual.stderr == pytest.approx(BASE.scale)
 
 
-def test_a_file_that_the_model_knows_without_its_folder_is_the_same_file() -> None:
-    known = Values(np.array([0.002]), np.array([0.001]), Knowledge.nothing(1))
-    found = kept(fitted({"days/monday": 0.004}, 0.003, Own("file", {"monday": known})), None)
-    assert found.usual.term.own is not None
-    assert list(found.usual.term.own.values) == ["monday"]
-    assert found.usual.term.vector == pytest.approx([0.004])
-
-
 def test_a_fixed_value_is_what_is_usual_whatever_the_files_have() -> None:
     fixed = Term(BASE, np.array([0.02])).fixed()
     found = kept(fitted({"monday": 0.004, "tuesday": 0.010}, 0.003), fixed)
@@ -246,3 +238,11 @@ def test_what_lists_no_effects_is_refused(tmp_path: Path, missing: Any, words: s
     path.write_text(json.dumps(content))
     with pytest.raises(InputFileError, match=f"^{path}: {words}"):
         load_diagnosed(path, ROBOT)
+
+
+def test_a_file_that_the_model_knows_without_its_folder_is_the_same_file() -> None:
+    known = Values(np.array([0.002]), np.array([0.001]), Knowledge.nothing(1))
+    found = kept(fitted({"days/monday": 0.004}, 0.003, Own("file", {"monday": known})), None)
+    assert found.usual.term.own is not None
+    assert list(found.usual.term.own.values) == ["monday"]
+    assert found.usual.term.vector == pytest.approx([0.004])

@@ -78,11 +78,6 @@ def test_tensions_stay_within_limits():
     assert wide.min() < low or wide.max() > high  # without limits they do not
 
 
-def test_a_robot_with_fewer_cables_than_freedoms_is_planned_too():
-    robot = load_robot(model_path("planar_two_cable"))
-    assert choose_poses(robot, 6).n_rows == 6
-
-
 def test_a_set_up_sees_what_it_reads(cogiro):
     data = measured(cogiro, points=2)
     by = {

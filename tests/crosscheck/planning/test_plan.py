@@ -12,11 +12,10 @@ from scipy import stats
 
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import evaluate
-from crosscheck.inference.fit import Data, fit
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import together
 from crosscheck.planning.design import choose_poses, make_plan
-from crosscheck.planning.places import detours, extensions, more_poses
+from crosscheck.planning.places import extensions, more_poses
 from crosscheck.planning.planned import MORE_POSES, READ, Adding, Reads, near_slack, planned
 from crosscheck.planning.proposer import NEEDED, chosen_poses, telling_apart
 from crosscheck.planning.room import Room, usual_tension
@@ -85,28 +84,6 @@ def test_the_smallest_visible_size_leaves_the_signal_needed(robot, plan):
     assert base.chi2 == pytest.approx(found.needed, rel=0.05)
 
 
-def test_effects_of_that_size_are_found_and_of_a_tenth_are_not(robot, plan):
-    """Four in five at the size that shows, hardly ever at a tenth of it."""
-    layout = effect(plan, "tracker_scale").signal.layout
-    factor = effect(plan, "tracker_scale").factor
-    hits = {}
-    for part in (1.0, 0.1):
-        vector = layout.null + part * factor * layout.scale
-        hits[part] = sum(_found(robot, layout, vector, seed) for seed in range(24))
-    assert 13 <= hits[1.0] <= 24
-    assert hits[0.1] <= 2
-
-
-def _found(robot, layout, vector, seed):
-    hidden = replace(term(robot, layout.name), vector=vector)
-    data = measured(robot, [hidden], seed=seed)
-    problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
-    every = Data.of(problem, Terms())
-    tried = fit(every, every.state(Terms([term(robot, layout.name)])), {layout.name: 10.0})
-    fall = every.state(Terms()).chi2 - tried.state.chi2
-    return stats.chi2.sf(fall, tried.seen.sum()) < 0.05 / 24
-
-
 def test_what_is_alike_by_algebra_is_named(plan):
     assert {"platform_mass", "external_wrench", "cable_stiffness"} <= set(
         effect(plan, "stiffness").twins
@@ -127,14 +104,6 @@ def test_the_confusion_map_is_of_parts(plan):
     assert table[i, j] > 1 - 1e-6 and table[j, i] > 1 - 1e-6
     k = names.index("tracker_scale")
     assert table[i, k] < 0.9
-
-
-def test_less_noise_shows_less(robot, few):
-    coarse = make_plan(robot, few)
-    finer = make_plan(robot, replace(few, sigma=Sigma(3e-6, 3.5e-5)))
-    for name in ("stiffness", "pulley_radius", "hysteresis"):
-        factor = effect(coarse, name).factor
-        assert effect(finer, name).factor == pytest.approx(0.1 * factor, rel=1e-3)
 
 
 def test_what_nobody_stated_is_assumed_and_said(robot, few):
@@ -278,16 +247,6 @@ def test_what_tells_two_effects_of_a_model_apart_is_proposed_by_the_same_means(r
     words = {s.kind: s.words for s in make_plan(robot, few).suggestions}
     payload = next(s for s in found if s.kind is Adding.PAYLOAD)
     assert payload.words == words[Adding.PAYLOAD]
-
-
-def test_the_payload_of_a_heavy_crane_has_no_exponent(robot, few):
-    """It was "a known extra 1e+02 kg" of a platform of 420 kg."""
-    heavy = replace(robot, mass=420.0, ea=robot.ea * 1000.0)
-    here = planned(heavy, few, SIGMA, Reads.of_kinds(robot.n_cables))
-    kinds = (Adding.PAYLOAD, Adding.PAYLOAD_ASIDE)
-    every = [*extensions(here), *detours(here)]
-    said = [one.words for one in every if one.kind in kinds]
-    assert len(said) == 2 and all("a known extra 105 kg " in words for words in said)
 
 
 def _later(robot, data):

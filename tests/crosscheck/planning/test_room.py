@@ -1,4 +1,4 @@
-"""Poses that are chosen or proposed may be run as they are: on robots of every kind."""
+"""Poses that are chosen or proposed may be run as they are, on robots of every kind."""
 
 from __future__ import annotations
 
@@ -9,9 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from called import ran, refused_in_a_line
+from rejointed import WAYS, rejointed
 from scipy import optimize
+from turned import turned
 
 import crosscheck
+from crosscheck.planning.design import candidate_poses
 from crosscheck.planning.planned import Adding
 from crosscheck.planning.room import Room
 from seecr.description.mjcf import load_robot
@@ -186,3 +189,38 @@ def test_what_cannot_be_asked_for_is_told(asked: str, words: str, tmp_path: Path
     given = f"crosscheck plan demobot_cogiro --rows 12 {asked} --out {tmp_path / 'p'}"
     assert words in " ".join(refused_in_a_line(given).split())
     assert not (tmp_path / "p").exists()
+
+
+# without its floor, which is a height along z
+COGIRO = replace(load_robot("demobot_cogiro"), floor=None)
+
+
+@pytest.mark.parametrize("name", ["demobot_cogiro", "planar_vertical"])
+def test_candidates_of_a_robot_with_z_down_are_those_of_the_same_one_with_z_up(name: str) -> None:
+    robot = replace(load_robot(name), floor=None)
+    other, turn = turned(robot, [np.pi, 0.0, 0.0])
+    own, there = (candidate_poses(Room.of(one)) for one in (robot, other))
+    np.testing.assert_allclose(there[:, :3], own[:, :3] @ turn.T, atol=1e-12)
+
+
+@pytest.mark.parametrize("rotvec", [[np.pi, 0.0, 0.0], [0.0, 0.5, 0.2]])
+def test_candidates_are_as_far_below_and_above_home_whichever_way_that_is(
+    rotvec: list[float],
+) -> None:
+    other, _turn = turned(COGIRO, rotvec)
+    heights = [
+        (candidate_poses(Room.of(robot))[:, :3] - robot.reference_pose[:3]) @ robot.up
+        for robot in (COGIRO, other)
+    ]
+    np.testing.assert_allclose(*(np.unique(some.round(9)) for some in heights), atol=1e-9)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_poses_of_robots_on_joints_stay_in_the_box_that_was_asked_for(way: str) -> None:
+    """A hinge beside the origin, or before the slides, carried half of them out of it."""
+    planar = load_robot("planar_vertical")
+    middle, half = planar.reference_pose[:3], np.array([0.02, 1.0, 0.02])
+    box = np.array([middle - half, middle + half])
+    room = Room.of(rejointed(planar, way), box=box, tilt=0.2)
+    place = candidate_poses(room)[:, :3]
+    assert len(place) > 30 and np.all((place >= box[0]) & (place <= box[1]))

@@ -19,7 +19,7 @@ from crosscheck.fit.state import known_left, known_readings
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import together
 from crosscheck.measurements.write import write_measurements
-from crosscheck.preparation.freed import freed, groups_of, laid_out
+from crosscheck.preparation.freed import freed, laid_out
 from crosscheck.preparation.prepare import prepare
 from seecr.description.mjcf import load_robot
 from seecr.effects import ApartLayout, Own, Term, Terms, Values, apart, effect_named, layout_of
@@ -168,13 +168,6 @@ def near(told: Array) -> float:
     return 0.1 * SIGMA.position_m / float(np.linalg.norm(told))
 
 
-def test_nothing_is_fitted_if_nothing_is_free() -> None:
-    held = term(STIFF, "tracker_scale", factor=1.002)
-    found = found_in(data_of(), held)
-    assert found.terms["tracker_scale"].vector.tolist() == [1.002]
-    assert found.free.tolist() == [False] and found.notes == []
-
-
 def test_without_readings_nothing_is_fitted() -> None:
     data = replace(data_of(), free=("tracker_scale",))
     nothing = Problem(STIFF, data, SIGMA, np.zeros(data.n_rows, dtype=bool))
@@ -312,11 +305,3 @@ def test_values_of_a_file_are_found_by_its_name_and_new_files_start_at_the_commo
         "case/tuesday.csv not in the model, so fitted to these data first"
     ]
     assert terms["stiffness"].vector.tolist() == [1.1]
-
-
-def test_rows_are_grouped_where_an_effect_has_values_apart() -> None:
-    plain = term(STIFF, "tracker_frame")
-    apart = laid_out(days(), Terms([replace(plain, own=Own("file", {}))]))[0]
-    groups = groups_of(days(), apart)
-    assert groups is not None and groups.tolist() == days().file.tolist()
-    assert groups_of(days(), Terms([plain])) is None

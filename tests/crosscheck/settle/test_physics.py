@@ -8,16 +8,19 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from hall import EXITS, SITES, hall
 
 from crosscheck.settle.newton import minimise, stiffness
 from crosscheck.settle.physics import Physics
-from crosscheck.settle.prepared import ignored_note
+from crosscheck.settle.settler import Settler
 from crosscheck.twin.cable import Springs
 from crosscheck.twin.robot import true_robot
 from crosscheck.twin.world import World
 from seecr.description.mjcf import load_robot, model_names, model_path, quiet_mujoco
 from seecr.effects import effect_named
+from seecr.equilibrium.solving import solve
 from seecr.errors import RobotError
+from seecr.pose import pose_difference
 
 PLANAR = model_path("planar_vertical").read_text(encoding="utf-8")
 
@@ -45,12 +48,6 @@ def test_what_hinders_is_named_one_by_one(old, new, name, tmp_path):
 @pytest.mark.parametrize("name", model_names())
 def test_nothing_hinders_a_shipped_robot(name):
     assert Physics.of(name).ignored == ()
-
-
-def test_the_note_is_one_sentence_with_the_file_and_all_names():
-    note = ignored_note(Path("my.xml"), ("damping", "contacts"))
-    assert note.startswith("my.xml: switched off here: damping, contacts; ")
-    assert "\n" not in note and not note.endswith(".")
 
 
 def test_mujoco_is_quiet_inside_and_speaks_again_after():
@@ -162,3 +159,32 @@ def test_parts_of_cables_are_solved_as_one_system_would_be(world):
     whole = np.linalg.solve(matrix + damping * np.eye(world.n_dof), force)
     np.testing.assert_allclose(step, whole, rtol=1e-8, atol=1e-12 * np.abs(whole).max())
     assert world.solve(matrix, force, -1e3 * damping) is None
+
+
+LOOSE = '<body name="box" pos="2 0 0"><freejoint/><geom size="0.1"/></body>'
+KEY = '<keyframe><key qpos="0 0 0 1 0 0 0 0 0 0 1 0 0 0"/></keyframe>'
+SERVO = '<actuator><position name="m" tendon="rope0" kp="500"/></actuator>'
+LUGS = f'<body name="lugs" pos="0.01 0.02 0.03" euler="5 0 20">{SITES}</body>'
+
+
+@pytest.mark.parametrize(
+    ("parts", "freedoms"),
+    [
+        ({"world": EXITS + LOOSE, "rest": KEY}, 6),
+        ({"world": LOOSE + EXITS, "rest": SERVO}, 6),
+        ({"rest": SERVO}, 6),
+        ({"inside": LUGS}, 6),
+        ({"joint": '<joint name="knee" type="ball" pos="0 0 0.3"/>'}, 3),
+        ({"joint": '<joint type="slide" axis="0 0 1"/><joint type="ball" pos="0 0 0.3"/>'}, 4),
+    ],
+)
+def test_both_sides_bring_the_same_file_to_the_same_rest(
+    parts: dict[str, str], freedoms: int, tmp_path: Path
+) -> None:
+    path = hall(tmp_path / "robot.xml", **parts)
+    assert Physics.of(path).n_dof == freedoms
+    robot = load_robot(path)
+    ours = solve(robot, robot.reference_pose)
+    theirs = Settler(path).settle(robot.reference_pose, ours.rest_lengths[0])
+    assert np.abs(pose_difference(ours.pose, theirs.pose[None])).max() < 1e-6
+    assert ours.tensions[0] == pytest.approx(theirs.tensions, abs=1e-3)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 
 import browser
@@ -61,19 +60,6 @@ def test_a_picture_is_dark_where_the_reader_is(pages: Path, tmp_path: Path) -> N
             assert taken.size == (PHONE, 300)
             corners.append(taken.getpixel((2, 2)))
     assert corners[0] == (255, 255, 255) and max(corners[1]) < 64
-
-
-def test_the_ground_of_figures_is_that_of_a_dark_narrow_page(pages: Path, tmp_path: Path) -> None:
-    from PIL import Image
-
-    page, path = tmp_path / "figure.html", tmp_path / "figure.png"
-    text = (pages / "plan.html").read_text(encoding="utf-8")
-    head, image = text.split("<main>")[0], re.search(r'<img alt="The smallest[^>]*>', text)
-    assert image is not None
-    page.write_text(f'{head}<figure class="wide">{image[0]}</figure>', encoding="utf-8")
-    browser.shoot(page, path, PHONE, dark=True, height=100)
-    with Image.open(path) as taken:
-        assert taken.getpixel((2, 90)) == taken.getpixel((2, 5)) == (0x14, 0x18, 0x1C)
 
 
 @pytest.mark.parametrize("dark", [False, True])

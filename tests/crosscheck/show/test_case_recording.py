@@ -23,7 +23,7 @@ from crosscheck.suite.verdicts import Verdict
 from seecr.description.mjcf import load_robot, model_path
 from seecr.pose import quat_conjugate, quat_multiply
 from seecr.show import scene
-from seecr.show.colours import cable_colours, round_up, scale_colours
+from seecr.show.colours import round_up, scale_colours
 from seecr.statics.solution import Status
 
 pytestmark = pytest.mark.slow
@@ -169,18 +169,6 @@ def test_the_text_has_the_guide_and_the_numbers(back: Readback, result: CaseResu
     assert "Settling, " in back.column(f"/{NOW}", "TextDocument:text", "settling_time")[0][0]
 
 
-def test_the_legend_gives_the_scale_in_newtons(back: Readback, result: CaseResult) -> None:
-    ticks = back.static("/legend/ticks", "Points2D:labels")
-    assert ticks[0] == "0 N" and ticks[-1] == "2 N"
-    assert result.solution.tensions.max() <= 2.0
-    assert back.static("/legend/names", "Points2D:labels") == [
-        "slack",
-        "command",
-        "SEECR",
-        "MuJoCo",
-    ]
-
-
 @pytest.fixture(scope="module")
 def failed(result: CaseResult) -> CaseResult:
     """A result whose second pose is no equilibrium in SEECR, and the third has none in MuJoCo."""
@@ -303,27 +291,12 @@ def test_slack_dashes_hang_below_the_straight_line() -> None:
     assert length == pytest.approx(lengths[0, 2], rel=0.02)
 
 
-def test_tight_slack_cables_are_straight() -> None:
-    robot = load_robot(PARALLEL)
-    pose = robot.reference_pose[None]
-    slack = np.ones((1, 8), dtype=bool)
-    strips = scene.slack_strips(robot, pose, slack, robot.nominal_lengths(pose))
-    first = np.array(strips[: scene.DASHES]).reshape(-1, 3)
-    chord = first[-1] - first[0]
-    assert np.abs(np.cross(first - first[0], chord)).max() < 1e-12
-
-
 def test_the_tension_scale_grows_lighter_all_the_way() -> None:
     shades = scale_colours(np.linspace(0.0, 1.0, 200), 1.0).astype(float)
     light = shades[:, :3] @ [0.2126, 0.7152, 0.0722]
     assert np.all(np.diff(light) >= -0.6), "a grey print reads the same"
     assert light[-1] > 2.4 * light[0]
     np.testing.assert_array_equal(scale_colours(np.array([5.0]), 1.0)[0], shades[-1])
-
-
-@pytest.mark.parametrize("count", [1, 8, 9, 40])
-def test_cables_have_colours_of_their_own(count: int) -> None:
-    assert len(set(cable_colours(count))) == count
 
 
 @pytest.mark.parametrize(

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import base64
-import io
-import itertools
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
-from copy import copy
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import made_diagnoses as made
 import numpy as np
@@ -19,7 +14,6 @@ import pytest
 from made_data import term
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from PIL import Image
 from written_pages import figures_of, text_of
 
 from crosscheck.diagnosis.path import ModelPath, Stage
@@ -29,16 +23,13 @@ from crosscheck.fit.algebra import basis, imitated
 from crosscheck.fit.problem import KINDS
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.inference.held_out import rms_by_block
-from crosscheck.inference.noise import Noise
-from crosscheck.preparation.prepare import noise_floor
 from crosscheck.show.blocks import text_of as text_of_words
 from crosscheck.show.diagnosis import checks
 from crosscheck.show.effect_figures import cables_of, confusion_of, projection, waterfall
 from crosscheck.show.error_figures import Wall, draw_wall, failure_map, length_changes, walls_of
-from crosscheck.show.figures import WIDTH, collecting, keeping
+from crosscheck.show.figures import WIDTH, collecting
 from crosscheck.show.findings import (
     candidate_rows,
-    correlations,
     in_brief,
     parameter_table,
     untried,
@@ -46,7 +37,7 @@ from crosscheck.show.findings import (
 from crosscheck.show.pictures import render
 from crosscheck.show.residuals import Misfit, views_of
 from seecr import load_robot
-from seecr.effects import Term, Terms, layout_of
+from seecr.effects import Term, layout_of
 from seecr.pose import transform_points
 from seecr.show.colours import AFTER, BEFORE, CALM
 from seecr.units import short, with_error
@@ -70,12 +61,6 @@ def path_of(found: Diagnosis) -> ModelPath:
 def ends_of(found: Diagnosis) -> tuple[Stage, Stage]:
     """The model as it stood, and the last one of listed effects."""
     return path_of(found).first, path_of(found).last
-
-
-def with_last(found: Diagnosis, **changes: Any) -> Diagnosis:
-    """A diagnosis whose last model is changed."""
-    *stages, last = path_of(found).stages
-    return replace(found, path=replace(path_of(found), stages=(*stages, replace(last, **changes))))
 
 
 @pytest.fixture
@@ -141,10 +126,6 @@ def test_figures_are_well_formed_and_say_what_they_show(name: str) -> None:
         assert ElementTree.fromstring(figure).tag == "{http://www.w3.org/2000/svg}svg"
     words = re.findall(r'<img alt="([^"]*)"', page(name))
     assert len(words) == len(figures) and all(words)
-
-
-def test_the_same_diagnosis_gives_the_same_page() -> None:
-    assert render(diagnosis("pulleys")) == page("pulleys")
 
 
 def test_numbers_are_those_of_the_json() -> None:
@@ -218,34 +199,6 @@ def test_text_from_users_stays_text(monkeypatch: pytest.MonkeyPatch) -> None:
     assert seen.count(EVIL) >= 4  # sentence, note, next, why not
     # a wall has 4 names, in lines of so many letters
     assert seen.count(EVIL[:12]) - seen.count(EVIL) >= 8
-
-
-@pytest.mark.usefixtures("words_alone")
-def test_noise_that_was_assumed_and_noise_that_was_found_are_told_apart() -> None:
-    found = diagnosis("pulleys")
-    assumed = noise_floor(path_of(found).problem)
-    larger = {key: value and 18.0 * value for key, value in assumed.items()}
-    search = copy(path_of(found).search)
-    search.cache = {
-        key: replace(one, fit=replace(one.fit, noise=Noise(np.full(3, 18.0), np.zeros(3))))
-        for key, one in search.fitted.items()
-    }
-    path = replace(path_of(found), search=search)
-    seen = text_of(render(replace(found, floor=larger, path=path)))
-    assert "assumed noise position 0.030 mm" in seen
-    assert "estimated noise 0.540 mm" in seen
-    assert "the error that the estimated noise alone would give" in seen
-    assert "two standard deviations of the assumed noise" in seen
-    assert not re.search("as found|as it was", text_of(page("pulleys")))
-
-
-def test_letters_of_a_figure_that_is_kept_are_whole(tmp_path: Path) -> None:
-    with keeping(tmp_path):
-        waterfall(diagnosis("pulleys"))
-    (picture,) = tmp_path.glob("*.png")
-    with Image.open(picture) as kept:
-        edges = np.asarray(kept.convert("L"))[:, [0, 1, 2, -3, -2, -1]]
-    assert edges.min() == 255
 
 
 @pytest.fixture
@@ -378,16 +331,6 @@ def test_a_bound_and_a_blind_parameter_are_flagged() -> None:
     assert "at its bound" not in text_of(page("pulleys"))
 
 
-def test_correlated_parameters_go_by_the_names_that_tables_have() -> None:
-    found = diagnosis("pulleys")
-    robot, last = made.robot(), path_of(found).last
-    terms = Terms([*last.fit.terms, term(robot, "platform_mass", added_kg=0.1)])
-    alike = replace(last.fit, state=replace(last.fit.state, terms=terms))
-    vars(alike)["covariance"] = np.array([[1.0, 0.95], [0.95, 1.0]])
-    pairs = correlations(with_last(found, fit=alike), found.missing[0])
-    assert pairs == ["radius with added of platform_mass (0.950)"]
-
-
 def test_checks_tell_noise_from_structure() -> None:
     good = {check.name: check.good for check in checks(diagnosis("pulleys"))}
     assert good["size of the noise"] is True
@@ -417,18 +360,6 @@ def test_friction_would_need_a_friction_and_not_the_length_that_it_is_looked_for
     tried = NotListed("exit_friction", "rubs", 1.0, Reason(Why.IMPROBABLE))
     (row,) = candidate_rows(replace(diagnosis("pulleys"), candidates=(tried,)))
     assert row["with a value of"] == "friction = 0.200"
-
-
-def test_sizes_that_are_not_plausible_are_named_with_their_effect() -> None:
-    found = diagnosis("pulleys")
-    (sizes,) = (check for check in checks(found) if check.name == "sizes")
-    assert sizes.words.endswith("expected sizes (pulley_radius)")
-    fit = path_of(found).last.fit
-    at_bound = replace(fit.state, terms=fit.terms.with_vector(fit.terms.lower))
-    stuck = with_last(found, fit=replace(fit, state=at_bound))
-    (sizes,) = (c for c in checks(stuck) if c.name == "sizes")
-    assert sizes.words.endswith("(pulley_radius); at its bound: pulley_radius")
-    assert sizes.good is False
 
 
 def test_blocks_are_the_runs_left_out() -> None:
@@ -469,43 +400,6 @@ def test_views_show_the_plane_of_a_flat_robot(
     assert views_of(corners) == views
 
 
-def test_many_rows_stay_small() -> None:
-    rng = np.random.default_rng(0)
-    n, m = 2000, 8
-    values = rng.standard_normal((n, m))
-    wall = Wall(
-        "many", [f"cable{k}" for k in range(m)], values, 0.5 * values, np.ones(m), "mm",
-        [(f"abscissa {k}", rng.uniform(size=(n, m))) for k in range(4)],
-    )  # fmt: skip
-    page_part = draw_wall(wall)
-    assert len(page_part) < 2_000_000
-    (text,) = figures_of(page_part)
-    images = re.findall(r'"data:image/png;base64,([^"]*)"', text)
-    assert len(images) == 32
-    for image in images:
-        drawn = np.asarray(Image.open(io.BytesIO(base64.b64decode(image))).convert("RGBA"))
-        assert np.mean(drawn[..., 3] > 128) > 0.02, "dots that nobody sees"
-
-
-@pytest.mark.parametrize(
-    ("unit", "beside"),
-    [
-        # one scale for all, beside the first column; else each panel has its own
-        ("mm", ["−5 0 5 a", "−5 0 5 b", ""]),
-        ("", ["−5 0 5 a two −5 0 5", "−0.1 0.0 0.1 b", "−0.1 0.0 0.1"]),
-    ],
-)
-def test_panels_of_a_wall_share_their_scales(unit: str, beside: list[str]) -> None:
-    values = np.outer(np.linspace(-1.0, 1.0, 7), [8.0, 0.1])
-    across = [("t", np.arange(7) * 1.0), ("l", np.outer(np.arange(7), [1.0, 10.0]))]
-    wall = Wall("two", ["a", "b"], values, 0.0 * values, np.full(2, 0.01), unit, across)
-    (text,) = figures_of(draw_wall(wall))
-    first, second, last = beside
-    # below the last row alone: the times, and the lengths of both rows
-    said = [first, "0 1 2 3 4 5 6 t", second, "0 10 20 30 40 50 60 l", last]
-    assert " ".join(re.findall(r">([^<\s]+)</text>", text)) == " ".join(said).strip()
-
-
 def test_a_wall_of_many_cables_shows_the_worst() -> None:
     n, m = 5, 30
     values = np.full((n, m), 0.1)
@@ -515,46 +409,6 @@ def test_a_wall_of_many_cables_shows_the_worst() -> None:
     (text,) = figures_of(draw_wall(wall))
     assert text.count(">rope") == 12
     assert "rope17" in text
-
-
-def test_names_of_cables_stay_on_the_page_and_numbers_of_panels_apart(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    kept: list[Figure] = []
-
-    def placed(figure: Figure, *_args: Any, **_named: Any) -> None:
-        figure.draw_without_rendering()
-        kept.append(figure)
-
-    monkeypatch.setattr(Figure, "savefig", placed)
-    names = ["winch_left_front_upper", "rightfrontlowercable", "a " * 40]
-    values = np.outer(np.linspace(0.15, 1.42, 7), np.ones(3))
-    across = [("t", values), ("l", 20.0 * (values - 1.0)), ("u", values), ("v", values)]
-    draw_wall(Wall("long", names, values, 0.0 * values, np.ones(3), "mm", across))
-    (figure,) = kept
-    panels = figure.axes
-    assert panels[0].get_ylabel() == "winch_left_\nfront_upper" and len(panels) == 12
-    assert panels[8].get_ylabel().endswith("…")
-    assert min(a.yaxis.label.get_window_extent().x0 for a in panels[::4]) > 0.0
-    numbers = [
-        label.get_window_extent()
-        for axes in panels[8:]
-        for label in axes.get_xticklabels()
-        if label.get_text() and axes.get_xlim()[0] <= label.get_position()[0] <= axes.get_xlim()[1]
-    ]
-    assert all(one.x1 + 3.0 < other.x0 for one, other in itertools.pairwise(numbers))
-
-
-def test_pages_are_small() -> None:
-    assert all(len(page(name).encode()) < 2_000_000 for name in ALL)
-
-
-def test_nothing_missing_is_not_drawn_in_the_colour_of_alarm() -> None:
-    *calm, _confusion = figures_of(page("nothing"))  # which frames what imitates what
-    assert len(calm) > 2 and not any(BEFORE.lower() in figure.lower() for figure in calm)
-    _robot, errors, *_others = figures_of(page("unknown"))
-    alarming = errors.lower()
-    assert BEFORE.lower() in alarming and CALM.lower() not in alarming
 
 
 @pytest.mark.parametrize(("name", "models"), [("pulleys", 2), ("nothing", 1)])

@@ -16,10 +16,9 @@ from crosscheck.planning.planned import Adding
 from crosscheck.planning.proposer import Gain, Suggestion
 from crosscheck.planning.result import Plan, Visible
 from crosscheck.planning.visibility import Signal
-from crosscheck.show.effects import effect_record, parameter_lines
 from crosscheck.show.plan import print_plan
 from seecr.description.mjcf import load_robot
-from seecr.effects import effect_named, layout_of
+from seecr.effects import layout_of
 from seecr.pose import quat_from_rotvec
 
 ROBOT = load_robot("demobot_cogiro")
@@ -97,22 +96,3 @@ def test_a_plan_counts_what_shows_and_what_can_be_named() -> None:
     assert "so few rows (2)" in plan(effects=()).sentence
     lost: Any = SimpleNamespace(unsolved=np.ones(2, bool), problem=None)
     assert "no equilibrium at any of the rows" in plan(effects=(), planned=lost).sentence
-
-
-def test_for_programs_limits_and_sizes_are_in_si() -> None:
-    (row,) = effect_record(effect_named("pulley_radius"), ROBOT)["parameters"]
-    assert row["unit"] == "m" and row["plausible_size"] == RADIUS.scale[0]
-    assert (row["absent"], row["lower"], row["shapes_the_others"]) == (0.0, 0.0, False)
-    (row,) = effect_record(effect_named("pulley_radius"), None)["parameters"]
-    words = "2 % of the mean cable length"
-    assert row == {
-        "name": "radius", "unit": "m", "each": "one", "absent": 0.0, "plausible_size": None,
-        "shapes_the_others": False, "plausible_size_words": words,
-    }  # fmt: skip
-
-
-def test_values_are_told_in_the_units_that_people_read() -> None:
-    lines = parameter_lines("pulley_radius", {"radius_m": 0.0105})
-    assert lines == ["radius = 10.5 mm"]
-    lines = parameter_lines("tracker_frame", {"rotation_y_rad": np.radians(2.0), "shift_x_m": 0.1})
-    assert lines == ["rotation_y = 2 deg", "shift_x = 100 mm"]

@@ -18,7 +18,6 @@ from crosscheck.fit.problem import KINDS, POSITION
 from crosscheck.show import residuals
 from crosscheck.show.error_figures import caption
 from crosscheck.show.error_recordings import (
-    bars_share,
     states_of,
     write_comparison_recording,
     write_diagnosis_recording,
@@ -289,12 +288,6 @@ def test_maps_have_axes_and_the_scale_of_their_colours(back: Readback, shown: Mi
         assert dots[:, 0].min() - 0.1 < across[0] and across[-1] < dots[:, 0].max() + 0.1
         bar = np.array(back.static(f"/map/{kind.name}/scale", "LineStrips2D:strips"))
         assert bar[..., 0].min() > dots[:, 0].max(), "beside the dots"
-
-
-def test_bars_have_room_for_their_words() -> None:
-    few, many = bars_share(3, 2), bars_share(3, 40)
-    rows = 3 * (2 + 1)  # of three kinds, each with its title
-    assert few * 1010.0 > 20.0 * rows and many < 0.7
 
 
 def test_the_viewer_has_nothing_to_complain_about(written: Path, compared: Path) -> None:

@@ -1,10 +1,11 @@
-"""Pages of comparisons and plans; how each came about; dark, narrow, and figures to keep."""
+"""Pages of comparisons and plans, how each came about, figures to keep, and the glossary."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import re
+from pathlib import Path
 
 import pytest
 from made_data import case, run, term
@@ -12,6 +13,7 @@ from written_pages import figures_of, text_of
 
 import crosscheck
 from crosscheck.planning.visibility import NAMED
+from crosscheck.show.glossary import Linker, entries
 from crosscheck.show.pictures import render
 from seecr.files import Made
 
@@ -71,15 +73,6 @@ def test_a_plan_has_its_page(plan, pages):
         assert not item.reached or item.words in seen
 
 
-def test_printed_tables_have_their_heads_on_every_page(pages):
-    style = pages["plan"].split("<style>")[1].split("</style>")[0]
-    printed = style[style.index("@media print") :]
-    assert "thead { display: table-header-group; break-inside: avoid; }" in printed
-    # heads that hold buttons are not repeated by browsers
-    assert "th button { display: contents;" in printed
-    assert "tr { break-inside: avoid; }" in style
-
-
 def test_version_command_day_and_hashes_are_on_page_and_in_json(files, tmp_path):
     out, kept = tmp_path / "out", tmp_path / "figures"
     done = run("compare", *files, "--out", out, "--figures", kept, "--no-recording")
@@ -104,3 +97,36 @@ def test_the_same_data_have_the_same_hash_wherever_they_lie(files, tmp_path):
     assert made[0] == made[1] and list(made[0].files) == [xml.name]
     other.write_text("<mujoco/>")
     assert Made.now("c", [other]) != made[0]
+
+
+SOURCE = Path(__file__).resolve().parents[3] / "docs" / "glossary.md"
+
+
+def test_each_word_of_the_file_is_an_entry_with_an_anchor_of_its_own() -> None:
+    heads = re.findall(r"^\*\*(.+?)\.\*\*", SOURCE.read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(entries()) == len(heads) > 30
+    assert len({entry.anchor for entry in entries()}) == len(heads)
+    assert not any(re.search(r"[`*]|\]\(", entry.text) for entry in entries())
+
+
+def test_a_word_is_linked_where_it_first_stands_in_each_section() -> None:
+    page = Linker()
+    first = page.linked("Noise, noise and a <residual>")
+    assert first.startswith('<a href="#glossary-noise">Noise</a>, noise and a &lt;<a href=')
+    assert page.linked("noise again") == "noise again"
+    page.begin_section()
+    assert page.linked("noise").startswith("<a ")
+    assert [entry.name for entry in page.used()] == ["Noise", "Residual"], "the glossary's order"
+
+
+def test_words_are_known_in_the_plural_with_numbers_and_by_their_other_names() -> None:
+    page = Linker().linked("9 standard errors from zero; two expected sizes; on test runs; p 0.1")
+    said = re.findall(r"<a [^>]*>(.*?)</a>", page)
+    assert said == ["9 standard errors from zero", "expected sizes", "test runs"]
+    assert "<a" not in Linker().linked("unslackened, noise-free & phase")
+
+
+def test_other_names_of_one_word_are_one() -> None:
+    page = Linker()
+    links = re.findall(r'href="#([^"]*)"', page.linked("null value and held out row; a rival"))
+    assert len(set(links)) == len(links) == len(page.used()) >= 3

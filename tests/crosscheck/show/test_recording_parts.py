@@ -1,4 +1,4 @@
-"""The recordings' parts, each drawn by itself and read back."""
+"""The recordings' parts and texts, each by itself."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from made_data import soft_cogiro
 from recordings import Readback
 
 from crosscheck.errors import CrosscheckError
+from crosscheck.show import suite
+from crosscheck.show.blocks import Bold, Code, Items, Line, TextTable, section
 from crosscheck.show.error_recordings import draw_axes
+from crosscheck.show.texts import markdown, pose_heading
 from seecr.errors import InputFileError
 from seecr.show import layout, plots
 from seecr.show.map_recording import write_map_recording
@@ -101,3 +104,29 @@ def test_a_workspace_has_numbers_at_its_edges_and_the_scale_of_its_margins(tmp_p
     back = Readback(tmp_path / "chance.rrd")
     assert "is not certain" in back.static("/legend/of", "Points2D:labels")[0]
     assert len(back.static("/scene/unsure", "Points3D:positions")) == 2
+
+
+def test_a_table_has_heads_of_its_own_or_its_first_row() -> None:
+    rows = [["a", "b"], ["1", "2"]]
+    assert markdown([TextTable([], rows)]) == "| a | b |\n| --- | --- |\n| 1 | 2 |"
+    assert markdown([TextTable(rows[0], rows[1:])]) == markdown([TextTable([], rows)])
+    assert markdown([TextTable(["n"], [[None]])]).endswith("| – |")
+
+
+def test_blocks_stand_below_their_title_and_what_users_wrote_means_nothing() -> None:
+    text = markdown([Line((Bold("Look."), " at *x* in ", Code("a_b"))), Items(["one", "two"])], "T")
+    assert text == "# T\n**Look.** at \\*x\\* in `a_b`\n\n- one\n- two"
+    assert markdown([section("S", Line("x"))]) == "## S\nx"
+
+
+def test_of_one_pose_it_is_not_said_which_of_how_many() -> None:
+    assert pose_heading(0, 1) == "## Pose 0"
+    assert pose_heading(2, 5) == "## Pose 2 (of 0 to 4)"
+
+
+def test_an_instant_is_in_millimetres_and_degrees() -> None:
+    text = suite.instant_text(0.25, 1e-3, np.array([0.002, np.pi / 180.0]), "cable1")
+    assert text.splitlines()[0] == "## Settling, 0.250 s"
+    assert [line.split(" | ")[1] for line in text.splitlines()[1:] if "---" not in line] == [
+        "2 mm |", "1 ° |", "0.001 J |", "cable1 |",
+    ]  # fmt: skip

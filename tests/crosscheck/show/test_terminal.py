@@ -16,15 +16,13 @@ from made_data import measured, soft_cogiro, term
 
 from crosscheck.add import add_effect
 from crosscheck.calibration import calibrate
-from crosscheck.comparison.limits import Limits, exceeded
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
-from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
-from crosscheck.measurements.read import together
+from crosscheck.fit.reasons import Reason, Why
 from crosscheck.show.comparison import print_comparison
 from crosscheck.show.diagnosis import print_diagnosis
 from crosscheck.show.findings import candidate_rows
-from crosscheck.show.models import print_addition, print_calibration, why_not
+from crosscheck.show.models import print_calibration, why_not
 from seecr.description.mjcf import load_robot
 from seecr.prediction.experiment import predict
 
@@ -54,16 +52,6 @@ def test_a_comparison_begins_with_verdict_and_limits(found: Comparison) -> None:
                    str(z.line), str(z.rows)]  # fmt: skip
 
 
-def test_of_several_files_it_is_told_which_the_largest_errors_are_in() -> None:
-    robot = soft_cogiro()
-    days = [replace(measured(robot, seed=k), path=Path(f"{k}.csv")) for k in (1, 2)]
-    both = compare(robot, together(days))
-    text = printed(print_comparison, both, [], False, Path("here"))
-    row = next(line.split() for line in text.splitlines() if line.startswith("z "))
-    z = next(c for c in both.coordinates if c.name == "z")
-    assert row[-3:-1] == both.problem.data.place(z.row).split() and row[-3] in ("1.csv", "2.csv")
-
-
 def test_what_rounding_leaves_of_an_error_is_nothing() -> None:
     """The readings are those of the model: errors were told as 3e-11 mm."""
     robot = soft_cogiro()
@@ -73,23 +61,6 @@ def test_what_rounding_leaves_of_an_error_is_nothing() -> None:
     text = printed(print_comparison, compare(robot, exact), [], False, Path("here"))
     row = next(line.split() for line in text.splitlines() if line.startswith("x "))
     assert row[1:5] == ["0", "0", "0", "mm"]
-
-
-def test_a_limit_that_is_exceeded_is_said(found: Comparison) -> None:
-    beyond = exceeded(Limits(max_position=1e-6), found)
-    text = printed(print_comparison, found, beyond, True, Path("here"))
-    assert beyond[0].words in text and "All limits hold" not in text
-
-
-def test_an_addition_tells_values_errors_and_what_was_written() -> None:
-    robot = soft_cogiro()
-    data = measured(robot, [term(robot, "stiffness", factor=1.4)])
-    added = add_effect(robot, data, "stiffness")
-    text = printed(print_addition, added, Path("m.toml"), True)
-    assert "  factor = 1.4 ± " in text or "  factor = 1.39" in text or "  factor = 1.40" in text
-    assert "With stiffness, the residuals are noise." in text
-    assert text.endswith("Written to m.toml: stiffness\n")
-    assert why_not(added).endswith("it is not worth adding; --force adds it anyway")
 
 
 @pytest.mark.parametrize(
@@ -186,16 +157,6 @@ def test_a_diagnosis_begins_with_its_verdict() -> None:
     assert any(line.startswith("In these data ") for line in lines)
     assert any(line.startswith("pulley_radius: ") for line in lines)
     assert any(line.startswith("not ") for line in lines) and lines[-1].startswith("Results in")
-
-
-def test_beside_something_unknown_probabilities_say_so() -> None:
-    texts = []
-    for verdict in (DiagnosisVerdict.EFFECTS_FOUND, DiagnosisVerdict.UNKNOWN_EFFECT):
-        found = replace(made.pulleys(), verdict=verdict)
-        texts.append(printed(print_diagnosis, found, Path("here")))
-    assert "(probability > 99 %)" in texts[0] and "beside something unknown" not in texts[0]
-    assert "(probability beside something unknown > 99 %)" in texts[1]
-    assert "note: Probabilities beside something unknown assume that it changes what" in texts[1]
 
 
 def test_classes_of_equals_are_told_with_their_probability_where_none_is_listed() -> None:

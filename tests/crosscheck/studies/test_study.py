@@ -1,4 +1,4 @@
-"""Studies: what a table may ask for, what is computed again, and what is refused."""
+"""Studies: what a table may ask for, what is computed again, what is refused, and the page."""
 
 from __future__ import annotations
 
@@ -16,9 +16,11 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 from called import as_json, ran
+from shown import Page
 
 import crosscheck
 import seecr
+from crosscheck.studies import cases
 from seecr.parallel import processes
 
 G = 9.81
@@ -391,3 +393,23 @@ def test_of_a_single_case_all_is_told(tmp_path: Path) -> None:
     cases.write_text("robot,do,grid\nplanar_vertical,map,0.4 0 0.2\n")
     said = ran(f"crosscheck study {cases} --jobs 1 --out {tmp_path / 'out'}", 0).stdout
     assert "robot: planar_vertical\n" in said and "at rest: 1\ndeviation max [mm]: " in said
+
+
+DOCS = Path(__file__).resolve().parents[3] / "docs"
+
+
+@pytest.mark.slow
+def test_the_page_works_as_written(tmp_path: Path) -> None:
+    page = Page(tmp_path)
+    page.run((DOCS / "study.md").read_text(encoding="utf-8"))
+    assert [command.split()[1] for command in page.commands] == ["study", "study"]
+
+
+def test_every_column_is_in_the_formats() -> None:
+    text = (DOCS / "formats.md").read_text(encoding="utf-8").partition("## Cases: CSV")[2]
+    assert [name for name in (*cases._HEAD, *cases._OPTIONS) if f"`{name}`" not in text] == []
+    changes = ("mass_kg", "ea_N", "ea_3_N", "exit_2_x_mm", "anchor_2_x_mm")
+    row = {"robot": "demobot_cogiro", "do": "map", "grid": 1, **dict.fromkeys(changes, 400)}
+    row |= {"mass_kg": 1, "anchor_2_x_mm": 50, "pulley_radius.radius_m": 0.01}
+    assert all(f"`{name}`" in text for name in (*changes, "pulley_radius.radius_m"))
+    assert crosscheck.study([row]).rows[0]["poses"] == 1

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from shutil import copyfile
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,6 @@ from crosscheck.suite.cases import (
     robot_sweep,
     select,
     shipped_cases,
-    user_cases,
 )
 from crosscheck.suite.results import failure_lines, remarks
 from crosscheck.suite.run import chosen_cases, run_case
@@ -31,7 +29,6 @@ from seecr.files import plain
 from seecr.pose import pose_difference
 
 PLANAR = seecr.model_path("planar_vertical")
-PARALLEL, COGIRO = model_path("demobot_parallel"), model_path("demobot_cogiro")
 
 
 @pytest.fixture(scope="module")
@@ -79,16 +76,6 @@ def test_turned_sweeps_turn_about_every_axis_and_planar_ones_about_theirs(shippe
         axes = [1] if case.name.startswith("planar") else [0, 1, 2]
         assert np.all(turns[axes] > np.sin(np.deg2rad(5.0)))
         assert np.all(np.delete(turns, axes) == 0.0)
-
-
-def test_planar_robots_run_on_both_cables_at_more_heights(shipped):
-    by_name = {case.name: case for case in shipped}
-    for robot in ("two-cable", "vertical", "horizontal"):
-        for cable in CABLES:
-            case = by_name[f"planar-{robot}-{cable}-heights"]
-            assert case.cable == cable
-            heights = {*case.poses[:, 2], *by_name[f"planar-{robot}"].poses[:, 2]}
-            assert len(heights) == 5
 
 
 @pytest.mark.slow
@@ -155,21 +142,6 @@ def test_poses_for_any_robot_scale_with_it(name):
     assert np.ptp(robot_sweep(robot)[:, 0]) > 0.4
 
 
-def test_a_robot_a_hundred_times_larger_gets_poses_a_hundred_times_larger():
-    robot = seecr.load_robot(COGIRO)
-    pose = robot.reference_pose.copy()
-    pose[:3] *= 100
-    large = replace(
-        robot,
-        exit_points=100 * robot.exit_points,
-        anchor_points=100 * robot.anchor_points,
-        rest_lengths=100 * robot.rest_lengths,
-        reference_pose=pose,
-    )
-    small_poses, large_poses = robot_sweep(robot), robot_sweep(large)
-    np.testing.assert_allclose(large_poses[:, :3], 100 * small_poses[:, :3], rtol=1e-12)
-
-
 def test_select_by_pattern_and_refuses_unknown_names(shipped):
     chosen = select(shipped, ["parallel-*-z0.10", "planar-vertical"])
     names = ["parallel-vectran-z0.10", "parallel-fishing-z0.10", "planar-vertical"]
@@ -204,18 +176,12 @@ def test_a_copy_may_change_one_value_and_is_written_back(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (
-            "[polish]\nposition_m = 1",
-            r"'polish' is not a table of thresholds; expected polished or",
-        ),
-        (
-            "[polished]\nposition_mm = 1",
-            r"'position_mm' is not a key of \[polished\] of thresholds; expected position_m or",
-        ),
-        (
-            "[settled]\nposition_m = 0",
-            r"\[settled\] position_m: expected a positive number up to 1, got 0",
-        ),
+        ("[polish]\nposition_m = 1",
+         r"'polish' is not a table of thresholds; expected polished or"),
+        ("[polished]\nposition_mm = 1",
+         r"'position_mm' is not a key of \[polished\] of thresholds; expected position_m or"),
+        ("[settled]\nposition_m = 0",
+         r"\[settled\] position_m: expected a positive number up to 1, got 0"),
         ("[settled]\nposition_m = -1e-6", r"expected a positive number up to 1, got -1e-06"),
         ("[settled]\nposition_m = nan", r"expected a positive number up to 1, got nan"),
         ("[settled]\nposition_m = inf", r"expected a positive number up to 1, got inf"),
@@ -230,7 +196,7 @@ def test_a_copy_may_change_one_value_and_is_written_back(tmp_path):
         ("[findings]\nfree_to_move = 'x 1'", r"free_to_move: expected a list of names"),
         ("[findings]\nfree_elsewhere = 2", r"free_elsewhere: expected a share from 0 to 1, got 2"),
     ],
-)
+)  # fmt: skip
 def test_bad_thresholds(tmp_path, text, message):
     path = tmp_path / "bad.toml"
     path.write_text(text)
@@ -238,23 +204,6 @@ def test_bad_thresholds(tmp_path, text, message):
         load_thresholds(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert "\n" not in str(caught.value)
-
-
-def test_thresholds_that_cannot_be_read(tmp_path):
-    with pytest.raises(InputFileError, match=r"none\.toml: no such file; expected thresh"):
-        load_thresholds(tmp_path / "none.toml")
-    (tmp_path / "latin.toml").write_bytes(b"# caf\xe9\n")
-    with pytest.raises(InputFileError, match=r"is not UTF-8 \(byte number 6\)"):
-        load_thresholds(tmp_path / "latin.toml")
-
-
-def test_user_cases_name_the_file(tmp_path):
-    file = tmp_path / "my robot.xml"
-    copyfile(COGIRO, file)
-    sweep, random = user_cases(file, n_random=7)
-    assert (sweep.name, random.name) == ("my robot-sweep", "my robot-random")
-    assert len(random.poses) == 7
-    assert sweep.mujoco_model == sweep.model
 
 
 def names(given: Any) -> list[str]:
@@ -303,8 +252,3 @@ def test_a_robot_that_is_not_its_file_is_refused() -> None:
         crosscheck.run_suite(replace(robot, gravity=0.5 * robot.gravity))
     with pytest.raises(seecr.InputError, match="was not read from a file"):
         crosscheck.run_suite(replace(robot, source=None))
-
-
-def test_nothing_does_not_agree() -> None:
-    nothing = crosscheck.Run([], load_thresholds(), 0, 1, 0.0)
-    assert nothing.outcome is Outcome.NOT_CONVERGED and str(nothing) == "Nothing was run."

@@ -1,4 +1,4 @@
-"""The suite's cases in both physics: agreement, findings, limits, and several processes."""
+"""The suite's cases in both physics: agreement, stiffness, findings, limits, and processes."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mujoco_modes import mujocos_modes
+from published import caspr_files, wirex_file
 
 import seecr
+from crosscheck import user_cases
 from crosscheck.errors import CrosscheckError
 from crosscheck.settle.settler import Settler, Settling, SettlingBatch, screw_motion
 from crosscheck.suite import agreement, verdicts
@@ -17,16 +20,19 @@ from crosscheck.suite import run as suite
 from crosscheck.suite.agreement import FindingLimits, gap, load_thresholds
 from crosscheck.suite.cases import (
     Case,
-    demobot_random,
     demobot_sweep,
     select,
     shipped_cases,
 )
-from crosscheck.suite.results import CaseResult, failure_lines, finding_lines, remarks, worst_of
+from crosscheck.suite.results import CaseResult, failure_lines, finding_lines, remarks
 from crosscheck.suite.run import run_case, run_suite
 from crosscheck.suite.verdicts import Outcome, Verdict
+from seecr import correct
 from seecr.description.mjcf import CABLES, model_path
-from seecr.errors import ExecutorError, InputFileError
+from seecr.errors import ExecutorError
+from seecr.importing.caspr import read_caspr
+from seecr.importing.draft import Draft
+from seecr.importing.wirex import read_wirex
 from seecr.pose import pose_add, pose_difference, quat_from_rotvec, quat_multiply
 
 PARALLEL, COGIRO = model_path("demobot_parallel"), model_path("demobot_cogiro")
@@ -54,11 +60,6 @@ def with_eigenvalue(settling: Settling, eigenvalue: float, residual: float = 1e-
     """A settling as if the robot were that soft [N/m], and so much were left unbalanced."""
     same = {"residual": residual, "settled_residual": residual}
     return replace(settling, smallest_eigenvalue=eigenvalue, **same)
-
-
-@pytest.fixture(scope="module")
-def shipped() -> list[Case]:
-    return shipped_cases()
 
 
 @pytest.fixture(scope="module")
@@ -94,30 +95,6 @@ def test_agreement_leaves_room(ends):
     # far inside the thresholds: what is left is rounding, not luck
     for result in ends.values():
         assert all(worst.ratio < 0.05 for worst in result.worst.values())
-
-
-def test_another_mjcf_for_mujoco_keeps_its_own_stiffness(tmp_path):
-    changed = with_stiffer_cable(COGIRO, tmp_path, 1.001)
-    poses = demobot_sweep(0.1, 1)
-    case = case_of(COGIRO, poses, mujoco_model=changed, cable="vectran")
-    np.testing.assert_allclose(case.settler().ea[0], 3003.0)
-    assert run_case(case, load_thresholds()).outcome is Outcome.DIFFER
-
-
-def test_mujoco_measures_the_lengths_it_pays_out_itself(tmp_path):
-    side, robot = Settler(PARALLEL), seecr.load_robot(PARALLEL)
-    poses = demobot_random(np.random.default_rng(5), 10, 0.2)
-    expected = robot.commanded_lengths(poses)
-    np.testing.assert_allclose(side.paid_out(poses), expected, rtol=0, atol=1e-15)
-    side.settle(poses[0], expected[0])  # changes the springs; the reference must not follow
-    np.testing.assert_allclose(side.paid_out(poses), expected, rtol=0, atol=1e-15)
-
-
-def test_cable_counts_must_match():
-    planar = model_path("planar_vertical")
-    case = case_of(COGIRO, demobot_sweep(0.1, 1), mujoco_model=planar, cable=None)
-    with pytest.raises(InputFileError, match=r"planar_vertical\.xml: 4 cables; expected 8 as in"):
-        run_case(case, load_thresholds())
 
 
 # --- findings ------------------------------------------------------------------------------
@@ -227,18 +204,6 @@ def test_an_answer_that_mujoco_leaves_is_no_equilibrium(seesaw):
     assert "MuJoCo leaves" in finding.text
 
 
-def test_unsolved_poses_are_neither_passes_nor_differences(monkeypatch):
-    def hurried(robot, poses, **options):
-        return seecr.solve(robot, poses, **{**options, "max_iterations": 2})
-
-    monkeypatch.setattr(suite, "seecr_solve", hurried)
-    result = run_case(case_of(PARALLEL, demobot_sweep(0.1, 2)), load_thresholds())
-    assert list(result.verdict) == [Verdict.SEECR_UNSOLVED] * 2
-    assert "iteration limit" in result.findings[0].text
-    assert result.outcome is Outcome.NOT_CONVERGED
-    assert result.worst == {}
-
-
 def test_mujoco_that_does_not_settle_is_unsolved(monkeypatch):
     settler = Case.settler
 
@@ -293,24 +258,6 @@ def test_a_cable_slack_for_one_only_matters_when_the_other_pulls(ends):
         # also where tensions may differ by that much
         generous = replace(result.allowance, tension_N=np.full(2, 1.0))
         assert agreement.within(difference, generous)[0] == same
-
-
-def test_a_screw_keeps_to_a_fixed_axis():
-    random = np.random.default_rng(7)
-    point, axis = random.normal(size=3), np.array([0.6, 0.0, 0.8])
-    start = np.r_[random.normal(size=3), quat_from_rotvec(random.normal(size=3))]
-
-    def turned(angle):
-        from seecr.pose import quat_multiply, quat_rotate
-
-        q = quat_from_rotvec(angle * axis)
-        return np.r_[point + quat_rotate(q, start[:3] - point), quat_multiply(q, start[3:])]
-
-    path = screw_motion(start, turned(1.2), 5)
-    for pose, angle in zip(path, (0, 0.3, 0.6, 0.9, 1.2), strict=True):
-        assert np.abs(pose_difference(pose, turned(angle))).max() < 1e-14
-    shift = screw_motion(start, pose_add(start, np.array([1.0, 2, 3, 0, 0, 0])), 3)
-    np.testing.assert_allclose(shift[1, :3], start[:3] + np.array([0.5, 1, 1.5]), atol=1e-14)
 
 
 # --- limits of findings --------------------------------------------------------------------
@@ -393,12 +340,6 @@ def test_processes_give_the_same_results_in_the_same_order():
         assert list(one.verdict) == list(two.verdict)
 
 
-def test_errors_cross_processes(tmp_path):
-    broken = [case_of(tmp_path / f"no{i}.xml", CORNER) for i in range(2)]
-    with pytest.raises(seecr.RobotError, match=r"no0\.xml: no such file"):
-        run_suite(broken, load_thresholds(), jobs=2)
-
-
 def test_a_process_that_was_killed_is_told_with_what_to_do(monkeypatch):
     def broken(*_args):
         raise ExecutorError("the executor ended before its work")
@@ -407,15 +348,6 @@ def test_a_process_that_was_killed_is_told_with_what_to_do(monkeypatch):
     words = r"one of 2 processes was killed, perhaps for lack of memory; try --jobs 1"
     with pytest.raises(CrosscheckError, match=words):
         run_suite(["planar-two-cable", "camera-sweep"], jobs=2)
-
-
-def test_worst_is_the_largest_share_of_what_is_allowed(ends):
-    results = list(ends.values())
-    result, worst = worst_of(results)
-    ratios = [w.ratio for r in results for w in r.worst.values()]
-    assert worst.ratio == max(ratios)
-    assert getattr(result.difference, worst.quantity)[worst.pose] == worst.value
-    assert worst_of([]) is None
 
 
 AXIS = np.array([0.48, -0.6, 0.64])
@@ -434,17 +366,6 @@ def test_the_angle_is_that_of_the_turn(angle):
     assert found == pytest.approx(angle, rel=1e-7, abs=4e-16 if angle < 1 else 1e-9)
 
 
-def test_small_angles_keep_their_digits():
-    angles = np.array([1e-14, 1e-10, 1e-7])
-    found = gap(np.stack([turned(a) for a in angles]), turned(0.0))[1]
-    np.testing.assert_allclose(found, angles, rtol=0, atol=1e-15)
-
-
-def test_a_quaternion_and_its_negative_are_one_rotation():
-    other = turned(0.4) * np.r_[1, 1, 1, -1, -1, -1, -1]
-    assert gap(other, turned(0.4))[1] < 1e-15
-
-
 def test_both_rotations_of_two_random_poses_say_the_same():
     random = np.random.default_rng(2)
     a, b = random.normal(size=(2, 50, 7))
@@ -456,9 +377,68 @@ def test_both_rotations_of_two_random_poses_say_the_same():
     np.testing.assert_allclose(angle, np.linalg.norm(change[:, 3:], axis=1), rtol=1e-7)
 
 
-def test_where_there_is_no_pose_there_is_no_gap():
-    nowhere = np.full(7, np.nan)
-    distance, angle = gap(np.stack([nowhere, turned(0.2)]), turned(0.0))
-    assert np.isnan(distance[0]) and np.isnan(angle[0])
-    assert distance[1] == 0.0 and angle[1] == pytest.approx(0.2, rel=1e-12)
-    assert np.isnan(gap(nowhere, nowhere)[1])
+def draft_of(folder: Path, name: str) -> Draft:
+    if name == "hrpcables":
+        return read_wirex(wirex_file(folder, name))
+    return read_caspr(*caspr_files(folder, name), None).with_options(ea="1e5N")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["cogiro", "kntu_planar", "example_spherical", "hrpcables"])
+def test_a_published_robot_agrees_with_mujoco(name: str, tmp_path: Path) -> None:
+    robot, _notes = draft_of(tmp_path, name).robot()
+    if robot.joints:  # nothing loads these at home
+        tight = correct(robot, robot.reference_pose[None], lowest=10.0).commands.lengths
+        assert tight is not None
+        robot = replace(robot, rest_lengths=tight[0])
+    path = tmp_path / f"{name}.xml"
+    robot.save(path)
+    run = run_suite(user_cases(path, n_random=6))
+    assert run.outcome is Outcome.AGREE
+    assert all(result.compared.all() for result in run.results)
+
+
+NAMES = (
+    "cogiro-vectran-turned", "parallel-fishing-turned", "parallel-vectran-tilted", "uneven-turned",
+    "off-centre-turned", "planar-two-cable-inverted", "planar-vertical-vectran-turned",
+    "planar-horizontal-fishing-turned", "cogiro-large-sweep", "ipanema-sweep", "camera-sweep",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    return {case.name: case for case in shipped_cases(n_random=1)}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_stiffness_and_frequencies_at_rest_are_mujocos(name, shipped):
+    result = run_case(shipped[name], load_thresholds())
+    solution, mujoco = result.solution, result.case.settler()
+    np.testing.assert_allclose(
+        solution.smallest_eigenvalue, result.settling.smallest_eigenvalue, rtol=1e-5
+    )
+    scale = np.where(solution.robot.hinges, solution.robot.length, 1.0)
+    for i in range(0, len(result), 5):
+        command, pose = solution.command[i], result.settling.pose[i]
+        stiffness, frequencies = mujocos_modes(mujoco, pose, command)
+        own = np.linalg.eigvalsh(solution.stiffness[i] / np.outer(scale, scale))
+        np.testing.assert_allclose(own, stiffness, rtol=1e-5, atol=1e-6 * stiffness[-1])
+        np.testing.assert_allclose(solution.frequencies[i], frequencies, rtol=1e-5)
+
+
+def test_a_screw_keeps_to_a_fixed_axis():
+    random = np.random.default_rng(7)
+    point, axis = random.normal(size=3), np.array([0.6, 0.0, 0.8])
+    start = np.r_[random.normal(size=3), quat_from_rotvec(random.normal(size=3))]
+
+    def turned(angle):
+        from seecr.pose import quat_multiply, quat_rotate
+
+        q = quat_from_rotvec(angle * axis)
+        return np.r_[point + quat_rotate(q, start[:3] - point), quat_multiply(q, start[3:])]
+
+    path = screw_motion(start, turned(1.2), 5)
+    for pose, angle in zip(path, (0, 0.3, 0.6, 0.9, 1.2), strict=True):
+        assert np.abs(pose_difference(pose, turned(angle))).max() < 1e-14
+    shift = screw_motion(start, pose_add(start, np.array([1.0, 2, 3, 0, 0, 0])), 3)
+    np.testing.assert_allclose(shift[1, :3], start[:3] + np.array([0.5, 1, 1.5]), atol=1e-14)

@@ -104,15 +104,6 @@ def test_commands_are_the_same_to_a_tenth_of_a_nanometre() -> None:
     assert len(key) == 4
 
 
-def test_what_the_commands_lack_is_said() -> None:
-    assert set(lacking_in(commands())) == {"time", "temperature"}
-    lengths = np.ones((2, 4))
-    whole = commands(
-        command_pose=None, command_lengths=lengths, t_s=np.arange(2.0), temperature_C=np.zeros(2)
-    )
-    assert set(lacking_in(whole)) == {"poses"} and lacking_in(replace(whole, told=True)) == {}
-
-
 def test_the_hall_warms_up_by_a_few_degrees_and_the_way_is_that_of_every_seed() -> None:
     one, other = (sweeps(ROBOT, 5, 1.0, seed) for seed in (1, 2))
     np.testing.assert_array_equal(one.command_pose, other.command_pose)
@@ -158,3 +149,12 @@ def test_where_nothing_rests_it_is_said_of_which_commands() -> None:
         rested({10: 0.9})
     with pytest.raises(CrosscheckError, match="along the twin's commands, however close"):
         rested({10: 0.9, 20: 0.9})
+
+
+def test_what_the_commands_lack_is_said() -> None:
+    assert set(lacking_in(commands())) == {"time", "temperature"}
+    lengths = np.ones((2, 4))
+    whole = commands(
+        command_pose=None, command_lengths=lengths, t_s=np.arange(2.0), temperature_C=np.zeros(2)
+    )
+    assert set(lacking_in(whole)) == {"poses"} and lacking_in(replace(whole, told=True)) == {}
