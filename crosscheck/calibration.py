@@ -32,8 +32,7 @@ from crosscheck.measurements.data import GivenSigma, Sigma
 from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import calibrated, provenance_of, renewed
-from crosscheck.preparation.prepare import Prepared, Progress, prepare
-from crosscheck.preparation.thinned import note_on_others, thinned
+from crosscheck.preparation.prepare import Prepared, Progress, note_on_others, prepare, thinned
 from seecr.arguments import silent
 from seecr.counted import counted, plural, some
 from seecr.effects import Terms, catalogue

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from crosscheck.importing.logs import Block, FileRows, Logged, Row, check_body
+from crosscheck.importing.logs import Block, FileRows, Logged, Row
 from seecr.columns.csv import VICON
 from seecr.counted import counted
 from seecr.pose import Array
@@ -50,9 +50,7 @@ def read_motive(path: Path) -> Logged:
         raise rows.error("has no row of labels that begins with Frame; is the file cut off?")
     labels = _labels(rows, top)
     body = range(top + 1, 1 + max(k for k, row in enumerate(rows.cells) if any(row)))
-    check_body(rows, body)
-    block = Block(rows, top, body)
-    block.check_whole()
+    block = Block.of(rows, top, body)
     _check_count(rows, settings, block)
     time = next((c for c, cell in enumerate(block.labels) if cell.startswith("Time (")), None)
     rate = settings.get("Export Frame Rate", "")
@@ -230,10 +228,7 @@ def _blocks(rows: FileRows) -> list[_Found]:
         end = top + 2
         while end < len(rows.cells) and any(rows.cells[end]):
             end += 1
-        body = range(top + 2, end)
-        check_body(rows, body)
-        block = Block(rows, top, body)
-        block.check_whole()
+        block = Block.of(rows, top, range(top + 2, end))
         out.append(_Found(kind, rate, rows.cells[top - 1], rows.cells[top + 1], block))
     return out
 

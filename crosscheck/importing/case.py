@@ -26,11 +26,10 @@ from crosscheck.importing.align import (
     with_target,
 )
 from crosscheck.importing.choices import ImportChoices
-from crosscheck.importing.join import commanded, joined
+from crosscheck.importing.dwells import about_mean, joined
 from crosscheck.importing.logs import Logged
-from crosscheck.importing.noise import noise_of_dwells, noise_words, repeated
 from crosscheck.importing.take import READERS, Take, take_of
-from crosscheck.measurements.data import Measurements
+from crosscheck.measurements.data import LEAST, Measurements, Sigma
 from crosscheck.measurements.read import load_commands, together
 from crosscheck.measurements.write import write_measurements
 from seecr.columns.csv import read_table, table_text
@@ -62,8 +61,9 @@ def without_strays(
     farther than most, and the platform has hardly moved since the dwell before, though it was told
     to. If more than a few of a recording are, it is no matter of single dwells: all stay.
     """
-    told = [_told(robot, take)[:, :3] for take in takes]
-    off = [_off(take, frames, own) for take, own in zip(takes, told, strict=True)]
+    told = [take.told(robot)[:, :3] for take in takes]
+    places = [frames.poses(*take.tracked)[0] for take in takes]
+    off = [np.linalg.norm(at - to, axis=1) for at, to in zip(places, told, strict=True)]
     usual = float(np.median(np.concatenate(off)))
     limit = max(LEFT * size_of_cloud(np.concatenate(told)), _USUAL * usual)
     out, notes = list[Take](), list[str]()
@@ -83,20 +83,6 @@ def _stood_still(take: Take, told: Array) -> NDArray[np.bool_]:
     place = take.dwells.position[take.used]
     moved, asked = (np.linalg.norm(np.diff(p, axis=0), axis=1) for p in (place, told))
     return np.concatenate([[False], moved < _FOLLOWED * asked])
-
-
-def _told(robot: Robot, take: Take) -> Array:
-    """Commanded poses (n, 7) of the dwells that are used."""
-    return commanded(robot, take.held.log.rows(take.held.row[take.number >= 0]))
-
-
-def _off(take: Take, frames: Frames, told: Array) -> Array:
-    """Distances (n,) [m] of the dwells that are used from where they are told to be (n, 3)."""
-    quat = take.dwells.quat_wxyz
-    place, _turned = frames.poses(
-        take.dwells.position[take.used], None if quat is None else quat[take.used]
-    )
-    return np.asarray(np.linalg.norm(place - told, axis=1))
 
 
 def _note(take: Take, far: NDArray[np.bool_], off: Array, usual: float) -> str:
@@ -279,11 +265,10 @@ def write_case(found: Imported, robot_path: Path, out: Path, made: Made | None =
 
 def _rests(robot: Robot, takes: Sequence[Take]) -> tuple[Array, Array | None, Array]:
     """Tracked positions (n, 3) and quaternions (n, 4), if any, and commanded poses (n, 7)."""
-    position = np.concatenate([take.dwells.position[take.used] for take in takes])
-    quats = [take.dwells.quat_wxyz for take in takes]
-    turned = [q[take.used] for q, take in zip(quats, takes, strict=True) if q is not None]
+    position, quats = zip(*(take.tracked for take in takes), strict=True)
+    turned = [quat for quat in quats if quat is not None]
     quat = np.concatenate(turned) if len(turned) == len(takes) else None
-    return position, quat, np.concatenate([_told(robot, take) for take in takes])
+    return np.concatenate(position), quat, np.concatenate([take.told(robot) for take in takes])
 
 
 def _frames(robot: Robot, takes: Sequence[Take], choices: ImportChoices) -> Frames:
@@ -327,11 +312,9 @@ def _place(export: Logged, name: str) -> Array:
 
 def _measured(take: Take, frames: Frames) -> tuple[Measurements, Array]:
     rows, noise = joined(take.held, take.dwells, take.number)
-    number = take.number[: rows.n_rows]
-    there = number >= 0
-    used, quat = number[there], take.dwells.quat_wxyz
-    place, turn = frames.poses(take.dwells.position[used], None if quat is None else quat[used])
-    position = np.full((rows.n_rows, 3), np.nan)
+    there = take.number[: rows.n_rows] >= 0
+    place, turn = frames.poses(*take.tracked)
+    position, quat = np.full((rows.n_rows, 3), np.nan), None
     position[there] = place
     if turn is not None:
         quat = np.full((rows.n_rows, 4), np.nan)
@@ -356,3 +339,128 @@ def _one(parts: Sequence[Measurements]) -> Measurements:
         t_s[own] += t_s[whole.file == k - 1][-1] + _BETWEEN - t_s[own][0]
     one = np.zeros(whole.n_rows, dtype=np.int64)
     return replace(whole, t_s=t_s, files=(), file=one, notes=())
+
+
+# The noise of imported poses: within dwells, and between visits, which show more.
+#
+# An error that stays the same for a whole dwell, such as a tracker's in its volume or a platform
+# that sticks, is in no scatter within dwells. What repeats at one place in every visit is in
+# neither.
+
+# From so many further visits on the size is known to a factor of 1.4, as a stated one is: that of
+# three coordinates has a relative error of 1 / sqrt(6 n), twice which is 0.4.
+_LEAST_VISITS = 4
+_NOISE_DIGITS = 3
+
+# Samples that scatter by less than this part of the least change between them show the last digit
+# written and no noise. From q / 2 on, the mean of numbers rounded to q is off by 0.002 q at most:
+# q exp(-2 (pi / 2)^2) / pi, the first term of the Fourier series of the rounding error.
+_DIGITS = 0.5
+
+
+def noise_of_dwells(takes: Sequence[Take], tensions: Sequence[Array]) -> Sigma:
+    """The noise of means, over all dwells; None if the rounding in the files hides it."""
+
+    def pooled(values: Array) -> float | None:
+        rms = _rms(values)
+        return float(f"{rms:.3g}") if rms > LEAST else None
+
+    def of_means(unit: str) -> float | None:
+        error, scatter, step = (
+            np.concatenate([getattr(t.dwells, f"{what}_{unit}")[t.used] for t in takes])
+            for what in ("error", "scatter", "step")
+        )
+        hidden = _rms(scatter) < _DIGITS * np.min(step, initial=np.inf)
+        return None if hidden else pooled(error)
+
+    pulls = np.concatenate([noise[noise > 0.0] for noise in tensions])
+    return Sigma(of_means("m"), of_means("rad"), pooled(pulls))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
+
+
+def noise_words(measured: Measurements) -> str:
+    """How large the noise of means is, and of which kind it is not stated."""
+    sigma, parts = measured.sigma, []
+    if sigma.position_m:
+        parts.append(f"position {1e3 * sigma.position_m:.2g} mm")
+    if sigma.orientation_rad:
+        parts.append(f"orientation {np.degrees(sigma.orientation_rad):.2g} deg")
+    if sigma.tension_N:
+        parts.append(f"tension {sigma.tension_N:.2g} N")
+    out = (
+        "noise of the means, estimated from the means of parts of each dwell: "
+        f"{', '.join(parts) or 'none'}"
+    )
+    hidden = ["position"] * (sigma.position_m is None)
+    hidden += ["orientation"] * (sigma.orientation_rad is None and measured.quat_wxyz is not None)
+    if not hidden:
+        return out
+    return (
+        f"{out}; {' and '.join(hidden)} not stated: within a dwell only the last digit changes, if "
+        "any, which shows no noise; other commands estimate it"
+    )
+
+
+def repeated(data: Measurements, scatter: Sigma) -> tuple[Sigma, str, str]:
+    """The noise that revisited poses show, if enough were, or else that of dwells.
+
+    Visits are compared that have one command and load, and came from one command before: what
+    depends on the way there, such as backlash, is no noise.
+
+    Args:
+        data: a row for each dwell. scatter: the noise of their means, from within dwells.
+
+    Returns:
+        the noise to state, the larger one of each kind; where it comes from; and a sentence.
+    """
+    visits = [rows for rows in _visits(data) if len(rows) > 1]
+    quat = data.quat_wxyz
+    kinds = {
+        "position_m": [_off(data.position[rows]) for rows in visits],
+        "orientation_rad": [] if quat is None else [about_mean(quat[rows])[1] for rows in visits],
+        "tension_N": [_off(data.tensions[rows]) for rows in visits],
+    }
+    further = sum(len(rows) - 1 for rows in visits)
+    sizes = {kind: _pooled(some, visits) for kind, some in kinds.items()}
+    if further < _LEAST_VISITS or not sizes["position_m"]:
+        said = "no pose was revisited often enough to tell how well poses repeat"
+        return scatter, "dwell_scatter", f"{said}: the true noise may be larger"
+    own = vars(scatter)
+    stated = {kind: max(size, own[kind] or 0.0) for kind, size in sizes.items() if size}
+    said = f"revisited poses ({counted(further, 'further visit')}) repeat to "
+    said += f"{1e3 * float(sizes['position_m']):.2g} mm"
+    if sizes["orientation_rad"]:
+        said += f" and {np.degrees(sizes['orientation_rad']):.2g} deg"
+    return replace(scatter, **stated), "revisited", f"{said}: the larger is stated as the noise"
+
+
+def _visits(data: Measurements) -> list[list[int]]:
+    """Rows that were read with one command and load, after the same command; runs begin at rest."""
+    told = data.command_pose if data.command_lengths is None else data.command_lengths
+    assert told is not None
+    load = np.zeros((data.n_rows, 1)) if data.loads is None else data.loads.mass[:, None]
+    keys = np.concatenate([told, load], axis=1).round(9)
+    same_run = np.concatenate([[False], data.run[1:] == data.run[:-1]])
+    before = np.where(same_run[:, None], np.roll(keys, 1, axis=0), np.inf)
+    groups: dict[bytes, list[int]] = {}
+    whole = np.isfinite(data.position).all(axis=1)
+    for row in np.flatnonzero(whole).tolist():
+        groups.setdefault(keys[row].tobytes() + before[row].tobytes(), []).append(row)
+    return list(groups.values())
+
+
+def _off(values: Array) -> Array:
+    return np.asarray(values - values.mean(axis=0))
+
+
+def _pooled(off: list[Array], visits: list[list[int]]) -> float | None:
+    """The rms of what visits are off their means, in each part that was read; None of nothing."""
+    squares = sum(float(np.nansum(one**2)) for one in off)
+    count = sum(
+        (len(rows) - 1) * int(np.isfinite(one).all(axis=0).sum())
+        for one, rows in zip(off, visits, strict=False)
+    )
+    return float(f"{np.sqrt(squares / count):.{_NOISE_DIGITS}g}") if squares > 0.0 else None

@@ -167,6 +167,7 @@ def _not_seen(position: Array) -> NDArray[np.bool_]:
 Row = list[str]
 
 _SEPARATORS = (",", ";", "\t")
+_CUT_OFF = "it is the last line: is the file cut off? Export it again"
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(e[+-]?\d+)?", re.IGNORECASE)
 
 
@@ -252,6 +253,23 @@ class Block:
     label_row: int
     body: range
 
+    @classmethod
+    def of(cls, rows: FileRows, label_row: int, body: range) -> Block:
+        """The block of these rows.
+
+        Raises:
+            InputFileError: it has no rows, or the last one is shorter than the others.
+        """
+        if len(body) == 0:
+            text = "has labels but no rows of frames; is the file cut off?"
+            raise rows.error(text, body.start - 1)
+        least = min((len(rows.cells[row]) for row in body[:-1]), default=0)
+        last = len(rows.cells[body[-1]])
+        if last < least:
+            text = f"expected {counted(least, 'cell')} as in the rows before, got {last}"
+            raise rows.error(f"{text}; {_CUT_OFF}", body[-1])
+        return cls(rows, label_row, body)
+
     @property
     def labels(self) -> Row:
         """The cells of the row of labels."""
@@ -293,8 +311,7 @@ class Block:
                 f"expected {counted(len(self.labels), 'cell')} as in the row of labels (line "
                 f"{self.label_row + 1}), got {len(cells)}"
             )
-            if row == self.body[-1]:
-                text += "; it is the last line: is the file cut off? Export it again"
+            text += f"; {_CUT_OFF}" if row == self.body[-1] else ""
             return self.rows.error(text, row)
         for c in columns:
             try:
@@ -305,16 +322,6 @@ class Block:
                 text = f"expected a number, got {show(cells[c])}; export the file again"
                 return self.rows.error(text, row, self.labels[c] or f"number {c + 1}")
         raise AssertionError("a row without a fault")
-
-    def check_whole(self) -> None:
-        """Refuse a last row that is shorter than the others: the file was cut off."""
-        sizes = {len(self.rows.cells[row]) for row in self.body[:-1]}
-        last = len(self.rows.cells[self.body[-1]])
-        if sizes and last < min(sizes):
-            text = f"expected {counted(min(sizes), 'cell')} as in the rows before, got {last}"
-            raise self.rows.error(
-                f"{text}; it is the last line: is the file cut off? Export it again", self.body[-1]
-            )
 
     def check_times(self, t_s: Array, label: str) -> None:
         """Refuse times (n,) [s] that are missing or do not increase."""
@@ -327,9 +334,3 @@ class Block:
             f"expected times that increase{before}, got {t_s[k]:.9g} s; are two recordings in one "
         )
         raise self.rows.error(f"{text}file? Export them one at a time", self.body[k], label)
-
-
-def check_body(rows: FileRows, body: range) -> None:
-    """Refuse a block without rows."""
-    if len(body) == 0:
-        raise rows.error("has labels but no rows of frames; is the file cut off?", body.start - 1)

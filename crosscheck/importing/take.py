@@ -14,8 +14,17 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.importing.align import size_of_cloud
 from crosscheck.importing.capture import read_motive, read_vicon
 from crosscheck.importing.choices import ImportChoices
-from crosscheck.importing.dwells import LEAST, Dwells, find_dwells, sample_noise
-from crosscheck.importing.join import HeldCommands, commanded, held_commands, matched, owners
+from crosscheck.importing.dwells import (
+    LEAST,
+    Dwells,
+    HeldCommands,
+    commanded,
+    find_dwells,
+    held_commands,
+    matched,
+    owners,
+    sample_noise,
+)
 from crosscheck.importing.logs import Logged, Stream
 from crosscheck.importing.poses import body_of_markers, read_poses
 from crosscheck.measurements.data import Measurements
@@ -213,6 +222,16 @@ class Take:
     def used(self) -> NDArray[np.int64]:
         """Dwells that belong to a command, in the order of the commands."""
         return self.number[self.number >= 0]
+
+    @property
+    def tracked(self) -> tuple[Array, Array | None]:
+        """Positions (n, 3) and quaternions (n, 4), if any, of these dwells, as tracked."""
+        quat = self.dwells.quat_wxyz
+        return self.dwells.position[self.used], None if quat is None else quat[self.used]
+
+    def told(self, robot: Robot) -> Array:
+        """Commanded poses (n, 7) of these dwells."""
+        return commanded(robot, self.held.log.rows(self.held.row[self.number >= 0]))
 
 
 def take_of(

@@ -206,12 +206,8 @@ def with_fit(
     order = [*model.names, *(name for name in added if name not in model.names)]
     by_name = {one.usual.term.name: one for one in _kept(model, fitted)}
     for name in order:
-        table = tables.get(name)
-        if table is None:
-            _describe(_appended(document, by_name[name]), provenance, errors)
-            continue
-        _fill(table, by_name[name])
-        if name in added:
+        table = _put(document, tables, by_name[name])
+        if name in added or name not in tables:
             _describe(table, provenance, errors)
         elif not by_name[name].usual.term.knowledge.fixed.all():
             table["refitted"] = with_remarks(tomlkit.item(vars(provenance)), table.get("refitted"))
@@ -264,10 +260,7 @@ def calibrated(
     tables = {str(table["name"]): table for table in document.get("effect", [])}
     every = _kept(model, fitted)
     for one in every:
-        if one.usual.term.name in tables:
-            _fill(tables[one.usual.term.name], one)
-        else:
-            _appended(document, one)
+        _put(document, tables, one)
     before = document.pop(CALIBRATION, None)
     _forget_covariance(document)
     table = tomlkit.table()
@@ -284,9 +277,13 @@ def _kept(model: Model, fitted: Sequence[Fitted]) -> list[Kept]:
     return [kept(f, model.terms[f.term.name] if f.term.name in names else None) for f in fitted]
 
 
-def _appended(document: Any, one: Kept) -> Any:
-    """A new table at the end of the document, for an effect that it does not have."""
-    table, term = tomlkit.table(), one.usual.term
+def _put(document: Any, tables: Mapping[str, Any], one: Kept) -> Any:
+    """The table of an effect with its values, a new one at the end where it has none."""
+    term = one.usual.term
+    if term.name in tables:
+        _fill(tables[term.name], one)
+        return tables[term.name]
+    table = tomlkit.table()
     table["name"] = term.name
     table["name"].comment(term.layout.effect.title)
     _fill(table, one)
@@ -496,7 +493,7 @@ def _in_step(model: Model) -> Any:
     for term in model.terms:
         free = np.zeros(len(term.layout), dtype=bool)
         if term.name not in before:
-            _appended(document, Kept(Fitted(term, model.errors_of(term.name), free), {}))
+            _put(document, tables, Kept(Fitted(term, model.errors_of(term.name), free), {}))
         elif not np.array_equal(term.vector, before[term.name].vector):
             changed = Fitted(term, np.full(len(free), np.nan), free)
             _fill_cells(_table_in(tables[term.name], "parameters"), changed)

@@ -52,12 +52,6 @@ def _turned(up: Array) -> Array:
     return np.asarray(np.eye(3) + about + about @ about / (1.0 + up[2]))
 
 
-def box_around(low: Array, high: Array, axes: Array) -> tuple[Array, Array]:
-    """The box along other axes (3, 3), as columns, around one along x, y, z: lowest and highest."""
-    ends = low[:, None] * axes, high[:, None] * axes
-    return np.minimum(*ends).sum(axis=0), np.maximum(*ends).sum(axis=0)
-
-
 # Candidate poses along x, y, z, and how far they extend beyond the planned region.
 _GRID, _BEYOND = (4, 3, 3), 0.25
 _TILTS = np.array(
@@ -147,7 +141,8 @@ def _grid(plan: Planned, room: Room) -> Array:
     frame = upright(robot)
     low, high = _around(robot, pose[:, :3] @ frame, frame)
     if box is not None:
-        own = box_around(box[0], box[1], frame)
+        ends = box[:, :, None] * frame  # along the axes of the frame, around the box
+        own = ends.min(axis=0).sum(axis=0), ends.max(axis=0).sum(axis=0)
         # where the box is beside what is planned, all of it
         apart = (high < own[0]) | (low > own[1])
         low = np.where(apart, own[0], np.maximum(low, own[0]))

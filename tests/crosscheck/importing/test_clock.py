@@ -12,8 +12,7 @@ import pytest
 from made_data import soft_cogiro
 
 from crosscheck.importing import ImportChoices, import_case
-from crosscheck.importing.dwells import find_dwells
-from crosscheck.importing.join import HeldCommands
+from crosscheck.importing.dwells import HeldCommands, find_dwells
 from crosscheck.importing.logs import Stream
 from crosscheck.importing.take import find_clock
 from seecr.errors import SeecrError

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from crosscheck.importing import import_case
 from crosscheck.importing.case import Imported, without_strays
 from crosscheck.importing.choices import ImportChoices
-from crosscheck.importing.dwells import find_dwells, sample_noise
-from crosscheck.importing.join import held_commands, joined
+from crosscheck.importing.dwells import find_dwells, held_commands, joined, sample_noise
 from crosscheck.importing.logs import Logged, Stream
 from crosscheck.importing.take import refuse_still
 from crosscheck.measurements.data import Measurements

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from crosscheck.importing.align import as_they_are, unturned
-from crosscheck.importing.noise import repeated
+from crosscheck.importing.case import repeated
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.pose import quat_from_rotvec, quat_multiply, rotvec_from_quat
 

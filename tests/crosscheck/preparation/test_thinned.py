@@ -13,7 +13,7 @@ import pytest
 import crosscheck
 import seecr
 from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.preparation.thinned import note_on_others, thinned
+from crosscheck.preparation.prepare import note_on_others, thinned
 from seecr.effects import Term, Terms
 from seecr.pose import quat_from_rotvec
 from seecr.prediction.experiment import Experiment
