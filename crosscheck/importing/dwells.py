@@ -273,8 +273,7 @@ class HeldCommands:
 
     def shifted(self, clock: float) -> HeldCommands:
         """The same with a clock offset that is larger by so much [s]."""
-        if self.begin_s is None or self.end_s is None:
-            return self
+        assert self.begin_s is not None and self.end_s is not None
         return replace(
             self, begin_s=self.begin_s + clock, end_s=self.end_s + clock, clock=self.clock + clock
         )

@@ -75,7 +75,12 @@ class Visible:
     @property
     def named(self) -> bool:
         """Whether an expected size would show and be told from everything else."""
-        return self.visible and not self.confused and not self.twins
+        return self.visible and not self.alike
+
+    @property
+    def alike(self) -> tuple[str, ...]:
+        """Effects from which it cannot be told at its expected size, exact twins first."""
+        return (*self.twins, *(name for name, _left in self.confused))
 
     def sizes(self, factor: float) -> dict[str, float]:
         """Parameters at a multiple of their expected sizes, without shapes."""
@@ -194,9 +199,7 @@ class Plan(Result):
                 "visible": found.visible,
                 "smallest_visible_in_plausible_sizes": found.factor,
                 "smallest_named_in_plausible_sizes": found.identifiable,
-                "cannot_be_told_from": ", ".join(
-                    [*found.twins, *(name for name, _left in found.confused)]
-                ),
+                "cannot_be_told_from": ", ".join(found.alike),
             }
             for found in self.effects
         ]
@@ -260,11 +263,7 @@ class Sight:
     @property
     def alike(self) -> dict[str, tuple[str, ...]]:
         """Effects that others imitate, exactly or within the noise, and the names of these."""
-        return {
-            found.name: (*found.twins, *(name for name, _left in found.confused))
-            for found in self.effects
-            if found.visible and (found.twins or found.confused)
-        }
+        return {one.name: one.alike for one in self.effects if one.visible and one.alike}
 
     def lines(self) -> list[str]:
         """The same in sentences: what shows, what does not, what cannot be told apart."""
@@ -339,11 +338,9 @@ def _size(need: float, power: float) -> float:
 
 def alike(found: Visible) -> str:
     """Effects from which an effect cannot be told, exact twins first."""
-    names = [f"{name} (exactly)" for name in found.twins]
-    names += [name for name, _left in found.confused]
     if not found.visible and not found.twins:
         return "(not visible at an expected size)"
-    return some(names)
+    return some([f"{name} (exactly)" if name in found.twins else name for name in found.alike])
 
 
 def signal_words(gain: Gain) -> str:
