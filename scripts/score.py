@@ -418,7 +418,7 @@ def beside(robot: Robot, data: Measurements, hidden: list[Term]) -> list[float]:
 def judged(task: Task) -> dict[str, Any]:
     """A case made and diagnosed, as a line."""
     if task.moved is not None:
-        _move(*task.moved)
+        move(*task.moved)
     with limited(LONGEST_S) as settled:
         case = made(task)
     if not settled:
@@ -489,7 +489,7 @@ def _elsewhere(case: Case, verdict: DiagnosisVerdict, terms: Terms) -> dict[str,
     return {key: round(got[key] / true[key], 3) for key in true}
 
 
-def _move(name: str, value: float) -> None:
+def move(name: str, value: float) -> None:
     """Move one of the numbers that steer, everywhere it has been imported."""
     import sys
 
