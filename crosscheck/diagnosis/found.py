@@ -27,13 +27,13 @@ from crosscheck.diagnosis.words import noise_notes, sentence_of, size_notes
 from crosscheck.fit.problem import KINDS, Problem, Rms, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.residual_noise import overestimated, whiteness
-from crosscheck.fit.state import contradictions, largest_size
+from crosscheck.fit.state import can_be, contradictions, largest_size
 from crosscheck.inference.about import About
 from crosscheck.inference.catalogue import name_of
 from crosscheck.inference.fields import detectable_size
-from crosscheck.inference.fit import Fit
-from crosscheck.inference.hypothesis import Hypothesis
-from crosscheck.inference.priors import WIDTHS
+from crosscheck.inference.fit import Fit, fit
+from crosscheck.inference.hypothesis import Hypothesis, scored
+from crosscheck.inference.priors import EQUAL, WIDTHS
 from crosscheck.inference.search import Search
 from crosscheck.inference.verdict import Judgement
 from crosscheck.model.fitted import Fitted
@@ -41,7 +41,7 @@ from crosscheck.model.write import provenance_of, renewed, with_fit
 from crosscheck.planning.result import Sight
 from crosscheck.preparation.prepare import noise_floor
 from seecr.description.robot import Robot
-from seecr.effects import Term, effect_named
+from seecr.effects import Knowledge, Term, effect_named
 from seecr.pose import Array
 from seecr.prediction.model import Model
 from seecr.units import parameter_name, shown
@@ -118,7 +118,7 @@ def _contradicted(
         return out
     what = " + ".join(effect.effect for effect in missing) or "what was tried"
     for term in search.every.stood:
-        new = search.contradicted(term) if term.knowledge.any else None
+        new = _freely_fitted(search, term) if term.knowledge.any else None
         if new is not None:
             held = term.knowledge.fixed | term.knowledge.measured
             rows = zip(new.layout.names, new.layout.units, new.vector, held, strict=True)
@@ -130,6 +130,26 @@ def _contradicted(
                 f"them it would be {free}, which explains far more than {what}. Check it first"
             )
     return out
+
+
+def _freely_fitted(search: Search, term: Term) -> Term | None:
+    """A known effect of the model as it would be fitted if nothing were known of it.
+
+    None unless that explains far more than the best hypothesis: then it contradicts the data.
+    """
+    free = replace(term, knowledge=Knowledge.nothing(len(term.layout)))
+    terms = search.every.stood.with_term(free)
+    every = replace(search.every, stood=terms)
+    state = search.data.state(terms, search.plain)
+    if not state.valid:
+        return None
+    found = scored(every, search.stood, fit(search.data, state), {})
+    own, known = term.knowledge.measured, term.knowledge
+    # the density that independent readings have by themselves, which evidence leaves out
+    readings = float(np.sum(np.log(term.layout.scale[own] / known.stderr[own])))
+    possible = can_be(search.data.problem.robot, found.fit.terms, search.every.stood)
+    better = found.score > search.best.score + readings + EQUAL
+    return found.fit.terms[term.name] if possible and better else None
 
 
 # --- what is listed -------------------------------------------------------------------------------

@@ -6,16 +6,18 @@ one is next whose addition has the greatest score, that is, explains most for it
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from crosscheck.fit.problem import KINDS, Problem, Rms, rms_by_kind
 from crosscheck.fit.state import State
-from crosscheck.inference.catalogue import name_of, part_of
-from crosscheck.inference.fit import Fit
+from crosscheck.inference.catalogue import Key, is_field, name_of, part_of
+from crosscheck.inference.fit import Fit, fit
 from crosscheck.inference.held_out import HeldOut, by_part, hold_out
+from crosscheck.inference.hypothesis import Hypothesis, scored
+from crosscheck.inference.priors import WITHIN
 from crosscheck.inference.search import Search
 from seecr.effects import ApartLayout, Term
 
@@ -127,20 +129,61 @@ def path_to(search: Search, listed: Sequence[str], whole: bool) -> ModelPath:
     named = bool(search.every.stood)
     start = "the given model" if named else "plain SEECR"
     stages = [stage(start, "", search.unfitted if named else search.none.fit)]
-    if named and search.wants_refit:
+    if named and _wants_refit(search):
         stages.append(stage(f"{start}, fitted", "", search.none.fit))
     while left:
-        following = search.next_of(key, left)
+        following = _next_of(search, key, left)
         if following is None:
             break
         best, found = following
         if whole and len(left) == 1:
-            found = search.at_plausible_sizes(found)
+            found = _at_plausible_sizes(search, found)
         label = f"+ {name_of(best)}" + (f" (each {part_of(best)})" if part_of(best) else "")
         key = found.key
         stages.append(stage(label, name_of(best), found.fit))
         left.remove(best)
     return ModelPath(search, tuple(stages))
+
+
+def _next_of(search: Search, start: Key, members: Iterable[str]) -> tuple[str, Hypothesis] | None:
+    """Which of some members is worth most beside a fitted hypothesis; None if none has a fit.
+
+    As in the search, what the linear model considers worse by WITHIN is not fitted.
+    """
+    scores, found = search.scores_about(search.at(start)), dict[str, Hypothesis]()
+    promised = {k: scores.promised(start | {k}) for k in members}
+    for k in sorted(promised, key=lambda k: (-promised[k], k)):
+        best = max((h.score for h in found.values()), default=-np.inf)
+        if start | {k} not in search.cache and promised[k] > best - WITHIN:
+            search.fit(scores, start | {k})
+        one = search.cache.get(start | {k})
+        if one is not None:
+            found[k] = one
+    best_of_all = max(found, key=lambda k: (found[k].score, k), default=None)
+    return None if best_of_all is None else (best_of_all, found[best_of_all])
+
+
+def _at_plausible_sizes(search: Search, found: Hypothesis) -> Hypothesis:
+    """A hypothesis fitted anew with prior widths of one expected size at least.
+
+    Narrow priors hold values near null that the readings hardly determine, and their errors
+    are small only because of that: no reason to tell somebody with a caliper.
+    """
+    widths = {k: max(w, 1.0) for k, w in found.widths.items() if not is_field(k)}
+    by_name = {name_of(k): w for k, w in widths.items()}
+    exact = replace(search.data, frozen=False)
+    again = fit(exact, found.fit.state, by_name, noise=found.fit.noise)
+    return scored(search.every, found.key, again, widths)
+
+
+def _wants_refit(search: Search) -> bool:
+    """Whether the model as it stands explains the data only with other values than it has.
+
+    The given values are a hypothesis of their own, without a parameter that the data chose
+    (Akaike's criterion).
+    """
+    fitted = search.none.fit
+    return bool(search.unfitted.cost > fitted.cost + 2.0 * len(fitted.terms))
 
 
 def _by_part(fit: Fit) -> Fit:

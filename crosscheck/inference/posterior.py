@@ -11,18 +11,25 @@ along from row to row (:meth:`crosscheck.inference.noise.NoisePrior.is_unknown`)
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from crosscheck.inference import priors
-from crosscheck.inference.catalogue import Key, bare, is_field
-from crosscheck.inference.noise import NoisePrior
+from crosscheck.inference.catalogue import Key, bare, is_field, name_of
+from crosscheck.inference.fields import over_place
+from crosscheck.inference.fit import fit
+from crosscheck.inference.hypothesis import scored
+from crosscheck.inference.noise import Noise, NoisePrior
 from crosscheck.inference.search import Search
 from seecr.effects.base import Layout
 
 # An effect of at most so many parameters is small, see EQUAL.
 _SMALL = 3
+# The key of a function of the place that stands for noise, and after which parts of half the range
+# of an axis it is forgotten: any that a cubic follows, and the finest that a grid of a dozen places
+# along an axis shows.
+_PLACE, _SMOOTH, _ROUGH = "~place", 1.0, 0.15
 
 Scored = Mapping[Key, float]
 
@@ -94,7 +101,7 @@ class Posterior:
         total = float(np.logaddexp.reduce(list(scores.values())))
         share = {k: float(np.exp(s - total)) for k, s in scores.items()}
         fitted = search.fitted
-        place = search.odds_of_place()
+        place = odds_of_place(search)
         loud = {
             k: 1.0
             if any(map(is_field, k))
@@ -116,6 +123,45 @@ class Posterior:
             _classes(search, _merged(with_unknown)) if with_unknown else None,
             dict(sorted(fields.items(), key=lambda one: -one[1])),
         )
+
+
+def odds_of_place(search: Search) -> float:
+    """Odds that what the best hypothesis takes for noise goes by the place and not by row.
+
+    A noise larger than stated may be the sensor's, or an error over the workspace, which nobody
+    calls noise. They differ in what they foretell of near places in other runs. If it goes
+    along from row to row, a smooth error is as probable beforehand. A rough one, of which even
+    neighbours hardly know, is as rare as anything unknown.
+    """
+    best, prior = search.best, NoisePrior.of(search.data.problem)
+    rare, odds = float(np.exp(priors.UNKNOWN)) / priors.MISJUDGED, 0.0
+    for kind, p in zip(prior.kinds, prior.misjudged(best.fit.noise), strict=True):
+        if best.field is None and p >= priors.MAY_BE_UNKNOWN:
+            odds = max(odds, rare * _odds_of(search, _ROUGH, prior, int(kind)))
+            if best.fit.noise.rho[kind] > 0.0:
+                odds = max(odds, _odds_of(search, _SMOOTH, prior, int(kind)))
+    return odds
+
+
+def _odds_of(search: Search, length: float, prior: NoisePrior, kind: int) -> float:
+    """Odds of a function of the place beside noise as stated, of the same prior probability.
+
+    Args:
+        search: the search. length: after which part of half the range it is forgotten.
+        prior: of the noise. kind: number of the kind of reading.
+    """
+    best = search.best
+    widths = {name_of(k): w for k, w in best.widths.items() if not is_field(k)}
+    columns = over_place(best.fit, kind, length)
+    scale, rho = best.fit.noise.scale.copy(), best.fit.noise.rho.copy()
+    size, scale[kind], rho[kind] = float(scale[kind]), 1.0, 0.0
+    every = replace(search.every, fields={_PLACE: columns})
+    found = fit(search.data, best.fit.state, widths, size * columns, noise=Noise(scale, rho))
+    other = scored(every, best.key | {_PLACE}, found, {**best.widths, _PLACE: size})
+    # what the sensor adds to it is as large as stated
+    as_stated = 1.0 - prior.misjudged(found.noise)[prior.kinds == kind][0]
+    share = np.log(max(as_stated, 1e-300)) + prior.log_misjudged(size)
+    return float(np.exp(min(other.score + share - best.score, 50.0)))
 
 
 def _unfitted(search: Search) -> dict[Key, float]:

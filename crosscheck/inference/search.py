@@ -22,16 +22,15 @@ import numpy as np
 
 from crosscheck.fit.problem import KINDS
 from crosscheck.fit.registration import registered, registered_each
-from crosscheck.fit.state import State, can_be
+from crosscheck.fit.state import State
 from crosscheck.inference.about import About, inside
 from crosscheck.inference.catalogue import Catalogue, Key, bare, is_field, name_of, part_of
-from crosscheck.inference.fields import over_place
 from crosscheck.inference.fit import TRACKER, Data, Fit, fit, unfitted
 from crosscheck.inference.hypothesis import Hypothesis, scored, wider
 from crosscheck.inference.noise import Noise, NoisePrior
-from crosscheck.inference.priors import EQUAL, FEW, MAY_BE_UNKNOWN, MISJUDGED, UNKNOWN, WITHIN
+from crosscheck.inference.priors import EQUAL, FEW, MAY_BE_UNKNOWN, WITHIN
 from crosscheck.inference.scores import LARGE, Scores, ranked
-from seecr.effects import Knowledge, Term
+from seecr.effects import Term
 from seecr.pose import Array
 
 # Single effects that are fitted beside a model, and how many of these are searched about.
@@ -56,10 +55,6 @@ _FITS, _ROUNDS = 8, 4
 _LOSING = 2
 # Most fits of one hypothesis: the second with the prior widths that the first asks for.
 _REFITS = 2
-# The key of a function of the place that stands for noise, and after which parts of half the range
-# of an axis it is forgotten: any that a cubic follows, and the finest that a grid of a dozen places
-# along an axis shows.
-_PLACE, _SMOOTH, _ROUGH = "~place", 1.0, 0.15
 
 
 @dataclass(eq=False)
@@ -112,70 +107,13 @@ class Search:
     @property
     def none(self) -> Hypothesis:
         """The hypothesis that nothing is missing, as fitted."""
-        return self._at(self.stood)
+        return self.at(self.stood)
 
-    def _at(self, key: Key) -> Hypothesis:
+    def at(self, key: Key) -> Hypothesis:
+        """A fitted hypothesis."""
         found = self.cache[key]
         assert found is not None
         return found
-
-    def next_of(self, start: Key, members: Iterable[str]) -> tuple[str, Hypothesis] | None:
-        """Which of some members is worth most beside a fitted hypothesis; None if none has a fit.
-
-        As in the search, what the linear model considers worse by WITHIN is not fitted.
-        """
-        scores, found = self.scores_about(self._at(start)), dict[str, Hypothesis]()
-        promised = {k: scores.promised(start | {k}) for k in members}
-        for k in sorted(promised, key=lambda k: (-promised[k], k)):
-            best = max((h.score for h in found.values()), default=-np.inf)
-            if start | {k} not in self.cache and promised[k] > best - WITHIN:
-                self.fit(scores, start | {k})
-            one = self.cache.get(start | {k})
-            if one is not None:
-                found[k] = one
-        best_of_all = max(found, key=lambda k: (found[k].score, k), default=None)
-        return None if best_of_all is None else (best_of_all, found[best_of_all])
-
-    def at_plausible_sizes(self, found: Hypothesis) -> Hypothesis:
-        """A hypothesis fitted anew with prior widths of one expected size at least.
-
-        Narrow priors hold values near null that the readings hardly determine, and their errors
-        are small only because of that: no reason to tell somebody with a caliper.
-        """
-        widths = {k: max(w, 1.0) for k, w in found.widths.items() if not is_field(k)}
-        by_name = {name_of(k): w for k, w in widths.items()}
-        exact = replace(self.data, frozen=False)
-        again = fit(exact, found.fit.state, by_name, noise=found.fit.noise)
-        return scored(self.every, found.key, again, widths)
-
-    @property
-    def wants_refit(self) -> bool:
-        """Whether the model as it stands explains the data only with other values than it has.
-
-        The given values are a hypothesis of their own, without a parameter that the data chose
-        (Akaike's criterion).
-        """
-        fitted = self.none.fit
-        return bool(self.unfitted.cost > fitted.cost + 2.0 * len(fitted.terms))
-
-    def contradicted(self, term: Term) -> Term | None:
-        """A known effect of the model as it would be fitted if nothing were known of it.
-
-        None unless that explains far more than the best hypothesis: then it contradicts the data.
-        """
-        free = replace(term, knowledge=Knowledge.nothing(len(term.layout)))
-        terms = self.every.stood.with_term(free)
-        every = replace(self.every, stood=terms)
-        state = self.data.state(terms, self.plain)
-        if not state.valid:
-            return None
-        found = scored(every, self.stood, fit(self.data, state), {})
-        own, known = term.knowledge.measured, term.knowledge
-        # the density that independent readings have by themselves, which evidence leaves out
-        readings = float(np.sum(np.log(term.layout.scale[own] / known.stderr[own])))
-        possible = can_be(self.data.problem.robot, found.fit.terms, self.every.stood)
-        better = found.score > self.best.score + readings + EQUAL
-        return found.fit.terms[term.name] if possible and better else None
 
     def begin(self) -> Hypothesis:
         """Fit the model as it stands, which is returned, and single effects beside it."""
@@ -279,7 +217,7 @@ class Search:
         for _ in range(_REFITS):
             new = scored(self.every, key, found, held)
             if self._take(new) is not new or new.wanted is None or self._is_endless(key):
-                return self._at(key)
+                return self.at(key)
             held = new.wanted
             found = self._fitted(key, found.state, held, found.noise)
         return self._take(scored(self.every, key, found, held))
@@ -521,45 +459,6 @@ class Search:
             fitted = self.cache.get(at)
             loss = loss if fitted is None else self.best.score - fitted.score
         return loss
-
-    def odds_of_place(self) -> float:
-        """Odds that what the best hypothesis takes for noise goes by the place and not by row.
-
-        A noise larger than stated may be the sensor's, or an error over the workspace, which nobody
-        calls noise. They differ in what they foretell of near places in other runs. If it goes
-        along from row to row, a smooth error is as probable beforehand. A rough one, of which even
-        neighbours hardly know, is as rare as anything unknown.
-        """
-        best, prior = self.best, NoisePrior.of(self.data.problem)
-        odds = 0.0
-        for kind, p in zip(prior.kinds, prior.misjudged(best.fit.noise), strict=True):
-            if best.field is None and p >= MAY_BE_UNKNOWN:
-                odds = max(
-                    odds, self._odds_of(_ROUGH, prior, int(kind)) * np.exp(UNKNOWN) / MISJUDGED
-                )
-                if best.fit.noise.rho[kind] > 0.0:
-                    odds = max(odds, self._odds_of(_SMOOTH, prior, int(kind)))
-        return odds
-
-    def _odds_of(self, length: float, prior: NoisePrior, kind: int) -> float:
-        """Odds of a function of the place beside noise as stated, of the same prior probability.
-
-        Args:
-            length: after which part of half the range it is forgotten. prior: of the noise.
-            kind: number of the kind of reading.
-        """
-        best = self.best
-        widths = {name_of(k): w for k, w in best.widths.items() if not is_field(k)}
-        columns = over_place(best.fit, kind, length)
-        scale, rho = best.fit.noise.scale.copy(), best.fit.noise.rho.copy()
-        size, scale[kind], rho[kind] = float(scale[kind]), 1.0, 0.0
-        every = replace(self.every, fields={_PLACE: columns})
-        found = fit(self.data, best.fit.state, widths, size * columns, noise=Noise(scale, rho))
-        other = scored(every, best.key | {_PLACE}, found, {**best.widths, _PLACE: size})
-        # what the sensor adds to it is as large as stated
-        as_stated = 1.0 - prior.misjudged(found.noise)[prior.kinds == kind][0]
-        share = np.log(max(as_stated, 1e-300)) + prior.log_misjudged(size)
-        return float(np.exp(min(other.score + share - best.score, 50.0)))
 
     def needed(self, some: Iterable[str]) -> float:
         """ln evidence that members add beside all others, about the fit of all effects together."""

@@ -17,7 +17,7 @@ from crosscheck.inference.catalogue import Catalogue, is_field, name_of, part_of
 from crosscheck.inference.evidence import Linear, MemberColumns
 from crosscheck.inference.fit import Data, fit
 from crosscheck.inference.hypothesis import scored
-from crosscheck.inference.posterior import Posterior
+from crosscheck.inference.posterior import Posterior, odds_of_place
 from crosscheck.inference.priors import WITHIN
 from crosscheck.inference.scores import Scores
 from crosscheck.inference.search import Search
@@ -172,7 +172,7 @@ def test_loud_noise_that_goes_by_the_place_is_none(
     unknown = Posterior.of(search).unknown
     assert unknown > 0.95 if is_unknown else unknown < 0.05
     search.cache = {k: h for k, h in search.cache.items() if not any(map(is_field, k))}
-    odds = search.odds_of_place()
+    odds = odds_of_place(search)
     assert odds > 20.0 if is_unknown else odds < 0.01
 
 
