@@ -24,6 +24,7 @@ import select
 import signal
 import sys
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
@@ -197,12 +198,14 @@ def _forked(work: Callable[[Callable[[str], None]], None]) -> str:
     child = os.fork()
     if not child:
         os.setpgid(0, 0)
-        nowhere = os.open(os.devnull, os.O_RDWR)
+        nowhere, errors = os.open(os.devnull, os.O_RDWR), os.dup(2)
         for stream in (0, 1, 2):
             os.dup2(nowhere, stream)
         try:
             with os.fdopen(writing, "w") as pipe:
                 work(lambda text: print(text, end="", file=pipe, flush=True))
+        except BaseException:  # a defect of this script, or a test that ends its process
+            os.write(errors, traceback.format_exc().encode())
         finally:
             os._exit(0)
     os.close(writing)

@@ -13,7 +13,9 @@ from scipy import signal
 from crosscheck.comparison.quantities import (
     STILL,
     QuantityKind,
+    cable_errors,
     in_time,
+    independent_part,
     of_cables,
     of_rows,
     periodogram,
@@ -22,6 +24,7 @@ from crosscheck.comparison.quantities import (
 )
 from crosscheck.fit.problem import Problem
 from seecr.effects import Terms
+from seecr.pose import pose_add
 from seecr.prediction.experiment import Prediction
 
 
@@ -95,6 +98,49 @@ def test_quantities_are_of_rows_or_of_cables(case: tuple[Problem, Prediction]) -
     home = problem.robot.nominal_lengths(problem.robot.reference_pose[None])[0]
     first = problem.robot.nominal_lengths(way.pose[:1])[0] > home
     assert [word == "paid out" for word in moved[:m]] == first.tolist()
+
+
+def test_errors_of_cables_are_what_the_way_would_be_longer(
+    case: tuple[Problem, Prediction],
+) -> None:
+    problem, prediction = case
+    random = np.random.default_rng(0)
+    raw = np.zeros((problem.data.n_rows, 6 + problem.robot.n_cables))
+    raw[:, :6] = 1e-7 * random.standard_normal((len(raw), 6))
+    ways = [
+        problem.robot.nominal_lengths(pose_add(prediction.pose, s * raw[:, :6])) for s in (1, -1)
+    ]
+    errors, _noise = cable_errors(problem, raw, prediction)
+    assert errors == pytest.approx((ways[0] - ways[1]) / 2.0, abs=1e-12)
+    skipped = Problem(problem.robot, problem.data, problem.sigma, np.arange(len(raw)) > 0)
+    assert np.isnan(cable_errors(skipped, raw, prediction)[0]).any(axis=1).tolist() == [
+        True, *[False] * (len(raw) - 1)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("kinds", [("position_m",), ("orientation_rad",), ()])
+def test_noise_of_errors_of_cables_is_that_of_noise_of_the_pose(
+    case: tuple[Problem, Prediction], kinds: tuple[str, ...]
+) -> None:
+    """Drawn eight hundred times, for rows of different noise; ``kinds`` are without any."""
+    problem, prediction = case
+    sigma = replace(problem.sigma, **dict.fromkeys(kinds))
+    ratio = np.tile(np.linspace(0.5, 2.0, problem.data.n_rows)[:, None], (1, 4))
+    data = replace(problem.data, sigma_ratio=ratio)
+    noisy = Problem(problem.robot, data, sigma, problem.use)
+    size = np.repeat([sigma.position_m or 0.0, sigma.orientation_rad or 0.0], 3)
+    random, raw = np.random.default_rng(0), np.zeros((len(ratio), 6 + problem.robot.n_cables))
+    draws = []
+    for _ in range(800):
+        raw[:, :6] = ratio[:, :1] * size * random.standard_normal((len(raw), 6))
+        errors, noise = cable_errors(noisy, raw, prediction)
+        draws.append(errors)
+    assert np.std(draws, axis=0) / noise == pytest.approx(np.ones_like(noise), rel=0.12)
+    # m errors count as m^2 / tr C^2, of which 1/800 for each pair is chance
+    alike = [np.corrcoef(row.T) for row in np.swapaxes(draws, 0, 1)]
+    m = problem.robot.n_cables
+    parts = [m / ((one**2).sum() - (1.0 - one**2).sum() / 800) for one in alike]
+    assert independent_part(noisy, prediction) == pytest.approx(np.mean(parts), rel=0.02)
 
 
 def test_a_period_is_found_in_time(case: tuple[Problem, Prediction]) -> None:

@@ -287,6 +287,14 @@ def test_p_values_are_corrected_for_all_that_was_tried(robot):
     whole = stats.f.sf(between / (3 * k) / (within / (3 * (n - k - 1))), 3 * k, 3 * (n - k - 1))
     assert run.p == pytest.approx(len(found.associations) * 2.0 * min(whole, 3 * each.min()))
     assert 1e-12 < run.p < 0.5
+    # and the share is what is left of the variance, with the freedoms that each has: adjusted R^2
+    left = (within / (n - k - 1)) / ((between + within) / (n - 1))
+    assert run.share == pytest.approx(1.0 - left)
+    assert [b.rows for b in run.bins] == [np.sum(data.run == b.label) for b in run.bins]
+    column = "xyz".index(run.strongest)
+    assert column == int(np.argmin(each)) and run.unit == "m"
+    means = [errors[data.run == b.label, column].mean() for b in run.bins]
+    assert [b.mean for b in run.bins] == pytest.approx(means)
 
 
 def test_groups_of_numbers_have_no_sign_at_zero() -> None:

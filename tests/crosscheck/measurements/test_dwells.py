@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.measurements.dwells import averaged_dwells
+from crosscheck.measurements.dwells import averaged_dwells, mean_error
 from crosscheck.measurements.read import measurements_of
 from seecr.commands import Loads
 from seecr.description.mjcf import load_robot, model_path
@@ -65,7 +65,18 @@ def test_readings_that_go_together_count_for_fewer(white):
     data = averaged_dwells(log(alike))
     off = (data.position - data.command_pose[:, :3]) / (NOISE_M * data.sigma_ratio[:, :1])
     assert np.std(off) == pytest.approx(1.0, rel=0.3)
-    assert data.sigma_ratio[0, 0] > 2.0 / np.sqrt(READINGS)
+    # so many in a row count as one: (1 + rho)/(1 - rho)
+    assert data.sigma_ratio[:, :2] == pytest.approx(
+        np.full((60, 2), 3.0 / np.sqrt(READINGS)), rel=0.1
+    )
+
+
+def test_the_error_of_a_mean_is_that_of_five_parts():
+    steps = np.repeat([0.0, 1.0, 2.0, 3.0, 4.0], 8)  # parts that differ, readings that do not
+    assert mean_error(steps[:, None]) == pytest.approx(np.sqrt(2.5 / 5.0))
+    both = np.stack([steps, 3.0 * steps[::-1]], axis=1)
+    assert mean_error(both) == pytest.approx(np.sqrt(0.5 * (2.5 + 22.5) / 5.0))
+    assert mean_error(np.array([[1.0], [3.0]])) == pytest.approx(1.0)  # and of two there are two
 
 
 def test_stated_noise_that_no_dwell_shows_stays(white):

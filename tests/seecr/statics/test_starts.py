@@ -78,6 +78,10 @@ def test_lengths_alone_bring_the_platform_where_the_poses_do(name: str) -> None:
     off = np.linalg.norm(fallen.pose[:, :3] - at.pose[:, :3], axis=1)
     assert np.sum(off > 0.01 * robot.length) >= 2  # the next rest downhill from home is another
     assert by_lengths.pose == pytest.approx(at.pose, abs=1e-7 * robot.length)
+    # of lengths that some pose has, the search starts at one that has them
+    straight = robot.nominal_lengths(at.pose)
+    first = poses_from_lengths(robot, Commands(home, lengths=straight))
+    assert robot.nominal_lengths(first) == pytest.approx(straight, abs=1e-6 * robot.length)
 
 
 def test_data_with_lengths_are_predicted_where_the_runs_lead() -> None:

@@ -1,4 +1,4 @@
-"""Stiffness under a moment, beside differences of forces that plain NumPy finds."""
+"""Forces and their stiffness under any load, beside those that plain NumPy finds."""
 
 from __future__ import annotations
 
@@ -9,8 +9,12 @@ import pytest
 from random_robots import KINDS, random_poses, random_robot
 
 import seecr
+from seecr import Commands, Experiment
 from seecr.description.joints import pose_of_values, values_of_pose
+from seecr.effects.load import ExternalWrench
 from seecr.pose import Array, pose_add, pose_difference, quat_rotate
+from seecr.statics import batch
+from seecr.statics.tables import assemble, rest_lengths_of
 
 STEP = 1e-5
 
@@ -57,3 +61,40 @@ def test_it_is_minus_the_derivative_of_forces_also_under_a_moment(kind: str, see
         slope = [(forces(values + s) - forces(values - s)) / (2.0 * STEP) for s in steps]
         near = 1e-6 * np.abs(found.stiffness[k]).max()
         np.testing.assert_allclose(found.stiffness[k], -np.array(slope).T, rtol=1e-5, atol=near)
+
+
+@pytest.mark.parametrize("rows", [3, 70])  # 70 have tables made for lanes
+@pytest.mark.parametrize("pushed", [0.0, 0.2])
+@pytest.mark.parametrize("gravity", [1.0, 0.0])
+def test_what_is_unbalanced_is_told_relative_to_the_load(
+    rows: int, pushed: float, gravity: float
+) -> None:
+    """That is weight, force, and moment over the robot's length; or cables at a strain of 1e-3."""
+    rng = np.random.default_rng(1)
+    robot = random_robot(rng, cables=8)
+    weight = gravity * robot.weight
+    outer = pushed * robot.weight * rng.uniform(-1, 1, 6) * np.repeat([1.0, robot.length], 3)
+    robot = replace(robot, gravity=gravity * robot.gravity)
+    poses = random_poses(rng, robot, rows)
+    effects = [ExternalWrench(outer[:3], outer[3:])] if pushed else []
+    tables = assemble(Experiment(robot, Commands(poses)).setup(effects))
+    at = batch.evaluate(tables, batch.Evaluation.at_commands(tables))
+    metre = np.repeat([1.0, robot.length], 3)
+    each = zip(rest_lengths_of(tables), poses, strict=True)
+    every = np.array([wrench_at(robot, rest, outer, pose) / metre for rest, pose in each])
+    off = np.linalg.norm(every.reshape(-1, 2, 3), axis=2).max(axis=1)
+    load = weight + np.linalg.norm((outer / metre).reshape(2, 3), axis=1).sum()
+    expected = off / (load or 1e-3 * robot.ea.max())
+    assert at.residual == pytest.approx(expected, rel=1e-9)
+    assert batch.pull_and_change(tables, at)[0].residual == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_platform_far_from_its_command_has_not_fallen() -> None:
+    """It is told to be five lengths of its cables away, where these are as long as they are."""
+    robot = seecr.load_robot("demobot_cogiro")
+    home = seecr.solve(robot, robot.reference_pose)
+    far = robot.reference_pose[None].copy()
+    far[0, 2] -= 5.0 * home.rest_lengths.max()
+    found = seecr.solve(robot, Commands(far, lengths=home.rest_lengths, told=False))
+    assert found.converged[0]
+    assert found.pose == pytest.approx(home.pose, abs=1e-9 * robot.length)
