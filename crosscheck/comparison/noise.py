@@ -8,19 +8,19 @@ over the workspace nor anything that varies in time explains anything.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.fit.problem import Problem, kinds_stated
 from crosscheck.fit.residual_noise import outlying_rows
-from crosscheck.fit.state import State
+from crosscheck.fit.state import State, evaluate
 from crosscheck.inference.catalogue import Catalogue
-from crosscheck.inference.evidence import Linear, MemberColumns, averaged
+from crosscheck.inference.evidence import log_gain
 from crosscheck.inference.fields import fields_about
-from crosscheck.inference.fit import Data, fit
-from crosscheck.inference.noise import NoisePrior, chain_of, outliers
+from crosscheck.inference.fit import Data, Fit, fit
+from crosscheck.inference.noise import Chain, NoisePrior, chain_of, outliers, whitened
 from crosscheck.inference.priors import FIELD_WIDTHS, MAY_BE_UNKNOWN, UNKNOWN
 from crosscheck.inference.search import Search
 from seecr.counted import counted
@@ -72,6 +72,10 @@ def side_by_side(problem: Problem, far: NDArray[np.bool_]) -> bool:
 _LARGER = 1.5
 # Fewer readings than this do not show how noise is correlated.
 _LEAST_READINGS = 60
+# A field has up to a thousand columns, and with tensions takes 0.1 MB for each row. Of more rows
+# than these, so many are asked: evenly spaced stretches, several times as long as noise with the
+# correlation of a tracker is alike.
+_MOST_ASKED, _STRETCH = 3000, 50
 
 
 @dataclass(frozen=True)
@@ -108,24 +112,32 @@ class Coloured:
 
 
 def coloured_noise(problem: Problem, state: State, factor: Array) -> Coloured | None:
-    """The residuals as autocorrelated noise with outliers; None if they are not noise."""
+    """The residuals as autocorrelated noise with outliers; None if they are not noise.
+
+    Of more than 3000 rows, see :func:`note_on_few`.
+    """
     if not state.valid or problem.n_readings < _LEAST_READINGS:
         return None
+    chain = chain_of(problem)
+    if problem.data.n_rows > _MOST_ASKED:
+        rows = _few(problem, state.prediction.has_history)
+        problem = _part(problem, rows)
+        factor = problem.noise_under(state.terms.effects)
+        state, chain = evaluate(problem, state.terms, factor), _cut(chain_of(problem), rows)
+        if not state.valid:
+            return None
     stated = [kind.name for kind in kinds_stated(problem)]
-    data = Data(problem, factor, chain_of(problem))
+    data = Data(problem, factor, chain)
     left = fit(data, state.of(Terms(term.fixed() for term in state.terms)))
     scale, rho = left.noise.by_kind(problem)
     if any(scale[name] > _LARGER * underestimation(name in stated, rho[name]) for name in scale):
         return None
     if NoisePrior.of(problem).is_unknown(left.noise) > MAY_BE_UNKNOWN:
         return None
-    every = fields_about(left)
-    kinds = [what for what, _columns in every]
-    odds = [
-        _log_odds(left.white, left.metric.white(columns))
-        - np.log(len(set(kinds))) - np.log(kinds.count(what))
-        for what, columns in every
-    ]  # fmt: skip
+    white = left.white
+    gains = [(what, _log_odds(left, white, columns)) for what, columns in fields_about(left)]
+    kinds = [what for what, _gain in gains]
+    odds = [g - np.log(len(set(kinds))) - np.log(kinds.count(what)) for what, g in gains]
     if odds and float(np.logaddexp.reduce(odds)) + UNKNOWN > 0.0:
         return None
     far = outliers(data.chain, left.weight, problem.data.n_rows)
@@ -134,10 +146,64 @@ def coloured_noise(problem: Problem, state: State, factor: Array) -> Coloured | 
     return Coloured(scale, rho, int(far.sum()), any(size > _LARGER for size in scale.values()))
 
 
-def _log_odds(left: Array, columns: Array) -> float:
-    """ln odds of a field beside nothing, both whitened, with equal priors."""
-    group = MemberColumns(np.arange(columns.shape[1]), np.array(FIELD_WIDTHS))
-    return averaged(Linear.of(columns, left, {"field": group}).solved({}).gains("field"))
+def note_on_few(problem: Problem) -> list[str]:
+    """A note on which rows are asked whether they are noise with autocorrelation, if not all."""
+    count = problem.data.n_rows
+    if count <= _MOST_ASKED:
+        return []
+    return [
+        f"Whether what is left is noise with correlation from row to row was asked of about "
+        f"{_MOST_ASKED} of {count} rows: of stretches of {_STRETCH} rows, evenly spaced, or where "
+        "the model has a history of the first rows of each run."
+    ]
+
+
+def _few(problem: Problem, history: bool) -> NDArray[np.intp]:
+    """Rows of stretches, evenly spaced; with a history the way to each row has to be there."""
+    count = problem.data.n_rows
+    if not history:
+        begin = np.linspace(0, count - _STRETCH, _MOST_ASKED // _STRETCH).astype(np.intp)
+        return np.ravel(begin[:, None] + np.arange(_STRETCH))
+    run = problem.data.run_index
+    begins = np.append(0, 1 + np.flatnonzero(np.diff(run)))
+    size = np.diff(np.append(begins, count))
+    place = np.arange(count) - np.repeat(begins, size)
+    return np.flatnonzero(place < np.repeat(np.ceil(size * _MOST_ASKED / count), size))
+
+
+def _part(problem: Problem, rows: NDArray[np.intp]) -> Problem:
+    """The problem of some rows alone."""
+    some = {
+        name: None if values is None else values[rows]
+        for name in ("groups", "far_off")
+        for values in [getattr(problem, name)]
+    }
+    return replace(problem, data=problem.data.rows(rows), use=problem.use[rows], **some)
+
+
+def _cut(chain: Chain, rows: NDArray[np.intp]) -> Chain:
+    """A chain in which no reading foretells one of another stretch of these rows."""
+    before = np.maximum(chain.before, 0)
+    apart = rows[chain.row] - rows[chain.row[before]] > _STRETCH
+    return replace(chain, before=np.where(apart, -1, chain.before))
+
+
+def _log_odds(left: Fit, white: Array, columns: Array) -> float:
+    """ln odds of a field (N, k) beside nothing in what a fit leaves, with equal priors.
+
+    Noise has channels by themselves, and most columns are of one channel alone: the normal
+    equations are sums over channels, with hardly more zeros than there must be.
+    """
+    count, channel = columns.shape[1], left.data.problem.column_of
+    normal, gradient = np.zeros((count, count)), np.zeros(count)
+    for one in np.unique(channel):
+        rows = np.flatnonzero(channel == one)
+        own = np.flatnonzero(columns[rows].any(axis=0))
+        some = left.data.chain.only(rows), left.noise, left.weight[rows]
+        x = whitened(*some, columns[np.ix_(rows, own)])
+        normal[np.ix_(own, own)] += x.T @ x
+        gradient[own] += x.T @ white[rows]
+    return log_gain(normal, gradient, FIELD_WIDTHS)
 
 
 def underestimation(stated: bool, rho: float) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from crosscheck.comparison.associations import associations
-from crosscheck.comparison.noise import coloured_noise, rows_far_off
+from crosscheck.comparison.noise import coloured_noise, note_on_few, rows_far_off
 from crosscheck.comparison.quantities import Travel, channels, regions_of, travel
 from crosscheck.comparison.result import (
     Comparison,
@@ -62,8 +62,7 @@ def compare(
         outliers = np.zeros(data.n_rows, dtype=bool)
     notes = [*said, *contradictions(terms), *ready.notes]
     terms = ready.terms
-    plain = problem.experiment.predict(terms.effects)
-    factor = problem.noise(plain)
+    factor = problem.noise_under(terms.effects)
     state = evaluate(problem, terms, factor)
     way = travel(problem, state.prediction)
     judged, left = problem, state
@@ -77,6 +76,10 @@ def compare(
         )
     some = judged.n_readings > 0
     white = whiteness(judged, left.white, ready.fitted) if some else None
+    coloured = None
+    if white and not white.is_noise:
+        coloured = coloured_noise(judged, left, factor)
+        notes += note_on_few(judged)
     return Comparison(
         problem=problem,
         state=state,
@@ -90,7 +93,7 @@ def compare(
         associations=tuple(associations(judged, left.white, left.prediction) if some else ()),
         worst=tuple(_worst(problem, state, way)),
         whiteness=white,
-        coloured=coloured_noise(judged, left, factor) if white and not white.is_noise else None,
+        coloured=coloured,
         unsolved=tuple(_unsolved(problem, state)),
         notes=tuple(dict.fromkeys(notes)),
         times_noise=_times_noise(judged, left),

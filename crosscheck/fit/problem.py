@@ -12,6 +12,7 @@ Residuals are whitened by its Cholesky factor, so that noise alone has unit vari
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -22,7 +23,7 @@ from crosscheck.measurements.data import Measurements, Sigma
 from seecr.description.joints import locked
 from seecr.description.robot import Robot
 from seecr.effects import catalogue
-from seecr.effects.base import Readings
+from seecr.effects.base import Effect, Readings
 from seecr.pose import Array, products, quat_conjugate, rotation_vectors, rxyz_from_quat
 from seecr.prediction.experiment import Experiment, Prediction
 from seecr.prediction.parted import Parted, rates_by_length
@@ -196,15 +197,24 @@ class Problem:
         return self.as_read(rates_by_length(at), at.readings)
 
     def noise(self, at: Prediction) -> Array:
-        """Cholesky factors of each row's noise, (n, 6 + m, 6 + m); 1 where nothing was read."""
+        """Cholesky factors of each row's noise, (n, 6 + m, 6 + m); 1 where nothing was read.
+
+        Of exact lengths, whose readings have noise of their own alone, only the diagonal (n, 6 + m)
+        exists.
+        """
         return self.noise_about(self.by_length(at) if self.sigma.length_m else None)
+
+    def noise_under(self, effects: Sequence[Effect]) -> Array:
+        """The same as a model sees it; nothing is predicted where lengths are exact."""
+        if not self.sigma.length_m:
+            return self.noise_about(None)
+        return self.noise(self.experiment.predict(effects))
 
     def noise_about(self, by_length: Array | None) -> Array:
         """The same, given the derivative by lengths (n, 6 + m, m); None if lengths are exact."""
-        _n, width = self.measured.shape
         own = np.where(self.measured, self.reading_sigma, 1.0)
         if by_length is None or not self.sigma.length_m:
-            return np.asarray(own[:, :, None] * np.eye(width))
+            return own
         rate = np.where(self.measured[:, :, None], by_length * self.length_sigma[:, None], 0.0)
         return noise_factors(own, rate)
 
@@ -213,15 +223,18 @@ class Problem:
         single = values.ndim == 2
         table = values[..., None] if single else values
         table = np.where(self.measured[..., None], table, 0.0)
-        white: Array = in_units_of(factor, table, bool(self.sigma.length_m))[self.counted]
+        white: Array = in_units_of(factor, table)[self.counted]
         return white[:, 0] if single else white
 
 
-def in_units_of(factor: Array, table: Array, correlated: bool) -> Array:
-    """Whiten residuals or derivatives (n, k, p) by Cholesky factors (n, k, k) of their noise."""
-    if correlated:
+def in_units_of(factor: Array, table: Array) -> Array:
+    """Whiten residuals or derivatives (n, k, p) by Cholesky factors (n, k, k) of their noise.
+
+    Factors (n, k) are the diagonals of those that have nothing else.
+    """
+    if factor.ndim == 3:
         return np.asarray(np.linalg.solve(factor, table), float)
-    return table / np.diagonal(factor, axis1=1, axis2=2)[..., None]
+    return table / factor[..., None]
 
 
 def angle_rates(quat_wxyz: Array) -> Array:

@@ -41,7 +41,7 @@ class State:
             errors.
         raw: (n, 6 + m) residuals at the commanded lengths, in SI units; NaN where nothing was read.
         table: (n, 6 + m) whitened residuals. white: (N,) whitened residuals that count.
-        factor: (n, 6 + m, 6 + m) Cholesky factors of the noise.
+        factor: Cholesky factors of the noise, :meth:`Problem.noise`.
         chi2: sum of squares of ``white``; inf if a counted row was not solved.
         log_det: log determinant of the counted rows' noise over that of the readings alone.
         experiment: the commands with the most likely length errors.
@@ -145,7 +145,7 @@ def _compared(
     experiment: Experiment,
 ) -> State:
     filled = np.where(problem.measured & np.isfinite(raw), raw, 0.0)
-    table = in_units_of(factor, filled[..., None], bool(problem.sigma.length_m))[..., 0]
+    table = in_units_of(factor, filled[..., None])[..., 0]
     white = table[problem.counted]
     valid = bool(np.all(prediction.solved[problem.use])) and bool(np.all(np.isfinite(white)))
     chi2 = float(white @ white) if valid else np.inf

@@ -18,7 +18,7 @@ from enum import StrEnum
 import numpy as np
 
 from crosscheck.fit.algebra import monomials, waves
-from crosscheck.fit.problem import KINDS, POSITION, Rms, rms_by_kind
+from crosscheck.fit.problem import BY_NAME, KINDS, POSITION, Rms, rms_by_kind
 from crosscheck.fit.state import amplitude_columns
 from crosscheck.inference.fit import Data, Fit
 from crosscheck.inference.priors import FIELD_WIDTHS, UNKNOWN
@@ -32,6 +32,8 @@ _SMOOTH = 0.3
 _SHORT = 0.3
 # Of more cables than these, pairs have no numbers of their own: they would be hundreds.
 _MOST_CABLES = 12
+# The number of its kind.
+_POSITION = KINDS.index(BY_NAME["position"])
 # Number of fields drawn, the part that has to be seen, and the sizes tried, in units of the noise.
 _DRAWN, _SEEN = 100, 0.9
 _SIZES = np.geomspace(0.03, 300.0, 81)
@@ -110,11 +112,17 @@ class Varying(StrEnum):
         return varying
 
 
-def fields_about(fit: Fit) -> list[tuple[Varying, Array]]:
-    """What may vary, each with columns (N, k) in units of the noise, about a fit."""
+def fields_about(fit: Fit) -> Iterator[tuple[Varying, Array]]:
+    """What may vary, each with columns (N, k) in units of the noise, about a fit.
+
+    One at a time: all together are a hundred times as large as the readings.
+    """
     about = _FieldColumns(fit)
     parts = (about.readings, about.image, about.session, about.forces, about.lengths, about.drifts)
-    return [(what, columns) for part in parts for what, columns in part() if np.any(columns)]
+    for part in parts:
+        for what, columns in part():
+            if np.any(columns):
+                yield what, columns
 
 
 def over_place(fit: Fit, kind: int, length: float) -> Array:
@@ -124,8 +132,7 @@ def over_place(fit: Fit, kind: int, length: float) -> Array:
     """
     problem = fit.data.problem
     shapes = waves(fit.state.prediction.pose[:, :3], length)[problem.row_of]
-    columns = per_channel(fit.data, shapes)
-    return columns[:, np.any(columns[fit.data.chain.kind == kind], axis=0)]
+    return per_channel(fit.data, shapes, kind)
 
 
 class _FieldColumns:
@@ -148,20 +155,17 @@ class _FieldColumns:
         large, and with smaller ones the higher they are, as of a lens. What is shorter than a cubic
         can follow, as a ripple of rails or of a picture, is there for each kind by itself.
         """
+        kinds = np.unique(self.data.chain.kind).tolist()
         for smooth in (1.0, _SMOOTH):
             shapes = monomials(self.place, 3, smooth)[self.row]
-            columns = per_channel(self.data, shapes)
-            kind_of = self.data.chain.kind[np.argmax(columns != 0.0, axis=0)]
-            kinds = np.unique(kind_of)
             if len(kinds) > 1 or smooth == 1.0:
                 for kind in kinds:
-                    yield Varying[KINDS[kind].name.upper()], columns[:, kind_of == kind]
+                    yield Varying[KINDS[kind].name.upper()], per_channel(self.data, shapes, kind)
             if len(kinds) > 1 and smooth == 1.0:
-                yield Varying.READINGS, columns
-        short = per_channel(self.data, waves(self.place, _SHORT)[self.row])
-        kind_of = self.data.chain.kind[np.argmax(short != 0.0, axis=0)]
-        for kind in np.unique(kind_of):
-            yield Varying[KINDS[kind].name.upper()], short[:, kind_of == kind]
+                yield Varying.READINGS, per_channel(self.data, shapes)
+        short = waves(self.place, _SHORT)[self.row]
+        for kind in kinds:
+            yield Varying[KINDS[kind].name.upper()], per_channel(self.data, short, kind)
 
     def image(self) -> Iterator[tuple[Varying, Array]]:
         """A picture that widens with the square of the distance from some point."""
@@ -172,7 +176,7 @@ class _FieldColumns:
     def session(self) -> Iterator[tuple[Varying, Array]]:
         """A cubic in the time for each coordinate; the pose on its way from the row before."""
         shapes = monomials(self.time[:, None], 3)[self.row]
-        yield Varying.SESSION, per_channel(self.data, shapes, POSITION.stop)
+        yield Varying.SESSION, per_channel(self.data, shapes, _POSITION)
         run, here = self.problem.data.run_index, self.state.prediction.readings
         before = np.maximum(np.arange(len(run)) - 1, 0)
         before[run[before] != run] += 1
@@ -242,12 +246,15 @@ class _FieldColumns:
             yield what, in_units_of_noise(products(self.rates_by(name), time))
 
 
-def per_channel(data: Data, shapes: Array, last: int | None = None) -> Array:
-    """(N, k) shapes (N, l) for each channel of readings by itself, or for those below ``last``."""
-    column = data.problem.column_of
-    channels = [c for c in np.unique(column) if last is None or c < last]
-    parts = [shapes * (column == c)[:, None] for c in channels]
-    return np.concatenate([np.zeros((len(column), 0)), *parts], axis=1)
+def per_channel(data: Data, shapes: Array, kind: int | None = None) -> Array:
+    """(N, k) shapes (N, l) for each channel of readings by itself, or for those of one kind."""
+    column, count = data.problem.column_of, shapes.shape[1]
+    channels = np.unique(column if kind is None else column[data.chain.kind == kind])
+    out = np.zeros((len(column), count * len(channels)))
+    for k, channel in enumerate(channels):
+        own = column == channel
+        out[own, k * count : (k + 1) * count] = shapes[own]
+    return out
 
 
 def widening(place: Array) -> Array:

@@ -76,8 +76,7 @@ class Data:
     @classmethod
     def of(cls, problem: Problem, terms: Terms, frozen: bool = True) -> Data:
         """The readings of a problem, with noise as a model sees it."""
-        factor = problem.noise(problem.experiment.predict(terms.effects))
-        return cls(problem, factor, chain_of(problem), frozen)
+        return cls(problem, problem.noise_under(terms.effects), chain_of(problem), frozen)
 
     @property
     def free(self) -> tuple[str, ...]:

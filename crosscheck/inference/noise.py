@@ -65,6 +65,12 @@ class Chain:
         cut = (self.before >= 0) & absent[self.before]
         return replace(self, before=np.where(cut, -1, self.before))
 
+    def only(self, some: NDArray[np.intp]) -> Chain:
+        """Some readings by themselves; none may follow another one."""
+        place = np.full(len(self.row) + 1, -1)  # of -1, too, which has no reading before
+        place[some] = np.arange(len(some))
+        return Chain(self.kind[some], self.row[some], place[self.before[some]], self.gap[some])
+
 
 @dataclass(frozen=True, eq=False)
 class Noise:

@@ -115,7 +115,7 @@ def noise_floor(problem: Problem, state: State | None = None) -> Rms:
     With a state, the noise of the commanded lengths is included, as whitening at that state has it.
     """
     raw = np.broadcast_to(problem.reading_sigma, problem.measured.shape).copy()
-    if state is not None:
+    if state is not None and state.factor.ndim == 3:
         raw = np.sqrt(np.einsum("nij,nij->ni", state.factor, state.factor))
     return rms_by_kind(problem, raw)
 
