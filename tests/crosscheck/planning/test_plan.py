@@ -122,11 +122,6 @@ def test_what_the_commands_lack_is_said(robot, few):
     )
 
 
-def test_one_row_is_too_few_for_any_plan(robot, few):
-    found = make_plan(robot, few.rows(slice(0, 1)))
-    assert not found.effects and "with so few rows (1)" in found.sentence
-
-
 def test_a_payload_and_tensions_tell_mass_from_stiffness(plan):
     by_kind = {s.kind: s for s in plan.suggestions}
     for kind in ("payload", "tensions"):

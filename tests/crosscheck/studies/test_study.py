@@ -402,7 +402,7 @@ DOCS = Path(__file__).resolve().parents[3] / "docs"
 def test_the_page_works_as_written(tmp_path: Path) -> None:
     page = Page(tmp_path)
     page.run((DOCS / "study.md").read_text(encoding="utf-8"))
-    assert [command.split()[1] for command in page.commands] == ["study", "study"]
+    assert [command.split()[1] for command in page.commands] == ["study", "study", "map"]
 
 
 def test_every_column_is_in_the_formats() -> None:
