@@ -151,8 +151,7 @@ PHYSICS = rooms_of(
 # A trajectory is poses that the robot's joints can reach: what is commanded, no physics.
 # Of an effect of a user's own nobody has written the mathematics a second time.
 OF_ITS_OWN = {
-    "crosscheck.twin.lab": ["seecr.description.joints"],
-    "crosscheck.twin.own": ["seecr.prediction.experiment"],
+    "crosscheck.twin.lab": ["seecr.description.joints", "seecr.prediction.experiment"],
 }
 
 

@@ -19,8 +19,7 @@ from seecr.cli.results import made_by, result_in
 )
 @choices.robot_and_data
 @choices.grown_model
-@choices.only
-@choices.exclude
+@choices.considered
 @options.own_effects
 @choices.sigma
 @options.option("--force", "Write it even if it does not predict test runs better.")

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from seecr.cli import results
-from seecr.cli.options import FILE, columns, fix, option, passive, together, words_option
+from seecr.cli import options, results
 
 if TYPE_CHECKING:
     from crosscheck import Addition, Calibrated, Comparison, Diagnosis, Measurements, Plan
@@ -19,37 +18,49 @@ if TYPE_CHECKING:
     from seecr.files import Made
 
 
-robot_and_data = together(
-    click.argument("robot", type=FILE, metavar="ROBOT.xml"),
-    click.argument("data", type=FILE, nargs=-1, required=True, metavar="DATA.csv..."),
-    fix,
-    passive,
+robot_and_data = options.together(
+    click.argument("robot", type=options.FILE, metavar="ROBOT.xml"),
+    click.argument("data", type=options.FILE, nargs=-1, required=True, metavar="DATA.csv..."),
+    options.fix,
+    options.passive,
 )
 # what is said of the files in place of their TOML
-sigma = together(
-    option(
+sigma = options.together(
+    options.option(
         "--sigma KIND=0.1mm",
         "Noise of a kind of reading (position, orientation, tension) or of the commanded lengths "
         "(length); may be repeated; overrides [sigma] in the TOML.",
         name="sigmas",
         multiple=True,
     ),
-    columns,
+    options.columns,
 )
-tolerance = option(
+tolerance = options.option(
     "--tolerance 0.1mm",
     "Unexplained errors beyond the noise matter from this rms size on, such as 0.1mm, 0.05deg or "
     "1N; may be repeated.  [default: half the noise]",
     name="tolerances",
     multiple=True,
 )
-only = words_option(
-    "--only EFFECT,...",
-    "Consider only these effects, in addition to those of the model; may be repeated.",
+considered = options.together(
+    options.words_option(
+        "--only EFFECT,...",
+        "Consider only these effects, in addition to those of the model; may be repeated.",
+    ),
+    options.words_option("--exclude EFFECT,...", "Do not consider these effects."),
 )
-exclude = words_option("--exclude EFFECT,...", "Do not consider these effects.")
-grown_model = option("--model M.toml", "The model; created if it does not exist.", required=True)
-figures = option("--figures DIR", "Folder for the page's figures, as SVG and PNG.")
+grown_model = options.option(
+    "--model M.toml", "The model; created if it does not exist.", required=True
+)
+workers = options.together(
+    options.option(
+        "--jobs N",
+        "Number of parallel processes.  [default: one per processor]",
+        options.WholeNumber(min=1),
+    ),
+    options.scheduler,
+)
+figures = options.option("--figures DIR", "Folder for the page's figures, as SVG and PNG.")
 
 
 def check_effects(*names: Sequence[str]) -> None:

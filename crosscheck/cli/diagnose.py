@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 @click.command(epilog="Example: crosscheck diagnose robot.xml measured.csv --out diagnosis")
 @choices.robot_and_data
 @options.option("--model M.toml", "Effects that the model already has.")
-@choices.only
-@choices.exclude
+@choices.considered
 @options.own_effects
 @choices.sigma
 @choices.tolerance

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from crosscheck.cli import choices
 from seecr.cli import options
 from seecr.cli.following import following, passive_lines
 from seecr.cli.progress import executor_of, progress_bar, say_duration
@@ -51,12 +52,7 @@ if TYPE_CHECKING:
     name="thresholds_file",
 )
 @options.option("--seed N", "Seed of the random numbers.", options.WholeNumber(min=0), default=0)
-@options.option(
-    "--jobs N",
-    "Number of parallel processes.  [default: one per processor]",
-    options.WholeNumber(min=1),
-)
-@options.scheduler
+@choices.workers
 @options.option("--no-recordings", "Do not write recordings (.rrd).")
 @options.out("crosscheck-results")
 @options.as_json

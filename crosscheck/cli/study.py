@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from crosscheck.cli import choices
 from seecr.cli import options
 from seecr.cli.progress import executor_of, progress_bar
 from seecr.cli.results import made_by
@@ -27,12 +28,7 @@ if TYPE_CHECKING:
     name="sizes",
     multiple=True,
 )
-@options.option(
-    "--jobs N",
-    "Number of parallel processes.  [default: one per processor]",
-    options.WholeNumber(min=1),
-)
-@options.scheduler
+@choices.workers
 @options.option("--figure [png|svg|none]", "Kind of figure.", default="png")
 @options.out("crosscheck-study")
 @options.as_json

@@ -184,8 +184,7 @@ class Machine:
         data, wrench = self.data, self.true.wrench
         if self._pushed:
             data.qfrc_applied[:] = 0.0
-            place = data.xpos[self._body].copy()
-            given = wrench[:3], wrench[3:], place, self._body, data.qfrc_applied
+            given = wrench[:3], wrench[3:], data.xpos[self._body], self._body, data.qfrc_applied
             mujoco.mj_applyFT(self.model, data, *given)
 
     @property
@@ -211,11 +210,8 @@ class Machine:
     @property
     def speed(self) -> float:
         """[m/s] of the platform, rotations times the robot's length."""
-        size = np.where(self._rotates(), self.true.robot.length, 1.0)
+        size = np.where(self.true.robot.hinges, self.true.robot.length, 1.0)
         return float(np.abs(self.data.qvel * size).max())
-
-    def _rotates(self) -> Array:
-        return np.asarray(self.true.robot.hinges)
 
     def rates(self) -> Array:
         """Angular frequencies (d,) [rad/s] of small vibrations about the present state, ascending.
@@ -225,7 +221,7 @@ class Machine:
         """
         model, data, start = self.model, self.data, self.data.qpos.copy()
         length, d = self.true.robot.length, self.model.nv
-        steps = _DIFFERENCE * np.where(self._rotates(), 1.0, length)
+        steps = _DIFFERENCE * np.where(self.true.robot.hinges, 1.0, length)
         matrix = np.empty((d, d))
         for k in range(d):
             ends = []

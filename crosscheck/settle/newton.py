@@ -127,7 +127,6 @@ class Polished:
 
     Attributes:
         residual: residual force relative to the load.
-        iterations: number of Newton steps.
         moved_m: distance [m] from the start.
         moved_rad: rotation [rad] from the start.
         smallest_eigenvalue: of the stiffness there [N/m], rotations times the robot's length.
@@ -137,7 +136,6 @@ class Polished:
     """
 
     residual: float
-    iterations: int
     moved_m: float
     moved_rad: float
     smallest_eigenvalue: float
@@ -160,13 +158,12 @@ def polish(physics: Physics) -> Polished:
     began = time.perf_counter()
     physics.update()
     start = physics.pose()
-    size, iterations = minimise(physics, physics.rounding(), _MAX_ITERATIONS)
+    size, _steps = minimise(physics, physics.rounding(), _MAX_ITERATIONS)
     physics.update()
     moved = pose_difference(physics.pose(), start)
     value, softest = _softest(physics)
     return Polished(
         residual=size,
-        iterations=iterations,
         moved_m=float(np.linalg.norm(moved[:3])),
         moved_rad=float(np.linalg.norm(moved[3:])),
         smallest_eigenvalue=value,

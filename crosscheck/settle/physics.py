@@ -1,31 +1,27 @@
 """One cable robot in MuJoCo: cables, load and pose in; forces, energy and tensions out.
 
 Nothing here comes from seecr's statics: the file is compiled by MuJoCo itself, and every force is
-MuJoCo's.
+MuJoCo's. What would hide or shift the equilibrium that statics predicts is switched off: contacts,
+joint and tendon limits, dry friction (with it a platform rests anywhere in a band), and damping
+(which shifts no equilibrium, but delays it).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.settle.prepared import change_mass_unit, ignored_in, springs_alone, without_loose
-from seecr.description.mjcf import quiet_mujoco, read_file
+from seecr.description.mjcf import Reading, quiet_mujoco, read_file, unsupported_features
 from seecr.description.robot import Robot
 from seecr.errors import InputFileError
 from seecr.pose import Array, pose_difference
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
 
 # MuJoCo's implicit step treats generalised forces below about 1e-8 (in its own units) as zero, so
 # that a light platform would stop moving before its forces balance. The unit of mass is arbitrary
@@ -117,13 +113,19 @@ class Physics:
         """
         self.model, self.parts, self.body = model, parts, parts.platform
         self.is_free = int(model.jnt_type[model.body_jntadr[parts.platform]]) == _FREE
-        self.ignored = ignored_in(model, parts.platform)
-        springs_alone(model)
-        self._set_lines()
+        self.ignored = _ignored_in(model, parts.platform)
+        _springs_alone(model)
+        # tendons are springs that only pull, springs that push, or no springs at all
+        self.pushes = np.zeros(model.ntendon, dtype=bool)
+        self.pushes[list(parts.pushes)] = True
+        self.constant = np.zeros(model.ntendon)
+        for tendon, _exit, _anchor, force in parts.pulled:
+            self.constant[tendon] = force
+            model.tendon_stiffness[tendon] = 0.0
         own = float(model.body_mass[parts.platform])
         self.mass = own or float(model.body_subtreemass[parts.platform])
         self.mass_unit = 2.0 ** round(float(np.log2(self.mass / _MASS_IN_MUJOCO)))
-        change_mass_unit(model, self.mass_unit)
+        _change_mass_unit(model, self.mass_unit)
         self.data = mujoco.MjData(model)
         self.reference_qpos = model.qpos0.copy()
         self.reference_gravity = model.opt.gravity.copy()
@@ -131,21 +133,15 @@ class Physics:
         mujoco.mj_forward(model, self.data)
         self.length = self._characteristic_length() if length is None else length
         # With a length for rotations all coordinates are metres: residuals and eigenvalues compare.
-        self.rotations = self._which_rotate()
+        kind = model.jnt_type[model.dof_jntid]
+        self.rotations = (kind == _HINGE) | (kind == _BALL)
+        if self.is_free:
+            self.rotations[3:6] = True  # the platform's own come first
         self.metre = np.where(self.rotations, self.length, 1.0)
         every = np.arange(self.n_dof)
         self.coupling: list[Together] = [(every[k : k + 1], every, 0 * every + k) for k in every]
         self.force_scale = self._load = 1.0
         self.set_load()
-
-    def _set_lines(self) -> None:
-        """What the tendons are: springs that only pull, that push, or no springs at all."""
-        self.pushes = np.zeros(self.model.ntendon, dtype=bool)
-        self.pushes[list(self.parts.pushes)] = True
-        self.constant = np.zeros(self.model.ntendon)
-        for tendon, _exit, _anchor, force in self.parts.pulled:
-            self.constant[tendon] = force
-            self.model.tendon_stiffness[tendon] = 0.0
 
     @classmethod
     def of(cls, path: str | Path, passive: Sequence[str] = ()) -> Physics:
@@ -160,7 +156,7 @@ class Physics:
             InputFileError: a block and tackle, of which MuJoCo's side has none.
         """
         found = read_file(path, passive)
-        robot, model = found.robot(), without_loose(found)
+        robot, model = found.robot(), _without_loose(found)
         for i in np.flatnonzero(model.tendon_num != 2):
             raise InputFileError(
                 f"{path}: tendon {robot.cable_names[i]}: expected exactly two sites; MuJoCo's side "
@@ -299,27 +295,17 @@ class Physics:
         # Not by xfrc_applied, which acts at the centre of mass, so that its torque would have to
         # follow the offset as the platform rotates; nor by a constant qfrc_applied, since the free
         # joint's torque is in body axes.
-        self.data.qfrc_applied[:] = 0.0
+        model, data, body, total = self.model, self.data, self.body, self.data.qfrc_applied
+        total[:] = 0.0
         # a third of the time of any(), once for every step and every difference
         if np.count_nonzero(self.wrench):
-            where = self.data.xpos[self.body]
             force, torque = self.wrench[:3] / self.mass_unit, self.wrench[3:] / self.mass_unit
-            mujoco.mj_applyFT(
-                self.model,
-                self.data,
-                force,
-                torque,
-                where,
-                self.body,
-                self.data.qfrc_applied,
-            )
+            mujoco.mj_applyFT(model, data, force, torque, data.xpos[body], body, total)
         for _tendon, exit_site, anchor_site, tension in self.parts.pulled:
-            there = self.data.site_xpos[anchor_site]
-            way = self.data.site_xpos[exit_site] - there
+            there = data.site_xpos[anchor_site]
+            way = data.site_xpos[exit_site] - there
             pull = tension / self.mass_unit / np.linalg.norm(way) * way
-            mujoco.mj_applyFT(
-                self.model, self.data, pull, np.zeros(3), there, self.body, self.data.qfrc_applied
-            )
+            mujoco.mj_applyFT(model, data, pull, np.zeros(3), there, body, total)
 
     def relative(self, force: Array) -> float:
         """Norm of a generalised force (d,) relative to the load, with torques over the length."""
@@ -435,18 +421,9 @@ class Physics:
             gap = weigh * pose_difference(pose, self.pose())
             mujoco.mj_jacBody(self.model, self.data, jacobian[:3], jacobian[3:], self.body)
             step = np.linalg.lstsq(weigh[:, None] * jacobian[:, :n], gap, rcond=None)[0]
-            whole = np.zeros(self.n_dof)
-            whole[:n] = step
-            self.move(whole)
+            self.move(np.append(step, np.zeros(self.n_dof - n)))
             if np.linalg.norm(step * self.metre[:n]) < 1e-15 * self.length:
                 break
-
-    def _which_rotate(self) -> Array:
-        kind = self.model.jnt_type[self.model.dof_jntid]
-        rotate = np.asarray((kind == _HINGE) | (kind == _BALL))
-        if self.is_free:
-            rotate[3:6] = True  # the platform's own come first
-        return rotate
 
     def _characteristic_length(self) -> float:
         anchors = self.data.site_xpos[self.parts.anchors]
@@ -462,3 +439,60 @@ def _finite(name: str, values: Array, shape: tuple[int, ...]) -> Array:
     if not np.all(np.isfinite(array)):
         raise CrosscheckError(f"{name}: expected finite numbers, got {array}")
     return array
+
+
+# A user's MJCF, reduced to springs and gravity.
+
+_DISABLE = (
+    mujoco.mjtDisableBit.mjDSBL_AUTORESET,  # else a diverging run restarts silently
+    mujoco.mjtDisableBit.mjDSBL_CONSTRAINT,  # contacts, limits, dry friction
+    mujoco.mjtDisableBit.mjDSBL_CONTACT,  # skips the search for contacts
+    mujoco.mjtDisableBit.mjDSBL_DAMPER,
+    mujoco.mjtDisableBit.mjDSBL_SENSOR,
+    mujoco.mjtDisableBit.mjDSBL_ACTUATION,
+)
+
+
+def _without_loose(found: Reading) -> mujoco.MjModel:
+    """The model of a file without moving bodies that no cable touches, and what is about them."""
+    if not found.platform.loose:
+        return found.model
+    spec = mujoco.MjSpec.from_file(str(found.path))
+    beside = (spec.keys, spec.sensors, spec.equalities, spec.excludes, spec.pairs, spec.actuators)
+    gone = [spec.bodies[body] for body in found.platform.loose]
+    for one in [each for some in beside for each in some] + gone:
+        spec.delete(one)
+    return spec.compile()
+
+
+def _ignored_in(model: mujoco.MjModel, platform: int) -> tuple[str, ...]:
+    """Names of features present that would hide, shift or delay the equilibrium."""
+    damped = model.dof_damping.any() or model.tendon_damping.any()
+    return (*unsupported_features(model, platform), *(("damping",) if damped else ()))
+
+
+def _springs_alone(model: mujoco.MjModel) -> None:
+    """Leave springs, gravity and inertia only."""
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+    model.opt.disableflags |= sum(int(flag) for flag in _DISABLE)
+    model.opt.tolerance = 1e-8  # relative, of the solve for the implicit step
+    model.opt.iterations = 100
+    model.opt.enableflags = int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+
+
+def ignored_note(name: str | Path, ignored: Sequence[str]) -> str:
+    """A sentence about what is :func:`_ignored_in` a file."""
+    return (
+        f"{name}: switched off here: {', '.join(ignored)}; only springs and gravity act on the "
+        "platform, as in the statics"
+    )
+
+
+def _change_mass_unit(model: mujoco.MjModel, mass_unit: float) -> None:
+    """Change the unit of mass [kg] of everything with mass, and of what MuJoCo derives from it."""
+    masses = (model.body_mass, model.body_inertia, model.dof_armature, model.tendon_armature)
+    for array in (*masses, model.tendon_stiffness, model.jnt_stiffness):
+        array /= mass_unit
+    model.opt.density /= mass_unit
+    model.opt.viscosity /= mass_unit
+    mujoco.mj_setConst(model, mujoco.MjData(model))

@@ -71,7 +71,6 @@ class Rest:
         residual: residual force relative to the load in that state, without velocity.
         steps: of MuJoCo, retries included.
         simulated_s: simulated time [s], retries included.
-        time_step: the last [s].
         wall_s: time taken [s].
     """
 
@@ -79,7 +78,6 @@ class Rest:
     residual: float
     steps: int
     simulated_s: float
-    time_step: float
     wall_s: float
 
     def after(self, first: Rest) -> Rest:
@@ -116,23 +114,18 @@ def come_to_rest(
         max_steps: after which to give up.
         observe: called after each step.
     """
-    began = time.perf_counter()
-    start = physics.data.qpos.copy()
-    rest = Rest(SettleStatus.DIVERGED, np.nan, 0, 0.0, time_step(physics), 0.0)
-    for retry in range(1 + _RETRIES):
-        physics.model.opt.timestep = rest.time_step / (_SHORTER if retry else 1.0)
+    began, start, steps, simulated = time.perf_counter(), physics.data.qpos.copy(), 0, 0.0
+    physics.model.opt.timestep = time_step(physics)
+    for _retry in range(1 + _RETRIES):
         physics.data.qpos[:] = start
         physics.data.qvel[:] = 0.0
         physics.data.time = 0.0
-        before = rest
-        status, residual, steps = _run(physics, tolerance, max_steps - before.steps, observe)
-        data, wall = physics.data, time.perf_counter() - began
-        simulated = before.simulated_s + float(data.time)
-        step = float(physics.model.opt.timestep)
-        rest = Rest(status, residual, before.steps + steps, simulated, step, wall)
+        status, residual, more = _run(physics, tolerance, max_steps - steps, observe)
+        steps, simulated = steps + more, simulated + float(physics.data.time)
         if status is not SettleStatus.DIVERGED:
             break
-    return rest
+        physics.model.opt.timestep /= _SHORTER
+    return Rest(status, residual, steps, simulated, time.perf_counter() - began)
 
 
 def _run(

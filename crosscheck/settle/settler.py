@@ -266,7 +266,7 @@ def _result(
     """The settling in the physics' present state; without numbers unless it is an answer."""
     status = rest.status if polished is None else _judge(physics, polished)
     fine, nan = status is SettleStatus.SETTLED, np.nan
-    last = polished or Polished(nan, 0, nan, nan, nan, np.full(0, nan), nan, 0.0)
+    last = polished or Polished(nan, nan, nan, nan, np.full(0, nan), nan, 0.0)
 
     def known(values: Array) -> Array:
         return values.copy() if fine else np.full_like(values, nan)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import rerun as rr
@@ -14,6 +13,7 @@ import rerun.blueprint as rrb
 from crosscheck.settle.physics import Physics
 from crosscheck.settle.settler import Settler, Settling
 from crosscheck.show import suite
+from crosscheck.suite.results import CaseResult
 from crosscheck.suite.verdicts import UNSOLVED, Verdict
 from seecr.pose import Array, pose_difference
 from seecr.show import colours, layout, plots
@@ -29,9 +29,6 @@ from seecr.show.stream import (
     sweep_index,
 )
 from seecr.statics.solution import Status
-
-if TYPE_CHECKING:
-    from crosscheck.suite.results import CaseResult
 
 READ_ME, NOW = "text/read_me", "text/now"
 DEVIATION, TILT, TENSION = "plot/deviation", "plot/tilt", "plot/tension"
@@ -204,10 +201,8 @@ def _worth_watching(result: CaseResult) -> int | None:
     settled = result.settling.settled
     if not settled.any():
         return None
-    for verdict in (Verdict.DIFFERS, Verdict.BRANCH):
-        if np.any(chosen := settled & (result.verdict == verdict)):
-            settled = chosen
-            break
+    of = (settled & (result.verdict == kind) for kind in (Verdict.DIFFERS, Verdict.BRANCH))
+    settled = next((some for some in of if some.any()), settled)
     change = pose_difference(result.settling.pose, result.case.begins)
     change[:, 3:] *= result.robot.length
     return int(np.argmax(np.where(settled, np.linalg.norm(change, axis=1), -1.0)))
@@ -240,16 +235,14 @@ def record_motion(
 def _layout(drawn: _Drawn) -> rrb.Blueprint:
     """Scene, legend and lanes on the left, plots in the middle, text on the right."""
     robot, name = drawn.result.robot, drawn.result.case.name
-    left = layout.scene_and_lanes(robot, drawn.seen, name, LANES, robot.n_cables + 1)
     root = rrb.Horizontal(
-        left,
+        layout.scene_and_lanes(robot, drawn.seen, name, LANES, robot.n_cables + 1),
         rrb.Vertical(*_plot_views(drawn), row_shares=list(drawn.shares.values())),
         rrb.Vertical(layout.text("Read me", READ_ME), layout.text("Now", NOW), row_shares=[3.2, 2]),
         column_shares=[5, 4, 2.6],
     )
-    speed = 0.0 if drawn.motion is None else float(drawn.motion.t_s[-1]) / _WATCH_S
-    opens = opening(drawn.tracks[0].index)
-    return layout.blueprint(root, playback_speed=colours.round_up(speed), timeline=opens)
+    speed = colours.round_up(0.0 if drawn.motion is None else drawn.motion.t_s[-1] / _WATCH_S)
+    return layout.blueprint(root, playback_speed=speed, timeline=opening(drawn.tracks[0].index))
 
 
 def _plot_views(drawn: _Drawn) -> list[rrb.TimeSeriesView]:
@@ -265,12 +258,10 @@ def _plot_views(drawn: _Drawn) -> list[rrb.TimeSeriesView]:
     if TILT in drawn.shares:
         views.append(_component_view(drawn, TILT, "Rotation from the command [°]", turned))
     roots = [f"{TENSION}/{who}" for who in ("seecr", "mujoco")]
-    limit = drawn.result.allowance
     gap = drawn.result.difference
-    lines = [*(getattr(limit, key) for key in _KEYS.values()), gap.settled_position_m,
-             gap.settled_orientation_rad]  # fmt: skip
     apart = [list(track.apart.values()) for track in drawn.tracks]
-    apart[0] += lines
+    apart[0] += [getattr(drawn.result.allowance, key) for key in _KEYS.values()]
+    apart[0] += [gap.settled_position_m, gap.settled_orientation_rad]
     curves = [plots.log10(np.stack(values, axis=1)) for values in apart]
     titles = [title for title, _colour in _QUANTITIES.values()]
     return [

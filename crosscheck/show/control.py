@@ -9,7 +9,7 @@ import numpy as np
 
 from crosscheck.controlled.result import TimedControl, TimedScheme
 from seecr.columns.csv import table_text
-from seecr.pose import Array, pose_difference
+from seecr.pose import Array
 from seecr.result import COORDINATES, Record, named
 from seecr.show.colours import COLOURS, COMMAND, MUJOCO, SERIES
 from seecr.show.control import LEAST, schemes_json
@@ -43,8 +43,7 @@ def trace_csv(one: TimedScheme) -> str:
 def away_mm(one: TimedScheme) -> Array:
     """(k,) [mm] from the pose that is wanted at each instant."""
     wanted = one.rest.solution.command[one.trace.row]
-    away = pose_difference(one.trace.pose, wanted)[:, :3]
-    return np.asarray(1e3 * np.linalg.norm(away, axis=1))
+    return np.asarray(1e3 * np.linalg.norm(one.trace.pose[:, :3] - wanted[:, :3], axis=1))
 
 
 def timed_figure(path: Path, result: TimedControl) -> None:

@@ -42,7 +42,15 @@ from crosscheck.show.blocks import (
 )
 from crosscheck.show.effect_figures import confusion_of, draw_confusion, robot_figure, waterfall
 from crosscheck.show.error_figures import map_section, wall_section
-from crosscheck.show.findings import PLAUSIBLE, candidate_blocks, candidate_lines, card, in_brief
+from crosscheck.show.findings import (
+    FILE,
+    MOST_CANDIDATES,
+    PLAUSIBLE,
+    candidate_blocks,
+    candidate_lines,
+    card,
+    in_brief,
+)
 from crosscheck.show.residuals import association_section, facts_of, title_of
 from crosscheck.show.texts import kinds_table, markdown, printed, row_heading, unused
 from seecr.show.colours import AFTER, BEFORE, CALM, TINT
@@ -55,9 +63,8 @@ _STYLE = {
     DiagnosisVerdict.UNKNOWN_EFFECT: "bold yellow",
     DiagnosisVerdict.NO_VERDICT: "bold red",
 }
-# Where not all fit, on the terminal and in a recording: diagnosis.json has the others.
-_FILE = "diagnosis.json"
-_MOST_CANDIDATES, _MOST_PARAMETERS, _MOST_LISTED = 6, 9, 6
+# Where not all fit, on the terminal and in a recording.
+_MOST_PARAMETERS, _MOST_LISTED = 9, 6
 # Noise within this factor of what was stated is as stated.
 _AS_STATED = 1.25
 
@@ -99,7 +106,7 @@ def _way(found: Diagnosis) -> TextTable:
 
 def _finding(finding: MissingEffect) -> Items:
     """Its values, what it cannot be told from, and how to check it."""
-    lines = cut(finding.value_lines(), _MOST_PARAMETERS, _FILE)
+    lines = cut(finding.value_lines(), _MOST_PARAMETERS, FILE)
     if finding.rivals:
         lines.append(f"indistinguishable from: {', '.join(finding.indistinguishable)}")
     return Items([*lines, f"check: {finding.check}"], "  ")
@@ -286,8 +293,8 @@ def diagnosis_text(found: Diagnosis, scene: Sequence[str]) -> str:
     Args:
         found: the diagnosis. scene: what is drawn, in words; empty if nothing is.
     """
-    steps = cut(found.measure_further, _MOST_LISTED, _FILE)
-    notes = cut(found.notes, _MOST_LISTED, _FILE)
+    steps = cut(found.measure_further, _MOST_LISTED, FILE)
+    notes = cut(found.notes, _MOST_LISTED, FILE)
     play = (
         " goes from the model as it stood through the effects added. ", Code("pose"),
         " (choose it at the bottom left) goes through the measured poses: orange edges measured, "
@@ -320,7 +327,7 @@ def step_text(
     if finding is not None:
         more = [Line(f"It {removed(finding.share)}: {finding.title}."), _finding(finding)]
     elif found.candidates and len(stages) == 1:
-        rows = [(row.effect, str(row.why_not)) for row in found.candidates[:_MOST_CANDIDATES]]
+        rows = [(row.effect, str(row.why_not)) for row in found.candidates[:MOST_CANDIDATES]]
         more = [TextTable(["tried", "why not listed"], rows)]
     table = kinds_table(kinds, errors, ("test runs", "fitted runs", "noise"))
     box = Line(f"The box shows the worst pose, line {line} of the data.")

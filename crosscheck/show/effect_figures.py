@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from crosscheck.diagnosis.path import ModelPath, Stage
@@ -47,17 +48,18 @@ def waterfall(found: Diagnosis) -> str:
         panels = figure.subplots(1, len(kinds), sharey=True, squeeze=False)[0]
         for axes, kind in zip(panels, kinds, strict=True):
             _panel(axes, found, stages, kind)
-        panels[0].set_yticks(range(len(stages)), [_label(stage, found) for stage in stages])
+        labels = {one.effect: _or_rivals(one) for one in found.missing}
+        panels[0].set_yticks(
+            range(len(stages)), [stage.label + labels.get(stage.added, "") for stage in stages]
+        )
         panels[0].set_ylim(len(stages) - 0.45, -0.75)
         return image(figure, "Errors on test runs, model by model, compared with the noise")
 
 
-def _label(stage: Stage, found: Diagnosis) -> str:
-    rivals = [f.rivals for f in found.missing if f.effect == stage.added]
-    if rivals and rivals[0]:
-        more = f" or {len(rivals[0])} more" if len(rivals[0]) > 1 else f"\nor {rivals[0][0].name}"
-        return stage.label + more
-    return stage.label
+def _or_rivals(one: MissingEffect) -> str:
+    if len(one.rivals) > 1:
+        return f" or {len(one.rivals)} more"
+    return "".join(f"\nor {rival.name}" for rival in one.rivals)
 
 
 def _panel(axes: Axes, found: Diagnosis, stages: Sequence[Stage], kind: Kind) -> None:
@@ -93,13 +95,8 @@ def _panel(axes: Axes, found: Diagnosis, stages: Sequence[Stage], kind: Kind) ->
         # beside a dot, which would hide it, and on a bar
         _runs(axes, row + 0.3 * logarithmic, runs)
         if stage.added and in_sample is not None:
-            axes.plot(
-                [in_sample * kind.factor] * 2,
-                [row - 0.3, row + 0.3],
-                color="#b9c0c7",
-                linewidth=1.4,
-                zorder=4,
-            )
+            ends = [in_sample * kind.factor] * 2, [row - 0.3, row + 0.3]
+            axes.plot(*ends, color="#b9c0c7", linewidth=1.4, zorder=4)
         reach = max(value, float(np.nanmax(runs, initial=0.0)))
         words = f"{short(value)} {kind.unit}"
         is_noise = found.verdict in _IS_NOISE
@@ -149,15 +146,14 @@ class Confusion:
     part: Array
 
     @property
+    def alike(self) -> NDArray[np.bool_]:
+        """(k, k) which two imitate each other."""
+        return (np.minimum(self.part, self.part.T) > ALIKE) & ~np.eye(len(self.part), dtype=bool)
+
+    @property
     def twins(self) -> list[tuple[str, str]]:
         """Pairs that imitate each other."""
-        k = len(self.names)
-        return [
-            (self.names[i], self.names[j])
-            for i in range(k)
-            for j in range(i + 1, k)
-            if min(self.part[i, j], self.part[j, i]) > ALIKE
-        ]
+        return [(self.names[i], self.names[j]) for i, j in np.argwhere(np.triu(self.alike))]
 
 
 def confusion_of(found: Diagnosis) -> Confusion | None:
@@ -218,22 +214,18 @@ def draw_confusion(confusion: Confusion) -> str:
                         fontsize=7.5 if k <= _FEW else 6.2,
                         color="white" if part[i, j] > 0.75 else INK,
                     )  # fmt: skip
-        for a, b in confusion.twins:
-            for i, j in ((names.index(a), names.index(b)), (names.index(b), names.index(a))):
-                corner = (j - 0.46, i - 0.46)
-                axes.add_patch(
-                    Rectangle(corner, 0.92, 0.92, fill=False, edgecolor=BEFORE, linewidth=1.8)
-                )
+        for i, j in np.argwhere(confusion.alike):
+            corner = (j - 0.46, i - 0.46)
+            frame = Rectangle(corner, 0.92, 0.92, fill=False, edgecolor=BEFORE, linewidth=1.8)
+            axes.add_patch(frame)
         axes.set_xticks(range(k), names, rotation=40, ha="right", rotation_mode="anchor")
         axes.set_yticks(range(k), names)
-        for label in axes.get_yticklabels()[: confusion.listed]:
-            label.set_fontweight("bold")
-        for label in axes.get_xticklabels()[: confusion.listed]:
-            label.set_fontweight("bold")
+        for labels in (axes.get_yticklabels(), axes.get_xticklabels()):
+            for label in labels[: confusion.listed]:
+                label.set_fontweight("bold")
         axes.set_xlabel("could be imitated by")
         axes.tick_params(length=0)
-        for spine in axes.spines.values():
-            spine.set_visible(False)
+        axes.spines[:].set_visible(False)
         return image(figure, "How much of each effect another could imitate")
 
 
@@ -379,6 +371,4 @@ def cables_of(finding: MissingEffect, cables: int) -> list[int]:
         number = _NUMBER.search(name)
         if number is not None and 1 <= int(number[1]) <= cables:
             size[int(number[1]) - 1] = max(size[int(number[1]) - 1], abs(float(value)))
-    if not size.any():
-        return list(range(cables))
-    return np.flatnonzero(size >= _LARGE * size.max()).tolist()
+    return np.flatnonzero(size >= _LARGE * size.max()).tolist()  # all where all are 0

@@ -220,17 +220,15 @@ def walls_of(problem: Problem, before: Drawn, after: Drawn) -> list[Wall]:
 
     Of the rows that are drawn.
     """
-    raw = before.state.raw
-    change = raw - after.state.raw
-    prediction = after.state.prediction
-    out = []
+    raw, prediction = before.state.raw, after.state.prediction
+    change, names, out = raw - after.state.raw, list(problem.robot.cable_names), []
+    against = _of_cables(problem, prediction)
     errors, noise = cable_errors(problem, raw, before.state.prediction)
     predicted, _ = cable_errors(problem, change, before.state.prediction)
-    names = list(problem.robot.cable_names)
     if np.isfinite(errors).any():
         out.append(
             Wall("Errors of cable length", names, 1e3 * errors, 1e3 * predicted,
-                 1e3 * np.mean(noise, axis=0), "mm", _of_cables(problem, prediction))
+                 1e3 * np.mean(noise, axis=0), "mm", against)
         )  # fmt: skip
     elif problem.counted[:, :6].any():
         out.append(_of_readings(problem, raw, change, prediction))
@@ -239,45 +237,40 @@ def walls_of(problem: Problem, before: Drawn, after: Drawn) -> list[Wall]:
         part = np.where(np.isfinite(shown), change[:, TENSION], np.nan)
         seen = np.flatnonzero(np.isfinite(shown).any(axis=0))
         level = np.full(len(seen), problem.sigma.tension_N or 0.0)
-        against = [
-            (name, values[:, seen] if values.ndim == 2 else values)
-            for name, values in _of_cables(problem, prediction)
-        ]
+        of_seen = [(name, some[:, seen] if some.ndim == 2 else some) for name, some in against]
         out.append(
             Wall("Errors of tension", [names[k] for k in seen], shown[:, seen], part[:, seen],
-                 level, "N", against)
+                 level, "N", of_seen)
         )  # fmt: skip
     rows = Misfit(problem, before.state).drawn
     return [wall.at(rows) for wall in out]
 
 
 def _of_cables(problem: Problem, prediction: Prediction) -> list[tuple[str, Array]]:
-    out = [("length of the cable [m]", cable_lengths(problem, prediction))]
-    out.append(("its tension [N]", prediction.tensions))
-    out.append(("reeled in ← last move [mm] → paid out", 1e3 * length_changes(problem, prediction)))
-    return out + _time(problem)
+    return [
+        ("length of the cable [m]", cable_lengths(problem, prediction)),
+        ("its tension [N]", prediction.tensions),
+        ("reeled in ← last move [mm] → paid out", 1e3 * length_changes(problem, prediction)),
+        *_time(problem),
+    ]
 
 
 def _of_readings(problem: Problem, raw: Array, change: Array, prediction: Prediction) -> Wall:
     """Where the pose was read in part: its readings against place and time."""
-    kept = [c for c in range(6) if problem.counted[:, c].any()]
-    names, _units = channels(problem)
-    factor = np.array([KINDS[0].factor] * 3 + [KINDS[1].factor] * 3)
-    sigma = np.array([problem.sigma.position_m or 0.0] * 3)
-    sigma = np.concatenate([sigma, [problem.sigma.orientation_rad or 0.0] * 3])
-    units = [KINDS[0 if c < 3 else 1].unit for c in kept]
-    shown = np.where(problem.counted[:, kept], raw[:, kept], np.nan) * factor[kept]
-    part = np.where(np.isfinite(shown), change[:, kept] * factor[kept], np.nan)
+    kept = np.flatnonzero(problem.counted[:, :6].any(axis=0)).tolist()
+    factor = np.repeat([KINDS[0].factor, KINDS[1].factor], 3)[kept]
+    sigma = [problem.sigma.position_m or 0.0, problem.sigma.orientation_rad or 0.0]
+    shown = np.where(problem.counted[:, kept], raw[:, kept], np.nan) * factor
+    part = np.where(np.isfinite(shown), change[:, kept] * factor, np.nan)
     place = travel(problem, prediction).pose[:, :3]
     wide = np.ptp(place[problem.use], axis=0) > 1e-6 * problem.robot.length
     abscissae = [(f"{'xyz'[k]} [m]", place[:, k]) for k in range(3) if wide[k]]
-    rows = [names[c] for c in kept]
-    if len(set(units)) > 1:
-        rows = [f"{name} [{unit}]" for name, unit in zip(rows, units, strict=True)]
+    rows, units = [channels(problem)[0][c] for c in kept], [KINDS[c // 3].unit for c in kept]
     unit = units[0] if len(set(units)) == 1 else ""
-    level = sigma[kept] * factor[kept]
-    return Wall("Errors of the readings", rows, shown, part, level, unit,
-                (abscissae + _time(problem))[:4])  # fmt: skip
+    if not unit:
+        rows = [f"{name} [{unit}]" for name, unit in zip(rows, units, strict=True)]
+    return Wall("Errors of the readings", rows, shown, part, np.repeat(sigma, 3)[kept] * factor,
+                unit, (abscissae + _time(problem))[:4])  # fmt: skip
 
 
 def _time(problem: Problem) -> list[tuple[str, Array]]:
@@ -323,7 +316,8 @@ def draw_wall(wall: Wall, alone: str = BEFORE) -> str:
     Args:
         wall: residuals. alone: their colour where no effect accounts for a part of them.
     """
-    rows = _worth_showing(wall)
+    size = np.where(np.isfinite(wall.measured), wall.measured**2, 0.0).sum(axis=0)
+    rows = sorted(np.argsort(-size)[:_MOST_ROWS].tolist())
     names = [_in_lines(wall.names[k]) for k in rows]
     widest = max(len(line) for name in names for line in name.split("\n"))
     with styled():
@@ -373,14 +367,6 @@ class _Inner(MaxNLocator):
         return places[(places > vmin + room) & (places < vmax - room)]
 
 
-def _worth_showing(wall: Wall) -> list[int]:
-    count = wall.measured.shape[1]
-    with np.errstate(invalid="ignore"):
-        size = np.nanmean(np.where(np.isfinite(wall.measured), wall.measured**2, 0.0), axis=0)
-    worst = np.argsort(-size)[:_MOST_ROWS]
-    return sorted(int(k) for k in worst) if count > _MOST_ROWS else list(range(count))
-
-
 def _of_row(values: Array, k: int) -> Array:
     return values if values.ndim == 1 else values[:, k]
 
@@ -417,11 +403,9 @@ def _limits(values: list[Array], margin: float) -> tuple[float, float]:
     """From the least to the largest finite value and a part of that beyond."""
     every = np.concatenate([np.ravel(v) for v in values])
     every = every[np.isfinite(every)]
-    if len(every) == 0 or np.ptp(every) == 0.0:
-        middle = float(every[0]) if len(every) else 0.0
-        return middle - 0.5, middle + 0.5
-    room = margin * float(np.ptp(every))
-    return float(every.min()) - room, float(every.max()) + room
+    low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, 0.0)
+    room = margin * (high - low) or 0.5
+    return low - room, high + room
 
 
 def _panel(axes: Axes, x: Array, wall: Wall, k: int, alone: str) -> None:

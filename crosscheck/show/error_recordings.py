@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -29,7 +30,6 @@ from crosscheck.show.residuals import Misfit, drawn_words, predicted_poses
 from seecr.compiled.columns import REST
 from seecr.pose import Array
 from seecr.show import colours, layout, plots
-from seecr.show.colours import Rgba
 from seecr.show.plots import Legend, legend_of
 from seecr.show.scene import Scene, States, extent
 from seecr.show.stream import MODEL_STEP, POSE, Index, Recording, pose_index, recording_file
@@ -63,6 +63,16 @@ def _scene_view(shown: Misfit, name: str, aspect: float) -> rrb.Spatial3DView:
     robot = shown.problem.robot
     low, high = extent(robot, shown.seen)
     return layout.scene_view(robot, low, high, name, aspect)
+
+
+def _flat_view(
+    name: str, origin: str, across: tuple[float, float], down: tuple[float, float]
+) -> rrb.Spatial2DView:
+    """A view of a drawing within these ranges."""
+    return rrb.Spatial2DView(
+        name=name, origin=origin, background=rrb.Background(color=layout.GROUND),
+        visual_bounds=rrb.VisualBounds2D(x_range=across, y_range=down),
+    )  # fmt: skip
 
 
 def _pose_by_pose(recording: Recording, scene: Scene, shown: Misfit, state: State) -> rr.TimeColumn:
@@ -117,16 +127,13 @@ def _comparison_layout(shown: Misfit, name: str) -> rrb.Blueprint:
     for kind in shown.kinds:
         _numbers, names, curves = zip(*_errors_of(shown, kind), strict=True)
         legends.append(legend_of([np.stack(curves, axis=1)], names, _HALF))
-    root = rrb.Horizontal(
-        _scene_view(shown, name, 0.76),
-        rrb.Vertical(
-            *map_views(shown),
-            panels(shown, legends),
-            row_shares=[*[1.0] * many, float(many)],
-        ),
-        _texts(2.4, 2.0),
-        column_shares=[4.6, 3.8, 2.8],
+    maps_and_plots = rrb.Vertical(
+        *map_views(shown), panels(shown, legends), row_shares=[*[1.0] * many, float(many)]
     )
+    root = rrb.Horizontal(
+        _scene_view(shown, name, 0.76), maps_and_plots, _texts(2.4, 2.0),
+        column_shares=[4.6, 3.8, 2.8],
+    )  # fmt: skip
     return layout.blueprint(root)
 
 
@@ -173,14 +180,15 @@ def write_diagnosis_recording(found: Diagnosis, path: str | Path) -> None:
 def _diagnosis_layout(stages: Sequence[Stage], shown: Misfit, name: str) -> rrb.Blueprint:
     many = len(shown.kinds)
     low = bars_share(many, len(stages))
+    bars = _flat_view("rms error on test runs, logarithmic; the line is the noise", _BARS,
+                      (0.0, 100.0), (-1.0, many * _block_height(len(stages))))  # fmt: skip
     legends = [_model_legend(stages, shown, kind) for kind in shown.kinds]
     root = rrb.Horizontal(
         rrb.Vertical(
             _scene_view(shown, name, 1.22), panels(shown, legends), row_shares=[3.0, 1.3]
         ),
         rrb.Vertical(
-            *map_views(shown), _bars_view(many, len(stages)),
-            row_shares=[*[(1.0 - low) / many] * many, low],
+            *map_views(shown), bars, row_shares=[*[(1.0 - low) / many] * many, low],
         ),
         _texts(1.6, 2.0),
         column_shares=[5.0, 3.6, 2.8],
@@ -261,45 +269,40 @@ def _row_of_each(states: Sequence[State], k: int) -> States:
     return States(*(np.concatenate([getattr(one, n) for one in some]) for n in vars(some[0])))
 
 
-def _shades(misfit: Misfit, state: State, kind: Kind) -> colours.Colours:
-    """(k, 4) colours of the rows that count."""
-    sizes = np.nan_to_num(misfit.sizes(state, kind)[misfit.rows])
-    return colours.scale_colours(sizes, misfit.top(kind))
+def _shades(misfit: Misfit, states: list[State], kind: Kind) -> colours.Colours:
+    """(k, 4) colours of the rows that count, under one model after the other."""
+    sizes = [np.nan_to_num(misfit.sizes(state, kind)[misfit.rows]) for state in states]
+    return colours.scale_colours(np.concatenate(sizes), misfit.top(kind))
 
 
 def arrows(
     recording: Recording, index: Index, misfit: Misfit, states: list[State], size: float
 ) -> None:
     """At each time the errors of one model: arrows of position, or dots if none was read."""
-    rows, place = misfit.rows, misfit.place
-    count = [len(rows)] * len(states)
-    kind = misfit.kinds[0]
-    shade = np.concatenate([_shades(misfit, state, kind) for state in states])
-    origins = np.tile(place[rows], (len(states), 1))
+    rows = misfit.rows
+    style: Any
+    shade = _shades(misfit, states, misfit.kinds[0])
+    origins = np.tile(misfit.place[rows], (len(states), 1))
     if misfit.magnify:
         vectors = np.concatenate([misfit.magnify * misfit.errors(state)[rows] for state in states])
         columns = rr.Arrows3D.columns(origins=origins, vectors=vectors, colors=shade)
-        recording.rows("scene/errors", index, columns.partition(count))
-        recording.always("scene/errors", rr.Arrows3D.from_fields(radii=[_ARROW * size]))
+        style = rr.Arrows3D.from_fields(radii=[_ARROW * size])
     else:
         columns = rr.Points3D.columns(positions=origins, colors=shade)
-        recording.rows("scene/errors", index, columns.partition(count))
-        dots = rr.Points3D.from_fields(radii=[4.0 * _ARROW * size])
-        recording.always("scene/errors", dots)
+        style = rr.Points3D.from_fields(radii=[4.0 * _ARROW * size])
+    recording.rows("scene/errors", index, columns.partition([len(rows)] * len(states)))
+    recording.always("scene/errors", style)
 
 
 def maps(recording: Recording, index: Index, misfit: Misfit, states: list[State]) -> None:
     """One map per kind of reading, with dots coloured by the error."""
-    rows = misfit.rows
+    rows, count = misfit.rows, [len(misfit.rows)] * len(states)
+    flat = _flat(misfit, misfit.place)[rows]
+    points = np.tile(flat, (len(states), 1))
     for kind in misfit.kinds:
-        words = f"{misfit.top(kind):g} {kind.unit}"
-        draw_axes(recording, f"map/{kind.name}", _flat(misfit, misfit.place)[rows], words)
-    points = np.tile(_flat(misfit, misfit.place)[rows], (len(states), 1))
-    count = [len(rows)] * len(states)
-    for kind in misfit.kinds:
+        draw_axes(recording, f"map/{kind.name}", flat, f"{misfit.top(kind):g} {kind.unit}")
         entity = f"map/{kind.name}/errors"
-        shade = np.concatenate([_shades(misfit, state, kind) for state in states])
-        columns = rr.Points2D.columns(positions=points, colors=shade)
+        columns = rr.Points2D.columns(positions=points, colors=_shades(misfit, states, kind))
         recording.rows(entity, index, columns.partition(count))
         recording.always(entity, rr.Points2D.from_fields(radii=[_DOT]))
         if kind.name == "position" and misfit.magnify:
@@ -314,14 +317,9 @@ def maps(recording: Recording, index: Index, misfit: Misfit, states: list[State]
 
 def panels(misfit: Misfit, legends: Sequence[Legend]) -> rrb.Tabs:
     """The plots of the errors, one per kind of reading, each with its legend."""
-    return rrb.Tabs(
-        *(
-            plots.plot(
-                f"{kind.name.capitalize()} error [{kind.unit}]", [f"plot/{kind.name}/**"], legend
-            )
-            for kind, legend in zip(misfit.kinds, legends, strict=True)
-        )
-    )
+    titles = [f"{kind.name.capitalize()} error [{kind.unit}]" for kind in misfit.kinds]
+    entities = [[f"plot/{kind.name}/**"] for kind in misfit.kinds]
+    return rrb.Tabs(*map(plots.plot, titles, entities, legends))
 
 
 def cursor(recording: Recording, index: Index, misfit: Misfit) -> None:
@@ -343,19 +341,16 @@ def _flat(misfit: Misfit, vectors: Array) -> Array:
 def map_views(misfit: Misfit) -> list[rrb.Spatial2DView]:
     """The maps' views."""
     points = _flat(misfit, misfit.place)[misfit.rows]
-    across, down = bounds(points)
     plane = ", ".join("xyz"[k] for k in misfit.views[0])
     arrows = f", arrows {misfit.scale}" if misfit.magnify else ""
     return [
-        rrb.Spatial2DView(
-            name=f"{kind.name.capitalize()} error [{kind.unit}] over {plane} [m]"
+        _flat_view(
+            f"{kind.name.capitalize()} error [{kind.unit}] over {plane} [m]"
             + arrows * (kind.name == "position"),
-            origin=f"map/{kind.name}",
-            background=rrb.Background(color=layout.GROUND),
-            visual_bounds=rrb.VisualBounds2D(x_range=across, y_range=down),
+            f"map/{kind.name}", *bounds(points),
         )
         for kind in misfit.kinds
-    ]
+    ]  # fmt: skip
 
 
 def misfit_words(misfit: Misfit) -> Sequence[str]:
@@ -383,18 +378,6 @@ _DIM, _LABEL = 0.45, 2.2
 _POINTS, _TITLE, _COLUMN, _MOST = 5.2, 32.0, 1010.0, 0.6
 
 
-def _bars_view(kinds: int, models: int) -> rrb.Spatial2DView:
-    """The bars' view."""
-    return rrb.Spatial2DView(
-        name="rms error on test runs, logarithmic; the line is the noise",
-        origin=_BARS,
-        background=rrb.Background(color=layout.GROUND),
-        visual_bounds=rrb.VisualBounds2D(
-            x_range=(0.0, 100.0), y_range=(-1.0, kinds * _block_height(models))
-        ),
-    )
-
-
 def bars_share(kinds: int, models: int) -> float:
     """Height relative to a column in a window of 1080 points, with room for the labels.
 
@@ -416,7 +399,9 @@ def _bars_of(
     floor = kind.factor * (found.floor.get(kind.key) or 0.0)
     ends = _bar_ends(values, values, floor)
     rows = top + _TITLE_ROW + _ROW * (np.arange(len(stages)) + 0.5)
-    lit = np.array([_lit(stage, found) for stage in stages], dtype=np.uint8)
+    calm = found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
+    alone = colours.SILVER if calm else colours.VERMILION
+    lit = np.array([colours.SKY if one.added else alone for one in stages], dtype=np.uint8)
     root = f"{_BARS}/{kind.name}"
     strips = [np.array([[_BEGIN, y], [x, y]]) for x, y in zip(ends, rows, strict=True)]
     thick = 0.3 * _ROW
@@ -452,13 +437,6 @@ def _bar_ends(values: np.ndarray, every: np.ndarray, floor: float) -> np.ndarray
     return np.asarray(_BEGIN + (_END - _BEGIN) * np.clip(part, 0.01, 1.0))
 
 
-def _lit(stage: Stage, found: Diagnosis) -> Rgba:
-    if not stage.added:
-        calm = found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
-        return colours.SILVER if calm else colours.VERMILION
-    return colours.SKY
-
-
 # --- axes of maps ---------------------------------------------------------------------------------
 
 # Ticks of an axis; slices of the bar; radii of lines in points of the screen.
@@ -473,10 +451,8 @@ _TICK, _THICK, _WORDS = 0.02, 0.035, 0.27
 def bounds(points: Array) -> tuple[tuple[float, float], tuple[float, float]]:
     """Ranges of a view along both axes, for a map of points (n, 2)."""
     low, high, size = _box(points)
-    return (low[0] - _LEFT * size, high[0] + _RIGHT * size), (
-        low[1] - _ABOVE * size,
-        high[1] + _BELOW * size,
-    )
+    across = low[0] - _LEFT * size, high[0] + _RIGHT * size
+    return across, (low[1] - _ABOVE * size, high[1] + _BELOW * size)
 
 
 def draw_axes(recording: Recording, entity: str, points: Array, words: str) -> None:
@@ -486,23 +462,19 @@ def draw_axes(recording: Recording, entity: str, points: Array, words: str) -> N
     low, high, size = _box(points)
     corner = np.array([low[0], high[1]])
     tick = _TICK * size
-    lines = [np.array([corner, [high[0], high[1]]]), np.array([corner, [low[0], low[1]]])]
-    labels, places = [], []
-    for value in _round(low[0], high[0]):
-        lines.append(np.array([[value, high[1]], [value, high[1] + tick]]))
-        labels.append(f"{value:g}")
-        places.append((value, high[1] + tick))
-    for value in _round(-high[1], -low[1]):
-        lines.append(np.array([[low[0] - tick, -value], [low[0], -value]]))
-        labels.append(f"{value:g}")
-        # the viewer draws labels below their points
-        places.append((low[0] - 5.0 * tick, -value - 2.2 * tick))
+    right, up = _round(low[0], high[0]), _round(-high[1], -low[1])
+    lines = [np.array([corner, high]), np.array([corner, low])]
+    lines += [np.array([[value, high[1]], [value, high[1] + tick]]) for value in right]
+    lines += [np.array([[low[0] - tick, -value], [low[0], -value]]) for value in up]
     strips = rr.LineStrips2D(lines, radii=-_LINE, colors=colours.FRAME)
     recording.always(f"{entity}/axes", strips)
     _bar(recording, f"{entity}/scale", low, high, size)
-    x = high[0] + (_BAR + _WORDS) * size
-    ends = [(x, low[1] - 2.2 * tick), (x, high[1] - 2.2 * tick)]
-    recording.labels(f"{entity}/numbers", [*places, *ends], [*labels, words, "0"])
+    x, above = high[0] + (_BAR + _WORDS) * size, 2.2 * tick  # labels are below their points
+    places = [(value, high[1] + tick) for value in right]
+    places += [(low[0] - 5.0 * tick, -value - above) for value in up]
+    places += [(x, low[1] - above), (x, high[1] - above)]
+    numbers = [f"{value:g}" for value in (*right, *up)]
+    recording.labels(f"{entity}/numbers", places, [*numbers, words, "0"])
 
 
 def _bar(recording: Recording, entity: str, low: Array, high: Array, size: float) -> None:

@@ -30,8 +30,8 @@ from crosscheck.show.blocks import (
     codes,
     present,
 )
-from seecr.counted import counted
-from seecr.effects import Term, Terms
+from seecr.counted import counted, some
+from seecr.effects import Term
 from seecr.effects.base import Layout
 from seecr.effects.setup import Setup
 from seecr.units import in_unit, measured, parameter_name, short, with_error
@@ -67,19 +67,16 @@ def _values_in_brief(finding: MissingEffect, cables: Sequence[str]) -> str:
     seen = np.isfinite(finding.stderr) & ~layout.shape
     if not seen.any():
         return "its values are not determined by these data"
-    order = np.argsort(-np.where(seen, sizes, -1.0), kind="stable")
-    of_cable = _OF_CABLE.fullmatch(parameter_name(layout.names[order[0]], layout.units[order[0]]))
+    names = list(map(parameter_name, layout.names, layout.units))
+    k = int(np.argmax(np.where(seen, sizes, -1.0)))
+    of_cable = _OF_CABLE.fullmatch(names[k])
     if of_cable is not None and 1 <= int(of_cable["cable"]) <= len(cables):
-        k = int(order[0])
         along = f" along {of_cable['axis']}" if of_cable["axis"] else ""
         return f"largest at {cables[int(of_cable['cable']) - 1]}, {_value(finding, k)}{along}"
-    first = [k for k in range(len(layout.names)) if seen[k]]
-    parts = [
-        f"{parameter_name(layout.names[k], layout.units[k]).replace('_', ' ')} {_value(finding, k)}"
-        for k in first[:_MOST_IN_BRIEF]
+    each = [
+        f"{names[k].replace('_', ' ')} {_value(finding, k)}" for k in np.flatnonzero(seen).tolist()
     ]
-    more = len(first) - len(parts)
-    return ", ".join(parts) + (f" and {more} more" if more > 0 else "")
+    return some(each, _MOST_IN_BRIEF)
 
 
 def _value(finding: MissingEffect, k: int) -> str:
@@ -151,7 +148,12 @@ def correlations(found: Diagnosis, finding: MissingEffect) -> list[str]:
     """Parameters that the data hold together, the strongest first."""
     assert found.path is not None
     best = found.path.last.fit
-    every = _spoken(best.terms, finding.effect)
+    # as the cards' tables name them, those of other effects with whose they are
+    every = [
+        parameter_name(name, unit) + ("" if term.name == finding.effect else f" of {term.name}")
+        for term in best.terms
+        for name, unit in zip(term.layout.names, term.layout.units, strict=True)
+    ]
     own = np.flatnonzero(best.terms.own(finding.effect))
     correlation = best.correlation
     pairs = {
@@ -168,19 +170,10 @@ def correlations(found: Diagnosis, finding: MissingEffect) -> list[str]:
     return out
 
 
-def _spoken(terms: Terms, effect: str) -> list[str]:
-    """Parameters as the cards' tables name them, those of other effects with whose they are."""
-    return [
-        parameter_name(name, unit) + ("" if term.name == effect else f" of {term.name}")
-        for term in terms
-        for name, unit in zip(term.layout.names, term.layout.units, strict=True)
-    ]
-
-
 # --- effects that are not listed: how probable each is, and why -----------------------------------
 
-# On the terminal; diagnosis.json has the others.
-_MOST, _FILE = 6, "diagnosis.json"
+MOST_CANDIDATES, FILE = 6, "diagnosis.json"
+"""How many are told where there is little room, and what has all."""
 _ALONE = "explains by itself"
 _ALONE_MEANS = (
     "Explains by itself: the part of the error beyond the noise that the effect removes when it "
@@ -194,9 +187,9 @@ def candidate_lines(found: Diagnosis) -> Iterator[Block]:
     # what the user left out need not be said
     rows = [row for row in found.candidates if row.why_not.why is not Why.EXCLUDED]
     lines = [f"{row.effect}: {row.why_not}{_all_the_same(found, row)}" for row in rows]
-    yield Items(lines[:_MOST], "not ", "dim")
-    if len(rows) > _MOST:
-        yield Line(_others(found, rows[_MOST:]), "dim")
+    yield Items(lines[:MOST_CANDIDATES], "not ", "dim")
+    if len(rows) > MOST_CANDIDATES:
+        yield Line(_others(found, rows[MOST_CANDIDATES:]), "dim")
 
 
 def _all_the_same(found: Diagnosis, row: NotListed) -> str:
@@ -218,7 +211,7 @@ def _others(found: Diagnosis, rows: Sequence[NotListed]) -> str:
         said.append(f"{'others ' if named else ''}{probability_words(max(rest))} or less")
     of = f" ({probability_name(found)}: {', '.join(said)})" if named else ""
     most = f" (probability {said[0]})" if said and not named else of
-    return f"nor {counted(len(rows), 'other')}{most}: see candidates in {_FILE}"
+    return f"nor {counted(len(rows), 'other')}{most}: see candidates in {FILE}"
 
 
 def candidate_blocks(found: Diagnosis) -> list[Block]:

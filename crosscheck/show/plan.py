@@ -26,6 +26,7 @@ from crosscheck.show.blocks import (
     present,
     section,
 )
+from crosscheck.show.effect_figures import Confusion, draw_confusion, draw_sizes
 from crosscheck.show.residuals import facts_of, title_of
 from crosscheck.show.texts import printed
 from seecr.counted import some
@@ -44,8 +45,8 @@ def print_plan(plan: Plan, out: Path, files: Sequence[str] = ()) -> Iterator[Blo
         yield TextTable(
             ["effect", *_HEADS], rows, ["" if v.visible else "dim" for v in plan.effects]
         )
-    untestable = [f"{name}: {_UNTESTABLE}{why.words}" for name, why in plan.missing.items()]
-    yield Items(untestable, style="dim")
+    missing = plan.missing.items()
+    yield Items([f"{name}: {_UNTESTABLE}{why.words}" for name, why in missing], style="dim")
     if plan.slack:
         lines = [f"line {line} ({cable})" for line, cable in plan.slack]
         yield Line(
@@ -132,8 +133,6 @@ def _visible(plan: Plan) -> Iterator[Block | None]:
         "imitates it best would explain the data as well; without a diamond, another effect "
         "imitates it exactly at these poses."
     )
-    from crosscheck.show.effect_figures import draw_sizes
-
     yield section(
         "How small an effect can be", Figure(draw_sizes(plan.effects)), Line(words, "dim")
     )
@@ -154,22 +153,23 @@ def _card(number: int, item: Suggestion) -> Panel:
          *(f"{v:.3g}" for v in np.degrees(rotvec_from_quat(pose[3:])))]
         for pose in (() if item.poses is None else item.poses)
     ]  # fmt: skip
-    gains = Items([gain_words(gain) for gain in item.reached])
-    demand = None if item.demand is None else Line(item.demand.words, "dim")
-    table = TextTable(heads, poses) if poses else None
-    return Panel(f"{number}. {item.words}", present(gains, table, demand), "card")
+    blocks = present(
+        Items([gain_words(gain) for gain in item.reached]),
+        TextTable(heads, poses) if poses else None,
+        None if item.demand is None else Line(item.demand.words, "dim"),
+    )
+    return Panel(f"{number}. {item.words}", blocks, "card")
 
 
 def _confusion(plan: Plan) -> Panel | None:
     """Which effects that show could be mistaken for which."""
-    from crosscheck.show.effect_figures import Confusion, draw_confusion
-
     names, part = plan.confusion
-    seen = np.array([any(v.name == name and v.visible for v in plan.effects) for name in names])
-    if seen.sum() < 2:
+    visible = {one.name for one in plan.effects if one.visible}
+    seen = [k for k, name in enumerate(names) if name in visible]
+    if len(seen) < 2:
         return None
-    kept = tuple(name for name, shown in zip(names, seen, strict=True) if shown)
-    figure = Figure(draw_confusion(Confusion(kept, 0, part[np.ix_(seen, seen)])), wide=False)
+    confusion = Confusion(tuple(names[k] for k in seen), 0, part[np.ix_(seen, seen)])
+    figure = Figure(draw_confusion(confusion), wide=False)
     words = (
         "Percentage of the row's signal, over its expected sizes, that the column could imitate. "
         "Framed: they imitate each other."

@@ -80,7 +80,7 @@ def _cell(key: str, value: Any) -> Cell:
 def study_figure(found: Study, path: Path | None) -> Any:
     """A dot for each case: those within the limits blue, or all if there are none."""
     rows = found.records()
-    pairs = [pair for pair in _PAIRS if any(_number(row, pair[0]) for row in rows)]
+    pairs = [pair for pair in _PAIRS if any(isinstance(row.get(pair[0]), float) for row in rows)]
     with figure(path, 1, max(len(pairs), 1), figsize=(6.4 * max(len(pairs), 1), 4.2)) as axes:
         for k, pair in enumerate(pairs):
             _dots(axes[0, k], found, rows, pair)
@@ -89,14 +89,10 @@ def study_figure(found: Study, path: Path | None) -> Any:
     return axes[0, 0].figure
 
 
-def _number(row: dict[str, Any], key: str) -> bool:
-    return isinstance(row.get(key), float)
-
-
 def _dots(
     axes: Axes, found: Study, rows: list[dict[str, Any]], pair: tuple[str, str, str, str]
 ) -> None:
-    some = [row for row in rows if _number(row, pair[0]) and _number(row, pair[1])]
+    some = [row for row in rows if all(isinstance(row.get(key), float) for key in pair[:2])]
     scales, names = zip(*(_unit(key) for key in pair[:2]), strict=True)
     at = np.array([[row[key] for key in pair[:2]] for row in some]).reshape(-1, 2) * scales
     axes.scatter(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,19 +14,16 @@ from crosscheck.suite.effects import effect_failures, effects_line
 from crosscheck.suite.results import (
     QUANTITY_HEADS,
     TABLE_HEADS,
+    CaseResult,
     case_cells,
     failure_lines,
     widened_lines,
 )
-from crosscheck.suite.run import threshold_cells, verdict_line
+from crosscheck.suite.run import Run, threshold_cells, verdict_line
 from crosscheck.suite.verdicts import FINDINGS, Outcome, Verdict
 from seecr.counted import counted
 from seecr.description.robot import Robot
 from seecr.pose import Array, pose_difference, rxyz_from_quat
-
-if TYPE_CHECKING:
-    from crosscheck.suite.results import CaseResult
-    from crosscheck.suite.run import Run
 
 _STYLE = {Outcome.AGREE: "green", Outcome.DIFFER: "bold red", Outcome.NOT_CONVERGED: "bold yellow"}
 # Failures told on the terminal; summary.md and results.json have them all.

@@ -154,7 +154,8 @@ class _Reader:
             values = [at(column, _change, robot, column, given[column]) for column in columns]
             if values:
                 robot = at(columns[0], _changed, robot, kind, values)
-        model = at("model", self._model, given.get("model"), robot)
+        of_model = given.get("model")
+        model = None if of_model is None else at("model", load_model, self._path(of_model), robot)
         terms = [at(f"{name}.{next(iter(values))}", Term.of, robot, name, **values)
                  for name, values in at("an effect", _values_of, given).items()]  # fmt: skip
         effects = Terms([*getattr(model, "terms", ()), *terms]) if terms else model or Terms()
@@ -164,9 +165,9 @@ class _Reader:
         }  # fmt: skip
         grid = {"axes": at("grid", _axes, given["grid"], robot)} if "grid" in given else {}
         data, digits = at("data", self._read, do, given.get("data"), robot)
-        of_model = "" if model is None else digits_of(model.path)
         key = key_of([
-            full_version(), do, all_numbers(robot), digits, of_model, numbers, grid,
+            full_version(), do, all_numbers(robot), digits,
+            "" if model is None else digits_of(model.path), numbers, grid,
             [[term.name, term.vector] for term in terms],
         ])  # fmt: skip
         return StudyCase(name, do, robot, given, effects, data, numbers | grid, key)
@@ -184,9 +185,6 @@ class _Reader:
         if not cell:
             raise InputError("expected the path of an MJCF or the name of a shipped robot")
         return load_robot(self._path(cell))
-
-    def _model(self, cell: str | None, robot: Robot) -> Model | None:
-        return load_model(self._path(cell), robot) if cell else None
 
     def _read(self, do: str, cell: str | None, robot: Robot) -> tuple[str, list[str]]:
         """The name of a case's data, which are read once for each robot, and their digits."""

@@ -8,24 +8,21 @@ import math
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from crosscheck.settle.settler import SettlingBatch
 from seecr.files import Toml, path_of, plain, read_toml
 from seecr.pose import Array
-
-if TYPE_CHECKING:
-    from crosscheck.settle.settler import SettlingBatch
-    from seecr.statics.solution import Solution
-
+from seecr.statics.solution import Solution
 
 # The distance between two poses, by code that neither SEECR's nor MuJoCo's side uses.
 #
 # Both sides compute rotations with seecr.pose; an error there could cancel in a difference
-# computed with it. Here SciPy makes rotation matrices of the quaternions.
+# computed with it. Here SciPy rotates.
 
 
 def gap(pose_a: Array, pose_b: Array) -> tuple[Array, Array]:
@@ -35,25 +32,11 @@ def gap(pose_a: Array, pose_b: Array) -> tuple[Array, Array]:
     angle = np.full(distance.shape, np.nan)
     known = np.isfinite(a).all(axis=-1) & np.isfinite(b).all(axis=-1)
     if known.any():
-        angle[known] = _angle(_matrix(a[known]), _matrix(b[known]))
+        one, other = (
+            Rotation.from_quat(poses[known][:, 3:], scalar_first=True) for poses in (a, b)
+        )
+        angle[known] = (one.inv() * other).magnitude()
     return distance, angle
-
-
-def _matrix(poses: Array) -> Array:
-    """Rotation matrices (k, 3, 3) of poses (k, 7)."""
-    w, x, y, z = poses[:, 3:].T
-    return np.asarray(Rotation.from_quat(np.stack([x, y, z, w], axis=1)).as_matrix())
-
-
-def _angle(a: Array, b: Array) -> Array:
-    """Angle (k,) [rad] of the rotations from matrices a to b, both (k, 3, 3).
-
-    The chord ``|a - b|`` is 2 sqrt(2) sin(angle/2), which keeps the digits of small angles; the
-    trace, 1 + 2 cos(angle), determines large ones.
-    """
-    half_sine = np.sqrt(np.sum((a - b) ** 2, axis=(1, 2)) / 8.0)
-    half_cosine = np.sqrt(np.maximum(1.0 + np.einsum("kij,kij->k", a, b), 0.0)) / 2.0
-    return np.asarray(2.0 * np.arctan2(half_sine, half_cosine))
 
 
 QUANTITIES = {
@@ -285,7 +268,12 @@ def _merge(thresholds: Thresholds, path: Path) -> Thresholds:
         if not isinstance(values, dict):
             raise file.error(f"{table}: expected a table [{table}], got {values!r}", table)
         _check_names(file, values, vars(part), f"key of [{table}]")
-        parts[table] = replace(part, **{k: _value(file, table, k, v) for k, v in values.items()})
+        for key, value in values.items():
+            expected, fits = _KINDS[key]
+            if not fits(value):
+                raise file.error(f"[{table}] {key}: expected {expected}, got {value!r}", key)
+        of_kind = {key: type(getattr(part, key))(value) for key, value in values.items()}
+        parts[table] = replace(part, **of_kind)
     return replace(thresholds, **parts)
 
 
@@ -298,14 +286,6 @@ def _check_names(file: Toml, got: Iterable[str], known: Collection[str], what: s
             )
 
 
-def _value(file: Toml, table: str, key: str, value: Any) -> Any:
-    """A value in the form that the dataclasses hold, checked for the kind that its key needs."""
-    expected, fits, hold = _KINDS[key]
-    if not fits(value):
-        raise file.error(f"[{table}] {key}: expected {expected}, got {value!r}", key)
-    return hold(value)
-
-
 def _is_number(value: Any, kind: Any = int | float) -> bool:
     return isinstance(value, kind) and not isinstance(value, bool) and math.isfinite(value)
 
@@ -314,11 +294,11 @@ def _are_names(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(name, str) for name in value)
 
 
-_Kind = tuple[str, Callable[[Any], bool], Callable[[Any], Any]]
+_Kind = tuple[str, Callable[[Any], bool]]
 
 
 def _positive(most: float) -> _Kind:
-    return f"a positive number up to {most:.3g}", lambda v: _is_number(v) and 0 < v <= most, float
+    return f"a positive number up to {most:.3g}", lambda v: _is_number(v) and 0 < v <= most
 
 
 # Two physics that differ by a metre, half a turn or a kilonewton agree on no robot: a larger
@@ -327,7 +307,7 @@ _KINDS: dict[str, _Kind] = {
     "position_m": _positive(1.0),
     "orientation_rad": _positive(math.pi),
     "tension_N": _positive(1000.0),
-    "branches": ("a whole number from 0 on", lambda v: _is_number(v, int) and v >= 0, int),
-    "free_to_move": ('a list of names "CASE POSE"', _are_names, tuple),
-    "free_elsewhere": ("a share from 0 to 1", lambda v: _is_number(v) and 0 <= v <= 1, float),
+    "branches": ("a whole number from 0 on", lambda v: _is_number(v, int) and v >= 0),
+    "free_to_move": ('a list of names "CASE POSE"', _are_names),
+    "free_elsewhere": ("a share from 0 to 1", lambda v: _is_number(v) and 0 <= v <= 1),
 }

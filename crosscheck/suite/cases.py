@@ -71,17 +71,13 @@ def demobot_random(random: np.random.Generator, n: int, turn: float) -> Array:
     return poses
 
 
-def demobot_tilted(cable: str) -> Array:
-    """The command (7,) at which the parallel DemoBot on that cable has two equilibria."""
-    pose = np.array(_TILTED[cable])
-    pose[3:] /= np.linalg.norm(pose[3:])
-    return pose
-
-
 def robot_sweep(robot: Robot, n: int = N_SWEEP) -> Array:
     """A level line (n, 7) through the reference pose, along the robot's widest direction."""
     exits, middle = robot.exit_points, robot.reference_pose[:3]
-    spread = np.linalg.svd(_level(robot, exits - exits.mean(axis=0)), full_matrices=False)[2][0]
+    across = exits - exits.mean(axis=0)
+    if robot.gravity.any():  # what is level of it
+        across = across - np.outer(across @ robot.up, robot.up)
+    spread = np.linalg.svd(across, full_matrices=False)[2][0]
     along = (exits - middle) @ spread
     steps = np.linspace(_USER_REACH * min(along.min(), 0.0), _USER_REACH * max(along.max(), 0.0), n)
     poses = np.tile(robot.reference_pose, (n, 1))
@@ -112,13 +108,6 @@ def _turns(random: np.random.Generator, n: int, largest: float) -> Array:
     return np.asarray(axes * random.uniform(0.0, largest, (n, 1))) + 0.0
 
 
-def _level(robot: Robot, vectors: Array) -> Array:
-    """Vectors (k, 3) without their component along gravity."""
-    if not np.any(robot.gravity):
-        return vectors
-    return np.asarray(vectors - np.outer(vectors @ robot.up, robot.up))
-
-
 N_RANDOM = 200
 # Cogiro withstands moments: its random poses are rotated by up to this about a random axis.
 _COGIRO_TURN = np.deg2rad(12.0)
@@ -127,9 +116,9 @@ _COGIRO_TURN = np.deg2rad(12.0)
 _PLANAR_HALF_WIDTH = 0.15
 _PLANAR_TURN = np.deg2rad(8.0)
 _PLANAR_HEIGHTS = (-0.3, -0.15, 0.2, 0.4)
-# Robots of other sizes and kinds, with only a part of the number of random poses.
 # Files beside the shipped robots, each with a passive line of another kind.
 _PASSIVE = ("band", "spring", "counterweight")
+# Robots of other sizes and kinds, with only a part of the number of random poses.
 _OTHERS = ("cogiro_large", "ipanema", "camera")
 _FEWER = 8
 
@@ -307,7 +296,8 @@ def _tilted_case(cable: str) -> Case:
     Each start leads to one of the two, and each physics has to find the one that its start leads
     to.
     """
-    model, command = "demobot_parallel", demobot_tilted(cable)
+    model, command = "demobot_parallel", np.array(_TILTED[cable])
+    command[3:] /= np.linalg.norm(command[3:])
     starts = np.stack([command, load_robot(model_path(model)).reference_pose])
     commands = np.stack([command, command])
     return _case(f"parallel-{cable}-tilted", model, "starts", commands, cable, starts=starts)

@@ -152,8 +152,14 @@ class EffectCase:
     @property
     def term(self) -> Term:
         """The effect with its values, as a term."""
-        random = np.random.default_rng([self.seed, _number(self.effect)])
-        return _slow(choose(self.robot, random, [self.effect])[0])
+        # those contained in others come last, so that they shift no other's seed
+        order = [*(name for name in TRUE_EFFECTS if name not in CONTAINED), *CONTAINED]
+        random = np.random.default_rng([self.seed, order.index(self.effect)])
+        term = choose(self.robot, random, [self.effect])[0]
+        if self.effect != "creep":
+            return term
+        times = np.array([name == "time_s" for name in term.layout.names])
+        return replace(term, vector=np.where(times, _CREEP_TIME_S, term.vector))
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,18 +326,6 @@ def _seen(readings: Any) -> Array:
     return np.concatenate([readings.position, readings.quat_wxyz], axis=1)
 
 
-def _number(effect: str) -> int:
-    """The seed of an effect; those contained in others come last, so that they shift no other."""
-    return [*(name for name in TRUE_EFFECTS if name not in CONTAINED), *CONTAINED].index(effect)
-
-
-def _slow(term: Term) -> Term:
-    if term.name != "creep":
-        return term
-    times = np.array([name == "time_s" for name in term.layout.names])
-    return replace(term, vector=np.where(times, _CREEP_TIME_S, term.vector))
-
-
 @cache
 def _robot_and_commands(path: Path) -> tuple[Robot, Commands]:
     robot = load_robot(path)
@@ -378,23 +372,24 @@ def effects_line(results: Sequence[EffectResult]) -> str:
 
 def _counterparts(results: Sequence[EffectResult]) -> str:
     """How many effects are compared with what, in words."""
-    kinds = {
-        kind: {r.case.effect for r in results if r.case.against is kind} - {LOADS, CONTROL}
-        for kind in Counterpart
-    }
-    parts = [f"{kind.value} ({len(names)})" for kind, names in kinds.items() if names]
+    found = _by_counterpart(results)
+    counts = {kind: len(found.get(kind, {}).keys() - {LOADS, CONTROL}) for kind in Counterpart}
+    parts = [f"{kind.value} ({count})" for kind, count in counts.items() if count]
     return " and ".join(parts) or Counterpart.MUJOCO.value
 
 
 def against_line(results: Sequence[EffectResult]) -> str:
     """What seecr's mathematics was compared with: MuJoCo's own means, or our own, written again."""
-    kinds: dict[Counterpart, list[str]] = {}
+    found = _by_counterpart(results).items()
+    return " ".join(f"Checked against {kind.value}: {', '.join(names)}." for kind, names in found)
+
+
+def _by_counterpart(results: Sequence[EffectResult]) -> dict[Counterpart, dict[str, None]]:
+    """Names of effects, each once and in their order, by what they are compared with."""
+    out: dict[Counterpart, dict[str, None]] = {}
     for result in results:
-        kinds.setdefault(result.case.against, []).append(result.case.effect)
-    return " ".join(
-        f"Checked against {kind.value}: {', '.join(dict.fromkeys(names))}."
-        for kind, names in kinds.items()
-    )
+        out.setdefault(result.case.against, {})[result.case.effect] = None
+    return out
 
 
 def effect_text(result: EffectResult) -> str:

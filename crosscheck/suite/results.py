@@ -173,7 +173,12 @@ class CaseResult(Result):
             "worst": self.worst,
             "widened": np.flatnonzero(self.allowance.widened),
             "findings": self.findings,
-            "timing": _timing(self),
+            "timing": {
+                "seecr_us_per_pose": self.seecr_us,
+                "mujoco_settle_ms_per_pose": 1e3 * float(np.mean(self.settling.settle_s)),
+                "mujoco_polish_ms_per_pose": 1e3 * float(np.mean(self.settling.polish_s)),
+                "case_s": self.wall_s,
+            },
             "recording": self.recording,
             "ea_N": self.robot.ea,
             "command": case.poses,
@@ -198,29 +203,16 @@ def counts(count: Callable[[Verdict], int]) -> dict[str, int]:
     return {verdict.name.lower(): count(verdict) for verdict in Verdict}
 
 
-def _timing(result: CaseResult) -> dict[str, float]:
-    settling = result.settling
-    return {
-        "seecr_us_per_pose": result.seecr_us,
-        "mujoco_settle_ms_per_pose": 1e3 * float(np.mean(settling.settle_s)),
-        "mujoco_polish_ms_per_pose": 1e3 * float(np.mean(settling.polish_s)),
-        "case_s": result.wall_s,
-    }
-
-
 def remarks(result: CaseResult) -> str:
     """Counts of poses that do not simply agree, and of widened thresholds."""
-    parts = [_counted(result, verdict) for verdict in _SHORT if result.count(verdict)]
-    widened = int(result.allowance.widened.sum())
-    if widened:
+    parts = []
+    for verdict, words in _SHORT.items():
+        if count := result.count(verdict):
+            beyond = sum(one.beyond_limits for one in result.findings if one.verdict is verdict)
+            parts.append(f"{count} {words}{f' ({beyond} beyond limits)' if beyond else ''}")
+    if widened := int(result.allowance.widened.sum()):
         parts.append(f"{widened} widened")
     return ", ".join(parts)
-
-
-def _counted(result: CaseResult, verdict: Verdict) -> str:
-    beyond = sum(one.beyond_limits for one in result.findings if one.verdict is verdict)
-    too_many = f" ({beyond} beyond limits)" if beyond else ""
-    return f"{result.count(verdict)} {_SHORT[verdict]}{too_many}"
 
 
 def case_cells(result: CaseResult) -> list[str]:
@@ -272,8 +264,7 @@ def finding_lines(result: CaseResult) -> list[str]:
 
 def _line(result: CaseResult, finding: PoseFinding) -> str:
     limits = " (beyond the limits in thresholds.toml)" if finding.beyond_limits else ""
-    at = command_words(result, finding.pose)
-    return f"pose {finding.pose}, commanded {at}: {finding.text}{limits}"
+    return f"{_pose_words(result, finding.pose)}: {finding.text}{limits}"
 
 
 def case_line(result: CaseResult) -> str:
@@ -286,23 +277,25 @@ def case_line(result: CaseResult) -> str:
 
 def widened_lines(result: CaseResult) -> list[str]:
     """One line for each pose with widened thresholds."""
-    rows = [i for i, wide in enumerate(result.allowance.widened) if wide]
-    return [
-        f"pose {i}, commanded {command_words(result, i)}: allowed "
-        + ", ".join(
+    out = []
+    for i in np.flatnonzero(result.allowance.widened).tolist():
+        allowed = [
             f"{getattr(result.allowance, name)[i]:.1e} {_UNITS[name]} ({QUANTITY_NAMES[name]})"
             for name in QUANTITIES
+        ]
+        softest = result.solution.smallest_eigenvalue[i]
+        out.append(
+            f"{_pose_words(result, i)}: allowed {', '.join(allowed)}; the smallest stiffness there "
+            f"is {softest:.1e} N/m"
         )
-        + f"; the smallest stiffness there is {result.solution.smallest_eigenvalue[i]:.1e} N/m"
-        for i in rows
-    ]
+    return out
 
 
-def command_words(result: CaseResult, pose: int) -> str:
+def _pose_words(result: CaseResult, pose: int) -> str:
     """A commanded pose, position [m] and quaternion, and its start if that is elsewhere."""
     case = result.case
     begun = "" if case.starts is None else f", started at {_numbers(case.starts[pose])}"
-    return f"{_numbers(case.poses[pose])}{begun}"
+    return f"pose {pose}, commanded {_numbers(case.poses[pose])}{begun}"
 
 
 def _numbers(row: Array) -> str:
@@ -313,4 +306,4 @@ def _share(ratio: float) -> str:
     """A ratio as a percentage, with no more digits than it needs."""
     if ratio >= 10.0:
         return f"{ratio:.3g} times"
-    return f"{100 * ratio:.2g} % of" if ratio < 1.0 else f"{100 * ratio:.4g} % of"
+    return f"{100 * ratio:.{2 if ratio < 1.0 else 4}g} % of"

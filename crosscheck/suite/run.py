@@ -16,8 +16,8 @@ import numpy as np
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.given import GivenRobot
-from crosscheck.settle.prepared import ignored_note
-from crosscheck.settle.settler import Settler, settle_batch
+from crosscheck.settle.physics import ignored_note
+from crosscheck.settle.settler import settle_batch
 from crosscheck.suite.agreement import (
     Thresholds,
     allowances,
@@ -105,8 +105,11 @@ def _cases_of(
 ) -> Sequence[Case | EffectCase]:
     if isinstance(given, Case | EffectCase):
         return [given]
-    if isinstance(given, str) and not _is_robot(given):
-        return shipped_like(shipped, [given])
+    if isinstance(given, str):
+        # a robot's file, or the name of a shipped one, and not of a case
+        path = Path(given)
+        if not (given in model_names() or path.suffix.lower() == ".xml" or path.is_file()):
+            return shipped_like(shipped, [given])
     if isinstance(given, GivenRobot):
         return user_cases(given, seed=seed)
     raise _no_case(given)
@@ -116,12 +119,6 @@ def _no_case(got: object) -> InputError:
     return InputError(
         "expected cases, names of shipped ones, robots or their MJCF, got " + type(got).__name__
     )
-
-
-def _is_robot(name: str) -> bool:
-    """Whether a word is a robot's file or the name of a shipped one, and not of a case."""
-    path = Path(name)
-    return name in model_names() or path.suffix.lower() == ".xml" or path.is_file()
 
 
 FORMAT = 1
@@ -271,7 +268,11 @@ def run_case(case: Case, thresholds: Thresholds, record: Recorder | None = None)
         robot = replace(robot, ea=np.where(robot.driven, case.ea, robot.ea))
     solution, seecr_s = _solve(robot, case)
     mujoco = case.settler()
-    _check_same_cables(case, robot, mujoco)
+    if (m := mujoco.physics.n_cables) != robot.n_cables:
+        raise InputFileError(
+            f"{case.mujoco_model}: {counted(m, 'cable')}; expected {robot.n_cables} as in "
+            f"{case.model}"
+        )
     told = mujoco.paid_out(case.poses)
     settling = settle_batch(mujoco, case.begins, told)
     allowance = allowances(thresholds, solution, settling)
@@ -341,8 +342,9 @@ def run_suite(
     one = partial(run_case, thresholds=thresholds, record=record)
     order = sorted(range(len(poses)), key=lambda i: -len(poses[i]))
     count = min(jobs, len(chosen)) if executor is None else 1
-    if count > 1:
-        _warm_up(chosen[0])
+    if count > 1:  # the loop is compiled into the cache before several processes need it
+        robot = load_robot(chosen[0].model)
+        seecr_solve(robot, robot.reference_pose[None])
     try:
         with processes(count) as own:
             results = run_tasks(one, poses, executor or own, order, tell)
@@ -374,12 +376,6 @@ def package_versions() -> dict[str, str]:
     return found
 
 
-def _warm_up(case: Case | EffectCase) -> None:
-    """Compile the loop into the cache before several processes need it."""
-    robot = load_robot(case.model)
-    seecr_solve(robot, robot.reference_pose[None])
-
-
 def _solve(robot: Robot, case: Case) -> tuple[Solution, float]:
     seecr_solve(robot, case.poses[:1])
     best = np.inf
@@ -388,12 +384,3 @@ def _solve(robot: Robot, case: Case) -> tuple[Solution, float]:
         solution = seecr_solve(robot, case.poses, start=case.starts, threads=1)
         best = min(best, time.perf_counter() - began)
     return solution, best
-
-
-def _check_same_cables(case: Case, robot: Robot, mujoco: Settler) -> None:
-    m = mujoco.physics.n_cables
-    if m != robot.n_cables:
-        raise InputFileError(
-            f"{case.mujoco_model}: {counted(m, 'cable')}; expected {robot.n_cables} as in "
-            f"{case.model}"
-        )

@@ -5,23 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.settle.relaxation import SettleStatus
-from crosscheck.suite.agreement import Allowance, Differences, gap, within
+from crosscheck.settle.settler import Settler, SettlingBatch
+from crosscheck.suite.agreement import Allowance, Differences, FindingLimits, gap, within
+from crosscheck.suite.cases import Case
 from seecr.equilibrium.solving import solve as seecr_solve
 from seecr.pose import Array
-from seecr.statics.solution import Status
-
-if TYPE_CHECKING:
-    from crosscheck.settle.settler import Settler, SettlingBatch
-    from crosscheck.suite.agreement import FindingLimits
-    from crosscheck.suite.cases import Case
-    from seecr.statics.solution import Solution
-
+from seecr.statics.solution import Solution, Status
 
 # Residual force, relative to the load, below which a platform counts as free to move: as much as an
 # answer itself may have.
@@ -113,106 +108,67 @@ def judge_poses(answers: Answers) -> tuple[NDArray[np.object_], tuple[PoseFindin
 
 
 def _look_closer(answers: Answers, i: int, close: bool) -> PoseFinding | None:
-    status, settled = answers.solution.status[i], answers.settling[i].status
-    sentence = f"SEECR: {answers.solution.sentence(i)}; MuJoCo: {settled.value}"
+    """What each physics makes of the other's answer at a pose."""
+    solution, settling, told = answers.solution, answers.settling[i], answers.told[i]
+    status, robot = solution.status[i], answers.mujoco
+    sentence = f"SEECR: {solution.sentence(i)}; MuJoCo: {settling.status.value}"
     if status not in (Status.CONVERGED, Status.SINGULAR):
         return PoseFinding(i, Verdict.SEECR_UNSOLVED, sentence)
-    if settled is not SettleStatus.SETTLED:
+    if settling.status is not SettleStatus.SETTLED:
         return PoseFinding(i, Verdict.MUJOCO_UNSOLVED, sentence)
-    pair = _Pair.of(answers, i)
-    if pair.joined_by_a_free_motion:
-        return pair.finding(Verdict.NEUTRAL)
-    if close and status is Status.SINGULAR:
+    ours, theirs = solution.pose[i], settling.pose
+    again = robot.settle(ours, told)
+    free = settling.free_to_move or again.free_to_move
+    mujoco_stays = again.settled and _near(answers, i, again.pose, ours)
+    seecr_stays = _seecr_stays(answers, i, theirs, free)
+    confirmed = mujoco_stays and seecr_stays
+    energies = robot.energy(ours, told), robot.energy(theirs, told)
+    if free and confirmed and _joined_by_a_free_motion(answers, i, *energies):
+        verdict = Verdict.NEUTRAL
+    elif close and status is Status.SINGULAR:
         return PoseFinding(i, Verdict.SEECR_UNSOLVED, f"{sentence}, held in every direction")
-    if close:
+    elif close:
         return None
-    return pair.finding(Verdict.BRANCH if pair.two_equilibria else Verdict.DIFFERS)
+    else:
+        two = confirmed and not _near(answers, i, theirs, ours)
+        verdict = Verdict.BRANCH if two else Verdict.DIFFERS
+    gaps = answers.difference
+    apart = float(gaps.position_m[i]), float(gaps.orientation_rad[i]), float(gaps.tension_N[i])
+    text = (
+        f"{verdict.value}: {apart[0]:.2e} m, {apart[1]:.2e} rad and {apart[2]:.2e} N apart"
+        f"{'' if gaps.slack_same[i] else ', other cables slack'}; MuJoCo's energy is "
+        f"{energies[0]:.9g} J at SEECR's answer and {energies[1]:.9g} J at its own; from SEECR's "
+        f"answer MuJoCo {_stays(mujoco_stays)}, from MuJoCo's SEECR {_stays(seecr_stays)}"
+    )
+    return PoseFinding(i, verdict, text, *energies, mujoco_stays, seecr_stays, *apart)
 
 
-@dataclass(frozen=True)
-class _Pair:
-    """The two answers for one pose, each tried in the other physics."""
+def _joined_by_a_free_motion(answers: Answers, i: int, seecr_J: float, mujoco_J: float) -> bool:
+    """Whether the platform is balanced all the way from one answer to the other.
 
-    answers: Answers
-    i: int
-    mujoco_stays: bool
-    seecr_stays: bool
-    free: bool
-    energy_seecr: float
-    energy_mujoco: float
-
-    @classmethod
-    def of(cls, answers: Answers, i: int) -> _Pair:
-        mujoco, told = answers.mujoco, answers.told[i]
-        ours, theirs = answers.solution.pose[i], answers.settling[i].pose
-        again = mujoco.settle(ours, told)
-        free = answers.settling[i].free_to_move or again.free_to_move
-        return cls(
-            answers,
-            i,
-            mujoco_stays=again.settled and _near(answers, i, again.pose, ours),
-            seecr_stays=(_seecr_balances if free else _seecr_stays)(answers, i, theirs),
-            free=free,
-            energy_seecr=mujoco.energy(ours, told),
-            energy_mujoco=mujoco.energy(theirs, told),
-        )
-
-    @property
-    def joined_by_a_free_motion(self) -> bool:
-        """Whether the platform is balanced all the way from one answer to the other."""
-        answers, i = self.answers, self.i
-        if not (self.free and self.mujoco_stays and self.seecr_stays):
-            return False
-        tension = answers.difference.tension_N[i] <= answers.allowance.tension_N[i]
-        if not (tension and answers.difference.slack_same[i]):
-            return False
-        solution, theirs = answers.solution, answers.settling[i].pose
-        apart = abs(self.energy_seecr - self.energy_mujoco)
-        work = float(solution.tables.scale[i]) * solution.robot.length
-        if not apart <= _BALANCED * work:
-            return False
-        left = answers.mujoco.imbalance_between(theirs, solution.pose[i], answers.told[i])
-        return left <= max(_BALANCED, 10.0 * answers.settling[i].rounding)
-
-    @property
-    def two_equilibria(self) -> bool:
-        """Whether the answers are apart, and each physics confirms the other's."""
-        theirs, ours = self.answers.settling[self.i].pose, self.answers.solution.pose[self.i]
-        return (
-            self.mujoco_stays and self.seecr_stays and not _near(self.answers, self.i, theirs, ours)
-        )
-
-    def finding(self, verdict: Verdict) -> PoseFinding:
-        """The finding about the pair."""
-        difference, i = self.answers.difference, self.i
-        position = float(difference.position_m[i])
-        angle = float(difference.orientation_rad[i])
-        tension = float(difference.tension_N[i])
-        text = (
-            f"{verdict.value}: {position:.2e} m, {angle:.2e} rad and {tension:.2e} N apart"
-            f"{'' if difference.slack_same[i] else ', other cables slack'}; MuJoCo's energy is "
-            f"{self.energy_seecr:.9g} J at SEECR's answer and {self.energy_mujoco:.9g} J at its "
-            f"own; from SEECR's answer MuJoCo {_stays(self.mujoco_stays)}, from MuJoCo's SEECR "
-            f"{_stays(self.seecr_stays)}"
-        )
-        return PoseFinding(
-            i, verdict, text, self.energy_seecr, self.energy_mujoco,
-            self.mujoco_stays, self.seecr_stays, position, angle, tension,
-        )  # fmt: skip
+    The energies [J] are MuJoCo's at both.
+    """
+    same = answers.difference.tension_N[i] <= answers.allowance.tension_N[i]
+    if not (same and answers.difference.slack_same[i]):
+        return False
+    solution, settling = answers.solution, answers.settling[i]
+    work = float(solution.tables.scale[i]) * solution.robot.length
+    if not abs(seecr_J - mujoco_J) <= _BALANCED * work:
+        return False
+    left = answers.mujoco.imbalance_between(settling.pose, solution.pose[i], answers.told[i])
+    return left <= max(_BALANCED, 10.0 * settling.rounding)
 
 
-def _seecr_stays(answers: Answers, i: int, pose: Array) -> bool:
-    command = answers.solution.command[i : i + 1]
-    back = seecr_solve(answers.solution.robot, command, start=pose[None])
+def _seecr_stays(answers: Answers, i: int, pose: Array, free: bool) -> bool:
+    """Whether SEECR comes to rest where it starts, or is balanced there if it is free to move."""
+    given = answers.solution.robot, answers.solution.command[i : i + 1]
+    if free:
+        # With one evaluation nothing moves: the residual is that of the pose itself. A search could
+        # end anywhere on the free motion.
+        here = seecr_solve(*given, start=pose[None], max_iterations=1)
+        return bool(here.residual[0] <= _BALANCED)
+    back = seecr_solve(*given, start=pose[None])
     return back.status[0] is Status.CONVERGED and _near(answers, i, back.pose[0], pose)
-
-
-def _seecr_balances(answers: Answers, i: int, pose: Array) -> bool:
-    # With one evaluation nothing moves: the residual is that of the pose itself. A search could end
-    # anywhere on the free motion.
-    command = answers.solution.command[i : i + 1]
-    here = seecr_solve(answers.solution.robot, command, start=pose[None], max_iterations=1)
-    return bool(here.residual[0] <= _BALANCED)
 
 
 def _near(answers: Answers, i: int, pose_a: Array, pose_b: Array) -> bool:

@@ -6,7 +6,6 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from crosscheck.suite.agreement import thresholds_toml
 from crosscheck.suite.effects import (
     EFFECT_HEADS,
     GROUP,
+    EffectResult,
     against_line,
     effect_cells,
     effect_failures,
@@ -34,14 +34,10 @@ from crosscheck.suite.results import (
 from crosscheck.suite.run import Run, results_json, threshold_cells, verdict_line
 from crosscheck.suite.verdicts import FINDINGS, UNSOLVED, Outcome, Verdict
 from seecr.description.passive import write_pull
+from seecr.description.robot import Robot
 from seecr.errors import InputError, InputFileError
 from seecr.files import path_of, write_text, written
 from seecr.pose import Array
-
-if TYPE_CHECKING:
-    from crosscheck.suite.effects import EffectResult
-    from seecr.description.robot import Robot
-
 
 # The suite's results as `junit.xml`, which continuous integration shows as tests.
 
@@ -87,7 +83,12 @@ def _add(suite: ET.Element, group: str, result: CaseResult | EffectResult) -> No
     name, seconds = result.case.name, f"{result.wall_s:.3f}"
     case = ET.SubElement(suite, "testcase", classname=group, name=_clean(name), time=seconds)
     if isinstance(result, CaseResult):
-        message, wrong, found = remarks(result), failure_lines(result), _report(result)
+        message, wrong = remarks(result), failure_lines(result)
+        found = [
+            f"{QUANTITY_NAMES[key]}: {one.value:.3e}, allowed {one.allowed:.3e}, pose {one.pose}"
+            for key, one in result.worst.items()
+        ]
+        found += [*finding_lines(result), *widened_lines(result)]
     else:
         message = effect_text(result)
         wrong, found = [f"{name}: {message}"], [message]
@@ -96,14 +97,6 @@ def _add(suite: ET.Element, group: str, result: CaseResult | EffectResult) -> No
         said = _clean(f"{name}: {message}")
         ET.SubElement(case, tag, message=said, type=tag).text = _clean("\n".join(wrong))
     ET.SubElement(case, "system-out").text = _clean("\n".join(found))
-
-
-def _report(result: CaseResult) -> list[str]:
-    lines = [
-        f"{QUANTITY_NAMES[name]}: {worst.value:.3e}, allowed {worst.allowed:.3e}, pose {worst.pose}"
-        for name, worst in result.worst.items()
-    ]
-    return [*lines, *finding_lines(result), *widened_lines(result)]
 
 
 def _clean(text: str) -> str:
@@ -244,38 +237,31 @@ def write_worst_pose_mjcf(
     except (OSError, ET.ParseError) as error:
         raise InputFileError(f"{model_path}: cannot read this as XML: {error}") from None
     root = tree.getroot()
-    _set_springs(root, np.asarray(rest_lengths, float), np.asarray(ea, float), model_path)
-    if robot is not None:
-        _set_kinds(root, robot)
+    _set_springs(root, np.asarray(rest_lengths, float), np.asarray(ea, float), model_path, robot)
     _make_paths_absolute(root, model_path.resolve().parent)
     for old in root.findall("keyframe"):
         root.remove(old)  # MuJoCo opens the first keyframe; it has to be this one
-    ET.SubElement(
-        ET.SubElement(root, "keyframe"), "key", name=KEYFRAME, qpos=_numbers(np.asarray(qpos))
-    )
+    ET.SubElement(ET.SubElement(root, "keyframe"), "key", name=KEYFRAME, qpos=_numbers(qpos))
     ET.indent(tree)
     with written(path, failure="cannot write the MJCF") as (partial,):
         tree.write(partial, encoding="utf-8")
 
 
-def _set_springs(root: ET.Element, rest_lengths: Array, ea: Array, path: Path) -> None:
+def _set_springs(
+    root: ET.Element, rest_lengths: Array, ea: Array, path: Path, robot: Robot | None
+) -> None:
+    """Give tendons their rest lengths (m,) [m] and E S (m,) [N], or let a constant force pull."""
     tendons = root.findall("tendon/spatial")
     if len(tendons) != len(rest_lengths):
         raise InputFileError(
             f"{path}: expected {len(rest_lengths)} <spatial> tendons in the file itself, got "
             f"{len(tendons)}; put included tendons into it"
         )
-    for tendon, rest, stiff in zip(tendons, rest_lengths, ea, strict=True):
-        tendon.set("springlength", _numbers(np.array([0.0, rest])))
+    for i, (tendon, rest, stiff) in enumerate(zip(tendons, rest_lengths, ea, strict=True)):
+        pushes = robot is not None and robot.pushes[i]
+        tendon.set("springlength", _numbers([rest] if pushes else [0.0, rest]))
         tendon.set("stiffness", repr(float(stiff / rest)))
-
-
-def _set_kinds(root: ET.Element, robot: Robot) -> None:
-    """Let springs push that do, and pull tendons with a constant force."""
-    for i, tendon in enumerate(root.findall("tendon/spatial")):
-        if robot.pushes[i]:
-            tendon.set("springlength", tendon.get("springlength", "").split()[-1])
-        elif robot.constant_tension_N[i] > 0.0:
+        if robot is not None and robot.constant_tension_N[i] > 0.0:
             tendon.set("name", robot.cable_names[i])
             tendon.set("stiffness", "0")
             write_pull(root, robot.cable_names[i], float(robot.constant_tension_N[i]))
@@ -299,7 +285,7 @@ def _make_paths_absolute(root: ET.Element, folder: Path) -> None:
 _ASSETS = {"mesh", "texture", "hfield", "skin", "model"}
 
 
-def _numbers(values: Array) -> str:
+def _numbers(values: Iterable[float]) -> str:
     return " ".join(repr(float(v)) for v in values)
 
 

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from crosscheck.settle.physics import Index
+from crosscheck.settle.physics import Index, Parts
 from crosscheck.twin.robot import TrueRobot
 from seecr.pose import Array, quat_conjugate, quat_rotate
 
@@ -35,38 +35,30 @@ _NODE = "n{}_{}"
 _ACROSS = np.array([1.0, -1.0, 0.0, 0.0]) / np.sqrt(2.0)
 
 
-@dataclass(eq=False)
-class Places:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Places(Parts):
     """Indices of parts in the compiled model, per cable.
 
     Attributes:
-        platform: its body; n_platform: number of its coordinates, which come first. payload: a body
-            on it.
+        payload: a body on the platform. n_platform: number of its coordinates, which come first.
         exit_dofs: (m, 3) or (m, 0); slider_dofs: (m, 1) or (m, 0).
         node_dofs: (m, N - 1, 3).
         tendons: (m, N), the first is the one at the exit point.
-        exits, anchors: (m,) sites.
         node_bodies: (m, N - 1); end_bodies: (m,) point masses on the platform, or (m, 0).
         top_next: (m,) sites next to the exit points along the cables.
         tail: [m] of tendon behind the exit point when the winch's spring is at rest.
-        pushes, pulled: of passive lines, see :class:`crosscheck.settle.physics.Parts`.
     """
 
-    platform: int
     payload: int
     n_platform: int
     exit_dofs: Index
     slider_dofs: Index
     node_dofs: Index
     tendons: Index
-    exits: Index
-    anchors: Index
     node_bodies: Index
     end_bodies: Index
     top_next: Index
     tail: float
-    pushes: tuple[int, ...]
-    pulled: tuple[tuple[int, int, int, float], ...]
 
 
 def build(true: TrueRobot, segments: int = 1) -> tuple[mujoco.MjModel, Places]:
@@ -96,11 +88,6 @@ def tail_of(true: TrueRobot) -> float:
         return 0.0
     reference = true.robot.reference_pose[None]
     return float(np.mean(true.robot.nominal_lengths(reference)))
-
-
-def _yields(true: TrueRobot) -> bool:
-    """Whether exit points are on springs of their own."""
-    return max(true.compliance, true.compliance_up) > 0 and true.pulley_radius == 0
 
 
 def _slides(true: TrueRobot) -> bool:
@@ -151,13 +138,14 @@ def _give_mass(body: mujoco.MjsBody, mass: float, length: float) -> None:
 def _add_exit(spec: mujoco.MjSpec, true: TrueRobot, i: int) -> None:
     """Parts at and behind an exit point: its site, a sheave, a winch, each if needed."""
     carrier, origin = spec.worldbody, true.exit_points[i]
-    if _yields(true):
+    soft = () if true.pulley_radius else _soft_axes(true)
+    if soft:
         carrier = spec.worldbody.add_body(name=f"x{i}", pos=origin)
         origin = np.zeros(3)
         _give_mass(carrier, _SMALL_MASS * true.mass, true.robot.length)
-        for axis, soft in _soft_axes(true):
+        for axis, by in soft:
             joint = carrier.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-            joint.stiffness = [1.0 / soft, 0.0, 0.0]
+            joint.stiffness = [1.0 / by, 0.0, 0.0]
     carrier.add_site(name=f"a{i}", pos=origin)
     winch = origin - tail_of(true) * true.up
     if _slides(true):
@@ -258,15 +246,13 @@ def _hang_springs(model: mujoco.MjModel, true: TrueRobot) -> None:
 def _places(model: mujoco.MjModel, true: TrueRobot, segments: int) -> Places:
     m = true.n_cables
 
-    def dofs(name: str) -> list[int]:
-        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
-        if body < 0:
-            return []
-        first = model.body_dofadr[body]
-        return list(range(first, first + model.body_dofnum[body]))
-
     def number(kind: mujoco.mjtObj, name: str) -> int:
         return int(mujoco.mj_name2id(model, kind, name))
+
+    def dofs(name: str) -> list[int]:
+        at = number(body, name)
+        first = model.body_dofadr[at]
+        return [] if at < 0 else list(range(first, first + model.body_dofnum[at]))
 
     site, body = mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_BODY
     nodes = [[_NODE.format(i, j) for j in range(1, segments)] for i in range(m)]

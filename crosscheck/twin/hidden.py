@@ -118,14 +118,11 @@ def choose(
     ]
     if tensions and free and random.random() < _ALSO:
         drawn.append(_with_numbers(layout_of(_OF_TENSIONS, robot), robot, random))
-    return [_alike_both_ways(one) if "pulley_radius" in names else one for one in drawn]
-
-
-def _alike_both_ways(hidden: Term) -> Term:
-    """With sheaves, MuJoCo's truth only has frames with the same compliance both ways."""
-    if hidden.name != "frame_compliance":
-        return hidden
-    return Term(hidden.layout, np.full(2, hidden.vector[0]))
+    # with sheaves, MuJoCo's truth only has frames with the same compliance both ways
+    alike = {"frame_compliance"} if "pulley_radius" in names else set()
+    return [
+        Term(one.layout, np.full(2, one.vector[0])) if one.name in alike else one for one in drawn
+    ]
 
 
 def _wanted(names: Sequence[str], lacking: Mapping[str, str]) -> str:

@@ -15,8 +15,8 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.data import Measurements, Names, Sigma
 from crosscheck.twin.hidden import Moves, times
 from crosscheck.twin.measure import Truth, measure
-from crosscheck.twin.own import simulated, with_laws
-from seecr.commands import Loads
+from crosscheck.twin.robot import TRUE_EFFECTS
+from seecr.commands import Commands, Loads
 from seecr.description.joints import locked, motion_columns, pose_of_values
 from seecr.description.robot import Robot
 from seecr.effects import Effect, Term
@@ -24,10 +24,12 @@ from seecr.pose import (
     Array,
     pose_add,
     pose_difference,
+    quat_conjugate,
     quat_from_rotvec,
     quat_multiply,
     rxyz_from_quat,
 )
+from seecr.prediction.experiment import predict
 
 # Commands as a person would measure: sweeps to and fro, and a tilted loop, scaled to a robot.
 
@@ -175,16 +177,16 @@ class Lab:
         """The truth at commands, with lengths off by the noise of the winches."""
         errors = None
         if self.stated.length_m is not None:
-            noise = random_of(self.seed, 3, self.commanded).standard_normal(
-                (case.n_rows, case.n_cables)
-            )
-            errors = self.stated.length_m * noise
-        commands, (known, own) = case.as_commands(self.robot), simulated(effects)
+            random = random_of(self.seed, 3, self.commanded)
+            errors = self.stated.length_m * random.standard_normal((case.n_rows, case.n_cables))
+        commands = case.as_commands(self.robot)
+        own = [effect for effect in effects if effect.name not in TRUE_EFFECTS]
+        known = [effect for effect in effects if effect not in own]
         truth = measure(
             self.robot, commands, known, length_errors=errors,
             progress=lambda rows: self.tell(rows, now),
         )  # fmt: skip
-        return with_laws(truth, self.robot, commands, known, own) if own else truth
+        return _with_laws(truth, self.robot, commands, known, own) if own else truth
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,9 +216,7 @@ class Measured:
         return hidden if not again or len(hidden) == len(self.alone) else set()
 
 
-def random_of(
-    seed: int, stream: int, commanded: tuple[int, ...] = ()
-) -> np.random.Generator:  # fmt: skip
+def random_of(seed: int, stream: int, commanded: tuple[int, ...] = ()) -> np.random.Generator:
     """Random numbers for one purpose: the noise does not depend on what is hidden."""
     return np.random.default_rng([seed, stream, *commanded])
 
@@ -282,10 +282,12 @@ def rest_of(
             continue
         sigma = _sigma(lab, plain)
         alone = [_made_visible(lab, case, one, plain, sigma, enlarged) for one in hidden]
-        if any(one is None for one in alone):
-            continue
         fine = [one for one in alone if one is not None]
-        truth = _together(lab, case, fine, plain)
+        if len(fine) < len(alone):
+            continue
+        truth = fine[0][1] if fine else plain
+        if len(fine) > 1:
+            truth = lab.measure(case, [one.effect() for one, _ in fine], "both effects")
         at_rest = truth.at_rest & plain.at_rest
         if _mostly(at_rest):
             return Measured(case, plain, truth, sigma, fine, at_rest, turning(lab.robot))
@@ -301,13 +303,6 @@ def rest_of(
 def _mostly(at_rest: NDArray[np.bool_]) -> bool:
     """Whether few rows are left out; a platform that does not rest cannot be measured."""
     return float(np.mean(at_rest)) >= _AT_REST
-
-
-def _together(lab: Lab, case: Measurements, alone: list[tuple[Term, Truth]], plain: Truth) -> Truth:
-    """The truth with all effects."""
-    if len(alone) < 2:
-        return alone[0][1] if alone else plain
-    return lab.measure(case, [one.effect() for one, _ in alone], "both effects")
 
 
 def sweeps(robot: Robot, points: int, extent: float, seed: int) -> Measurements:
@@ -394,3 +389,37 @@ def read_of(made: Measured, random: np.random.Generator) -> Measurements:
         notes=(),
         **anew,
     )
+
+
+# Effects of users' own act by their own law: MuJoCo has no means for what nobody foretold.
+#
+# It brings the robot to rest with all other hidden effects. What an own effect adds is the
+# difference that its law makes in SEECR's prediction, with the same other effects on both sides.
+
+
+def _with_laws(
+    truth: Truth, robot: Robot, commands: Commands, known: Sequence[Effect], own: Sequence[Effect]
+) -> Truth:
+    """MuJoCo's answers with ``known`` effects, and what own ones change in them."""
+    before = predict(robot, commands, known)
+    after = predict(robot, commands, [*known, *own])
+    was, now = before.readings, after.readings
+    there = np.hstack([truth.position, truth.quat_wxyz])
+    poses = (np.hstack([one.position, one.quat_wxyz]) for one in (was, now))
+    read = _moved(there, *poses)
+    return replace(
+        truth,
+        pose=_moved(truth.pose, before.pose, after.pose),
+        tensions=truth.tensions + after.tensions - before.tensions,
+        at_rest=truth.at_rest & before.solved & after.solved,
+        position=read[:, :3],
+        quat_wxyz=read[:, 3:],
+        tension_readings=truth.tension_readings + now.tensions - was.tensions,
+    )
+
+
+def _moved(poses: Array, before: Array, after: Array) -> Array:
+    """Poses (n, 7) shifted and turned in the base frame as others are from before to after."""
+    turn = quat_multiply(after[:, 3:], quat_conjugate(before[:, 3:]))
+    place = poses[:, :3] + after[:, :3] - before[:, :3]
+    return np.hstack([place, quat_multiply(turn, poses[:, 3:])])

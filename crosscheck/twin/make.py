@@ -185,13 +185,21 @@ def make_twin(
         notes=(*robot.notes, *(() if given is None else given.notes)),
     )
     if out is not None:
-        _write(twin, path, Path(out), None if given is None else given.path)
+        # commands made in Python name a file that need not be there
+        read = [given.path] if given is not None and given.path.exists() else []
+        with staged(Path(out), read=read) as folder:
+            write_measurements(folder / "measured.csv", twin.measured)
+            copy_robot(path, folder / "robot.xml", robot)
+            write_text(folder / NAME, seal(twin.answer))
     return twin
 
 
 def _answer(made: Measured, robot: Robot, seed: int, sigma: Sigma) -> Answer:
     import mujoco
 
+    # MuJoCo has no means for effects of users' own
+    own = [one.name for one, _ in made.alone if one.name not in TRUE_EFFECTS]
+    law = f"; {', '.join(own)} by its own law in SEECR" if own else ""
     return Answer(
         robot=robot.name,
         seed=seed,
@@ -200,20 +208,5 @@ def _answer(made: Measured, robot: Robot, seed: int, sigma: Sigma) -> Answer:
         all_move_over_noise=made.moves(made.truth),
         sigma=sigma.stated,
         poses=int(np.sum(made.at_rest)),
-        truth=_truth(f"MuJoCo {mujoco.__version__}", [one.name for one, _ in made.alone]),
+        truth=f"MuJoCo {mujoco.__version__}{law}",
     )
-
-
-def _truth(mujoco: str, hidden: Sequence[str]) -> str:
-    """What measured a twin: MuJoCo, and the laws of effects that it has no means for."""
-    own = [name for name in hidden if name not in TRUE_EFFECTS]
-    return f"{mujoco}; {', '.join(own)} by its own law in SEECR" if own else mujoco
-
-
-def _write(twin: Twin, robot_path: Path, out: Path, commands: Path | None) -> None:
-    # commands made in Python name a file that need not be there
-    read = [commands] if commands is not None and commands.exists() else []
-    with staged(out, read=read) as folder:
-        write_measurements(folder / "measured.csv", twin.measured)
-        copy_robot(robot_path, folder / "robot.xml", twin.robot)
-        write_text(folder / NAME, seal(twin.answer))

@@ -136,7 +136,7 @@ def paid_out(true: TrueRobot, path: Waypoints, temperature: Array | None) -> Arr
     """
     absolute = path.lengths is not None and not path.told
     if path.lengths is None:
-        told = _straight_change(true, path.pose)
+        told = _straight(true, path.pose) - _straight(true, true.robot.reference_pose[None])
     else:
         told = path.lengths - (0.0 if absolute else true.robot.rest_lengths)
     turned = told
@@ -157,12 +157,8 @@ def paid_out(true: TrueRobot, path: Waypoints, temperature: Array | None) -> Arr
     return np.asarray(paid)
 
 
-def _straight_change(true: TrueRobot, poses: Array) -> Array:
-    """Straight lengths of the described robot minus those at its reference, (N, m) [m]."""
-    return _straight(true, poses) - _straight(true, true.robot.reference_pose[None])
-
-
 def _straight(true: TrueRobot, poses: Array) -> Array:
+    """Straight lengths (N, m) [m] of the described robot."""
     robot = true.robot
     anchors = transform_points(poses, robot.anchor_points)
     return np.asarray(np.linalg.norm(anchors - robot.exit_points, axis=-1))
@@ -386,7 +382,9 @@ def _start(world: World, bare: World, pose: Array, springs: Springs) -> bool:
     """Bring the platform to rest from a pose; cables with weight get theirs afterwards."""
     bare.set_springs(springs)
     bare.place(pose)
-    if not _moves_to_rest(bare):
+    # MuJoCo's own dynamics, damped, from there
+    tolerance = max(_AT_REST, 10.0 * bare.rounding())
+    if come_to_rest(bare, tolerance, _MAX_STEPS).status is not SettleStatus.SETTLED:
         return False
     if bare is not world:
         if world.true.pulley_radius:
@@ -398,7 +396,6 @@ def _start(world: World, bare: World, pose: Array, springs: Springs) -> bool:
 
 def _settle(world: World, springs: Springs, judge: bool = True, limit: int = _LIMIT) -> Descent:
     """Polish, or go downhill; chains over sheaves repeat that until their free parts are right."""
-    found = _NOWHERE
     for _ in range(_SHARES):
         world.set_springs(springs)
         found = descend(world, judge, limit)
@@ -410,12 +407,6 @@ def _settle(world: World, springs: Springs, judge: bool = True, limit: int = _LI
         if change < _SHARE:
             break
     return found if world.wraps else _NOWHERE
-
-
-def _moves_to_rest(world: World) -> bool:
-    """MuJoCo's own dynamics, damped, from where the platform is placed."""
-    tolerance = max(_AT_REST, 10.0 * world.rounding())
-    return come_to_rest(world, tolerance, _MAX_STEPS).status is SettleStatus.SETTLED
 
 
 def _note(world: World, out: _Rows, k: int, found: Descent) -> None:

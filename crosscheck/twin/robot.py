@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -125,7 +126,7 @@ def true_robot(robot: Robot, effects: Sequence[Effect] = (), apart: bool = True)
     )
     for effect in effects:
         if effect.name in _SENSING:
-            true.sensors.append(_SENSING[effect.name](effect))
+            true.sensors.append(partial(_SENSING[effect.name], effect))
         elif effect.name in _BODILY:
             _BODILY[effect.name](true, effect)
         else:
@@ -176,23 +177,9 @@ def _zero_pose(true: TrueRobot, effect: Any) -> None:
     true.zero_pose = np.concatenate([true.zero_pose[:3] + effect.position, turned])
 
 
-def _hysteresis(true: TrueRobot, effect: Any) -> None:
-    true.hysteresis += effect.amplitude
-    true.hysteresis_stretch = effect.stretch
-
-
-def _creep(true: TrueRobot, effect: Any) -> None:
-    true.creep += effect.amount
-    true.creep_time = effect.time
-
-
 def _tilt(true: TrueRobot, effect: Any) -> None:
     turn = quat_from_rotvec(np.array([effect.tilt_x, effect.tilt_y, 0.0]))
     true.gravity = quat_rotate(turn, true.gravity)
-
-
-def _thermal(true: TrueRobot, effect: Any) -> None:
-    true.expansion, true.zero_temperature = effect.expansion, effect.zero_temperature
 
 
 def _eccentricity(true: TrueRobot, effect: Any) -> None:
@@ -211,6 +198,16 @@ def _add(**parameters: str) -> Callable[[TrueRobot, Any], None]:
     return act
 
 
+def _set(**parameters: str) -> Callable[[TrueRobot, Any], None]:
+    """An effect whose parameters are the robot's numbers of these names."""
+
+    def act(true: TrueRobot, effect: Any) -> None:
+        for name, parameter in parameters.items():
+            setattr(true, name, getattr(effect, parameter))
+
+    return act
+
+
 def _stiffen(true: TrueRobot, effect: Any) -> None:
     true.ea = true.ea * effect.factor
 
@@ -223,37 +220,23 @@ def _wrench(true: TrueRobot, effect: Any) -> None:
     true.wrench = true.wrench + np.concatenate([effect.force, effect.moment])
 
 
-def _frame(effect: Any) -> Sensor:
-    def read(reading: Reading) -> Reading:
-        position, quat, tensions = reading
-        turn = quat_from_rotvec(effect.rotation)
-        return quat_rotate(turn, position) + effect.shift, quat_multiply(turn, quat), tensions
-
-    return read
+def _frame(effect: Any, reading: Reading) -> Reading:
+    position, quat, tensions = reading
+    turn = quat_from_rotvec(effect.rotation)
+    return quat_rotate(turn, position) + effect.shift, quat_multiply(turn, quat), tensions
 
 
-def _target(effect: Any) -> Sensor:
-    def read(reading: Reading) -> Reading:
-        position, quat, tensions = reading
-        turned = quat_multiply(quat, quat_from_rotvec(effect.rotation))
-        return position + quat_rotate(quat, effect.shift), turned, tensions
-
-    return read
+def _target(effect: Any, reading: Reading) -> Reading:
+    position, quat, tensions = reading
+    turned = quat_multiply(quat, quat_from_rotvec(effect.rotation))
+    return position + quat_rotate(quat, effect.shift), turned, tensions
 
 
-def _scale(effect: Any) -> Sensor:
-    return lambda reading: (effect.factor * reading[0], reading[1], reading[2])
-
-
-def _tension_scale(effect: Any) -> Sensor:
-    return lambda reading: (reading[0], reading[1], effect.factor * reading[2])
-
-
-_SENSING: dict[str, Callable[[Any], Sensor]] = {
+_SENSING: dict[str, Callable[[Any, Reading], Reading]] = {
     "tracker_frame": _frame,
     "tracker_target": _target,
-    "tracker_scale": _scale,
-    "tension_scale": _tension_scale,
+    "tracker_scale": lambda effect, read: (effect.factor * read[0], read[1], read[2]),
+    "tension_scale": lambda effect, read: (read[0], read[1], effect.factor * read[2]),
 }
 
 _BODILY: dict[str, Callable[[TrueRobot, Any], None]] = {
@@ -263,7 +246,7 @@ _BODILY: dict[str, Callable[[TrueRobot, Any], None]] = {
     "length_scale": _add(gain="factor"),
     "drum_eccentricity": _eccentricity,
     "backlash": _add(backlash="gap"),
-    "thermal_expansion": _thermal,
+    "thermal_expansion": _set(expansion="expansion", zero_temperature="zero_temperature"),
     "pulley_radius": _add(pulley_radius="radius"),
     "exit_point_error": _add(exit_points="error"),
     "anchor_point_error": _add(anchor_points="error"),
@@ -272,8 +255,8 @@ _BODILY: dict[str, Callable[[TrueRobot, Any], None]] = {
     "nonlinear_elasticity": _add(quadratic="quadratic", cubic="cubic"),
     "winch_side_length": _add(winch_side="length"),
     "cable_weight": _add(cable_weight="weight"),
-    "hysteresis": _hysteresis,
-    "creep": _creep,
+    "hysteresis": _set(hysteresis="amplitude", hysteresis_stretch="stretch"),
+    "creep": _set(creep="amount", creep_time="time"),
     "exit_friction": _add(friction="friction", winch_side="length"),
     "frame_compliance": _add(compliance="sideways", compliance_up="upwards"),
     "platform_mass": _add(mass="added"),

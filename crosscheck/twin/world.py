@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.settle.newton import minimise, neutral_stiffness, stiffness
-from crosscheck.settle.physics import Index, Parts, Physics, Together
+from crosscheck.settle.physics import Index, Physics, Together
 from crosscheck.twin.build import Places, build
 from crosscheck.twin.cable import Springs, hang
 from crosscheck.twin.robot import TrueRobot
@@ -36,8 +36,7 @@ class World(Physics):
         self.true, self.segments = true, segments
         model, self.places = build(true, segments)
         places = self.places
-        parts = Parts(places.platform, places.exits, places.anchors, places.pushes, places.pulled)
-        super().__init__(model, parts, true.robot.length)
+        super().__init__(model, places, true.robot.length)
         hubs = np.concatenate([places.exit_dofs, places.slider_dofs], axis=1)
         nodes = places.node_dofs.reshape(true.n_cables, -1)
         self.cable_dofs = np.concatenate([hubs, nodes], axis=1)
@@ -97,17 +96,13 @@ class World(Physics):
             poly = springs.poly[:, k, None] / part ** (k + 2)
             model.tendon_stiffnesspoly[at, k] = poly / self.mass_unit
         self._rest = springs.rest
-        if n > 1:
-            self._set_weight(free / n)
-
-    def _set_weight(self, segment: Array) -> None:
-        """Lump the weight of segments (m,) [m]: half of each at either end."""
-        g = float(np.linalg.norm(self.true.gravity))
-        mass = self.true.cable_weight * segment / g / self.mass_unit
-        self.model.body_mass[self.places.node_bodies] = mass[:, None]
-        self.model.body_mass[self.places.end_bodies] = 0.5 * mass
-        mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
-        self._segment_weight = self.true.cable_weight * segment
+        if n > 1:  # half of a segment's weight is at either end
+            self._segment_weight = self.true.cable_weight * free / n
+            g = float(np.linalg.norm(self.true.gravity))
+            mass = self._segment_weight / g / self.mass_unit
+            model.body_mass[self.places.node_bodies] = mass[:, None]
+            model.body_mass[self.places.end_bodies] = 0.5 * mass
+            mujoco.mj_setConst(model, mujoco.MjData(model))
 
     def carry(self, mass: float, centre: Array, wrench: Array) -> None:
         """Attach a payload to the platform, and apply a known wrench in addition to its own.
@@ -132,21 +127,14 @@ class World(Physics):
 
     def _string(self) -> None:
         """Put point masses where a chain hangs between its ends."""
-        end = self.data.site_xpos[self.parts.anchors]
-        free = self._rest * self.free_share
+        start, end = self.exit_points(), self.data.site_xpos[self.parts.anchors]
+        # straight cables leave exit points, or about sheaves' tangents
+        start = start + (1.0 - self.free_share)[:, None] * (end - start)
         up = -self.true.gravity / np.linalg.norm(self.true.gravity)
-        weight = self.true.cable_weight * up
-        start = self._leaves_towards(end)
+        free, weight = self._rest * self.free_share, self.true.cable_weight * up
         nodes = hang(start, end, free, self.true.ea, weight, self.segments)
         # a free platform has one more number in qpos than coordinates
         self.data.qpos[self.places.node_dofs + (1 if self.is_free else 0)] = nodes
-
-    def _leaves_towards(self, ends: Array) -> Array:
-        """Where straight cables to points (m, 3) leave: exit points, or about sheaves' tangents."""
-        start = self.exit_points().copy()
-        if self.true.pulley_radius:
-            start += (1.0 - self.free_share)[:, None] * (ends - start)
-        return start
 
     def update(self) -> None:
         """Update poses, sheaves and cable lengths to the present qpos."""
