@@ -104,7 +104,8 @@ class SettlingBatch(tuple[Settling, ...]):
     __slots__ = ()
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("_") or not (name in _FIELDS or hasattr(Settling, name)):
+        known = name in Settling.__dataclass_fields__ or hasattr(Settling, name)
+        if name.startswith("_") or not known:
             raise AttributeError(f"a settling has no {name}")
         values = [getattr(one, name) for one in self]
         if name == "status":
@@ -128,9 +129,6 @@ class SettlingBatch(tuple[Settling, ...]):
             "simulated_s": self.simulated_s,
             "status": self.status,
         }
-
-
-_FIELDS = frozenset(Settling.__dataclass_fields__)
 
 
 class Settler:

@@ -199,8 +199,7 @@ def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
                 cases.append(_case(f"{name}-z{z:.2f}", model, "sweep", demobot_sweep(z), cable))
             cases.append(_case(f"{name}-turned", model, "sweep", demobot_turned_sweep(), cable))
             cases.append(_case(f"{name}-random", model, "random", random, cable, **named))
-    cases += [_tilted_case(cable) for cable in CABLES]
-    cases.append(_inverted_case())
+    cases += [*map(_tilted_case, CABLES), _inverted_case()]
     for robot in ("two_cable", "vertical", "horizontal"):
         cases += _planar_cases(robot)
     for robot, turn in (("uneven", 0.0), ("off_centre", _COGIRO_TURN)):
