@@ -78,15 +78,6 @@ def test_the_page_of_public_names_is_current_and_has_them_all() -> None:
     assert "\nJoint(kind: str, name: str, axis: Array, point: Array, ball: bool = False)\n" in page
 
 
-def test_one_line_of_a_docstring_may_explain_several_names() -> None:
-    words = "Args:\n    a: the first. b, c: others,\n        further down.\n    d: a last: one."
-    shown = "- `a`: the first.\n- `b`, `c`: others, further down.\n- `d`: a last: one.\n"
-    assert list(make_api.as_markdown(words, "abcd")) == [shown]
-    assert list(make_api.as_markdown("Returns:\n    a :class:`X`,\n    or none.", "")) == [
-        "Returns: a `X`, or none.\n"
-    ]
-
-
 def test_the_picture_of_the_floors_is_current_and_shows_each_room() -> None:
     drawn = draw_floors.PICTURE.read_text(encoding="utf-8")
     assert draw_floors.picture() == drawn, AGAIN

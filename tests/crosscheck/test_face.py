@@ -104,16 +104,6 @@ def test_a_plan_is_of_poses_too() -> None:
         crosscheck.make_plan(ROBOT, [[1.0, 2.0]])
 
 
-def test_what_is_no_model_and_no_data_is_refused() -> None:
-    data = data_file()
-    with pytest.raises(seecr.InputError, match=r"Term\.of\(robot, name.*, got 'stiffness'$"):
-        crosscheck.compare(ROBOT, data, model=["stiffness"])  # type: ignore[list-item]
-    with pytest.raises(seecr.InputError, match=r"^expected measurements or their files, got int$"):
-        crosscheck.compare(ROBOT, 3)  # type: ignore[arg-type]
-    with pytest.raises(seecr.InputError, match=r"^expected a robot, the path .* got NoneType$"):
-        crosscheck.diagnose(None, data)  # type: ignore[arg-type]
-
-
 def test_what_was_found_is_the_next_model() -> None:
     """As terms, as a model and as a file; what is left is noise in each."""
     robot = seecr.load_robot(ROBOT)

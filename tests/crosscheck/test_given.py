@@ -64,6 +64,13 @@ BAD: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: crosscheck.load_measurements("m.csv", ROBOT, sigma=cast(Any, {"position": 1.0})),
         "sigma: expected a crosscheck.Sigma, such as .* got dict",
     ),
+    "a name for a model": (
+        lambda: crosscheck.compare(ROBOT, DATA, model=cast(Any, ["stiffness"])),
+        r"Term\.of\(robot, name.*, got 'stiffness'$",
+    ),
+    "no robot": (
+        lambda: crosscheck.diagnose(cast(Any, None), DATA), r"expected a robot, .* got NoneType$",
+    ),
     "a diagnosis": (
         lambda: crosscheck.compare(ROBOT, DATA, cast(Any, made_diagnoses.none())),
         "expected a model, .*, got Diagnosis; its .model is one",

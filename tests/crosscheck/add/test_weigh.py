@@ -279,25 +279,6 @@ def test_a_fit_that_cannot_be_solved_adds_nothing() -> None:
         add_effects(ROBOT, data, [huge])
 
 
-def test_warnings_of_several_parameters_are_in_the_plural() -> None:
-    """Once "gain_1, gain_2 is up to 9 times its expected size"."""
-    gains = {f"gain_{i}": 0.1 for i in (1, 2)}
-    one, two = (
-        " ".join(weigh._warnings_of(ROBOT, fitted("drum_gain", **dict(list(gains.items())[:k]))))
-        for k in (1, 2)
-    )
-    assert one.startswith("drum_gain: gain_1 is ")
-    assert two.startswith("drum_gain: gain_1, gain_2 are up to ")
-    assert "times its expected size: check it on" in one and "up to" not in one
-    assert "times their expected sizes: check them on" in two
-    known = Term.of(ROBOT, "drum_gain").measured(**dict.fromkeys(gains, (0.01, 1e-4)))
-    known = known.with_vector(np.zeros(8))
-    off = Fitted(known, np.full(8, 1e-4), np.zeros(8, dtype=bool))
-    assert "gain_1, gain_2 are up to 100 standard errors from" in " ".join(
-        weigh._warnings_of(ROBOT, off)
-    )
-
-
 def test_what_a_tracker_throws_far_off_is_left_out_neighbours_as_well() -> None:
     """From one row in twenty on all were kept: the model was "3.8 times the noise" off."""
     data = measured(ROBOT, [term(ROBOT, "stiffness", factor=1.3)])

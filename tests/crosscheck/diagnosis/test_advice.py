@@ -150,11 +150,8 @@ def test_checks_name_totals(effect: str, values: dict[str, float], expected: str
     ("effect", "values", "error", "expected"),
     [
         ("pulley_radius", {"radius_m": 0.0099}, 2.3e-6, "a radius of 9.90 mm"),
-        ("pulley_radius", {"radius_m": 0.0099}, 2.3e-3, "a radius of 10 mm"),
         ("platform_mass", {"added_kg": 0.047}, 2e-4, "expect 0.4470 kg, not 0.4000"),
-        ("platform_mass", {"added_kg": 0.047}, 0.02, "expect 0.45 kg, not 0.40"),
         ("stiffness", {"factor": 1.512}, 0.1, "expect E S = 450 N, not 300"),
-        ("stiffness", {"factor": 1.512}, 0.01, "expect E S = 454 N, not 300"),
         ("stiffness", {"factor": 6.0}, 6.0, "expect E S = 2000 N, not 300"),
         ("centre_of_mass", {"shift_z_m": -0.01}, 1.5e-3, "(0, 0, -10) mm of its frame"),
         ("cable_length_offset", {"offset_2_m": 0.01}, 1.5e-3, "the largest +10 mm (offset_2: "),
