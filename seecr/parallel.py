@@ -8,7 +8,6 @@ one they run in this process, with the same results.
 
 from __future__ import annotations
 
-import asyncio
 import hashlib
 import logging
 import os
@@ -201,6 +200,8 @@ def cluster(address: str, tell: Callable[[str], None]) -> Iterator[Executor]:
         MissingPackageError: distributed is not installed.
         InputError: there is no scheduler.
     """
+    import asyncio  # takes a while, and only this needs it
+
     try:
         from distributed import Client, rpc
     except ModuleNotFoundError as error:

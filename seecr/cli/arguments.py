@@ -35,7 +35,6 @@ from seecr.effects.base import unfed
 from seecr.equilibrium.strange import strained_rows, strange, walked_in_steps
 from seecr.pose import NORM_TOLERANCE
 from seecr.statics.starts import commanded_poses
-from seecr.workspace.maps import MOST_POSES, axis_of
 
 _COUNT = 24  # poses of --line
 
@@ -140,29 +139,35 @@ def check_places(places: ArrayLike, robot: Robot) -> None:
         )
 
 
-def _check_count(option: str, poses: int, most: int = MOST_POSES, cure: str = "") -> None:
+def _check_count(option: str, poses: int, most: int | None = None, cure: str = "") -> None:
     """That there are not more poses than can be solved.
 
     Raises:
         InputError: there are.
     """
+    from seecr.workspace.maps import MOST_POSES  # takes a while to import
+
+    most = MOST_POSES if most is None else most
     if poses > most:
         raise InputError(f"{option}: expected at most {most:.0e} poses, got {poses:.1e}{cure}")
 
 
 def axes_of(
     texts: Sequence[str], robot: Robot, directions: NDArray[np.float64] | None = None,
-    most: int = MOST_POSES, cure: str = "",
+    most: int | None = None, cure: str = "",
 ) -> list[NDArray[np.float64]]:  # fmt: skip
     """The axes of a grid, along x, y and z or along directions (3, 3) in rows.
 
     Args:
         texts: each as :func:`axis_of` takes it. robot: as described. directions: see above.
-        most: poses that are accepted. cure: what to do about more, for the error.
+        most: poses that are accepted, by default as many as fit into memory.
+        cure: what to do about more, for the error.
 
     Raises:
         InputError: one that is none, or far outside the robot; more poses than can be solved.
     """
+    from seecr.workspace.maps import axis_of  # takes a while to import
+
     axes = [axis_of(text, "--grid") for text in texts]
     _check_count("--grid", math.prod(map(len, axes)), most, cure)
     places = np.array([[axis[k] for axis in axes] for k in (0, -1)])

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,9 +44,11 @@ from seecr.statics.tables import (
     spanless,
     take,
 )
-from seecr.statics.verification import Verification, verification_of
 from seecr.statics.vibration import modes_of
 from seecr.units import joules, millimetres
+
+if TYPE_CHECKING:
+    from seecr.statics.verification import Verification
 
 
 class Status(Enum):
@@ -266,6 +268,8 @@ class Solution(Result):
             >>> found.verify().holds.all()
             np.True_
         """
+        from seecr.statics.verification import verification_of  # scipy.spatial takes a while
+
         return verification_of(self)
 
     def rows(self, index: ArrayLike) -> Solution:
