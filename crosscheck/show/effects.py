@@ -14,7 +14,7 @@ from crosscheck.show.blocks import Block, Items, Line, TextTable
 from crosscheck.show.texts import printed
 from seecr.description.robot import Robot
 from seecr.effects import BUILT_IN, PLACES, Effect, known, layout_of
-from seecr.result import Record
+from seecr.result import Record, rows_of
 from seecr.units import in_unit, parameter_name, shown
 
 EACH = {
@@ -43,15 +43,11 @@ def _parameters(effect: type[Effect], robot: Robot | None) -> list[Record]:
         return [_parameter(f.name, f.metadata) for f in fields(effect)]
     layout = layout_of(effect, robot)
     words = [size_words(f.metadata) for f in fields(effect) for _ in range(layout.count(f.name))]
-    rows = zip(
-        layout.names, layout.units, layout.null.tolist(), layout.lower.tolist(),
-        layout.upper.tolist(), layout.scale.tolist(), layout.shape.tolist(), words, strict=True,
-    )  # fmt: skip
-    keys = (
-        "name", "unit", "absent", "lower", "upper", "plausible_size", "shapes_the_others",
-        "plausible_size_words",
-    )  # fmt: skip
-    return [dict(zip(keys, row, strict=True)) for row in rows]
+    return rows_of({
+        "name": layout.names, "unit": layout.units, "absent": layout.null, "lower": layout.lower,
+        "upper": layout.upper, "plausible_size": layout.scale, "shapes_the_others": layout.shape,
+        "plausible_size_words": words,
+    })  # fmt: skip
 
 
 def _parameter(name: str, metadata: Mapping[str, Any]) -> Record:

@@ -128,7 +128,7 @@ def true_robot(robot: Robot, effects: Sequence[Effect] = (), apart: bool = True)
         if effect.name in _SENSING:
             true.sensors.append(partial(_SENSING[effect.name], effect))
         elif effect.name in _BODILY:
-            _BODILY[effect.name](true, effect)
+            true = replace(true, **_BODILY[effect.name](true, effect))
         else:
             raise CrosscheckError(
                 f"effect {effect.name}: MuJoCo cannot simulate it; expected one of "
@@ -172,52 +172,27 @@ def _passive_apart(true: TrueRobot) -> TrueRobot:
 _OF_CABLES = ("exit_points", "anchor_points", "ea", "offset", "gain")
 
 
-def _zero_pose(true: TrueRobot, effect: Any) -> None:
-    turned = quat_multiply(quat_from_rotvec(effect.rotation), true.zero_pose[3:])
-    true.zero_pose = np.concatenate([true.zero_pose[:3] + effect.position, turned])
-
-
-def _tilt(true: TrueRobot, effect: Any) -> None:
-    turn = quat_from_rotvec(np.array([effect.tilt_x, effect.tilt_y, 0.0]))
-    true.gravity = quat_rotate(turn, true.gravity)
-
-
-def _eccentricity(true: TrueRobot, effect: Any) -> None:
-    true.run_out.append((effect.sine, effect.cosine, effect.drum_radius))
-
-
-def _add(**parameters: str) -> Callable[[TrueRobot, Any], None]:
+def _add(**parameters: str) -> Callable[[TrueRobot, Any], dict[str, Any]]:
     """An effect that adds its parameters, by the names of the robot's numbers."""
 
-    def act(true: TrueRobot, effect: Any) -> None:
+    def changed(true: TrueRobot, effect: Any) -> dict[str, Any]:
+        out = {}
         for name, parameter in parameters.items():
             value, more = getattr(true, name), getattr(effect, parameter)
-            more = np.reshape(more, np.shape(value)) if np.ndim(more) else more
-            setattr(true, name, value + more)
+            out[name] = value + (np.reshape(more, np.shape(value)) if np.ndim(more) else more)
+        return out
 
-    return act
-
-
-def _set(**parameters: str) -> Callable[[TrueRobot, Any], None]:
-    """An effect whose parameters are the robot's numbers of these names."""
-
-    def act(true: TrueRobot, effect: Any) -> None:
-        for name, parameter in parameters.items():
-            setattr(true, name, getattr(effect, parameter))
-
-    return act
+    return changed
 
 
-def _stiffen(true: TrueRobot, effect: Any) -> None:
-    true.ea = true.ea * effect.factor
+def _zero_pose(true: TrueRobot, effect: Any) -> dict[str, Any]:
+    turned = quat_multiply(quat_from_rotvec(effect.rotation), true.zero_pose[3:])
+    return {"zero_pose": np.concatenate([true.zero_pose[:3] + effect.position, turned])}
 
 
-def _stiffen_ropes(true: TrueRobot, effect: Any) -> None:
-    true.ea = np.where(true.robot.driven, effect.factor * true.ea, true.ea)
-
-
-def _wrench(true: TrueRobot, effect: Any) -> None:
-    true.wrench = true.wrench + np.concatenate([effect.force, effect.moment])
+def _tilt(true: TrueRobot, effect: Any) -> dict[str, Any]:
+    turn = quat_from_rotvec(np.array([effect.tilt_x, effect.tilt_y, 0.0]))
+    return {"gravity": quat_rotate(turn, true.gravity)}
 
 
 def _frame(effect: Any, reading: Reading) -> Reading:
@@ -239,31 +214,42 @@ _SENSING: dict[str, Callable[[Any, Reading], Reading]] = {
     "tension_scale": lambda effect, read: (read[0], read[1], effect.factor * read[2]),
 }
 
-_BODILY: dict[str, Callable[[TrueRobot, Any], None]] = {
+# What each effect changes of the robot's numbers.
+_BODILY: dict[str, Callable[[TrueRobot, Any], dict[str, Any]]] = {
     "cable_length_offset": _add(offset="offset"),
     "initial_pose_error": _zero_pose,
     "drum_gain": _add(gain="gain"),
     "length_scale": _add(gain="factor"),
-    "drum_eccentricity": _eccentricity,
+    "drum_eccentricity": lambda true, effect: {
+        "run_out": [*true.run_out, (effect.sine, effect.cosine, effect.drum_radius)],
+    },
     "backlash": _add(backlash="gap"),
-    "thermal_expansion": _set(expansion="expansion", zero_temperature="zero_temperature"),
+    "thermal_expansion": lambda _true, effect: {
+        "expansion": effect.expansion, "zero_temperature": effect.zero_temperature,
+    },
     "pulley_radius": _add(pulley_radius="radius"),
     "exit_point_error": _add(exit_points="error"),
     "anchor_point_error": _add(anchor_points="error"),
-    "stiffness": _stiffen_ropes,
-    "cable_stiffness": _stiffen,
+    "stiffness": lambda true, effect: {
+        "ea": np.where(true.robot.driven, effect.factor * true.ea, true.ea),
+    },
+    "cable_stiffness": lambda true, effect: {"ea": true.ea * effect.factor},
     "nonlinear_elasticity": _add(quadratic="quadratic", cubic="cubic"),
     "winch_side_length": _add(winch_side="length"),
     "cable_weight": _add(cable_weight="weight"),
-    "hysteresis": _set(hysteresis="amplitude", hysteresis_stretch="stretch"),
-    "creep": _set(creep="amount", creep_time="time"),
+    "hysteresis": lambda _true, effect: {
+        "hysteresis": effect.amplitude, "hysteresis_stretch": effect.stretch,
+    },
+    "creep": lambda _true, effect: {"creep": effect.amount, "creep_time": effect.time},
     "exit_friction": _add(friction="friction", winch_side="length"),
     "frame_compliance": _add(compliance="sideways", compliance_up="upwards"),
     "platform_mass": _add(mass="added"),
     "centre_of_mass": _add(centre_of_mass="shift"),
-    "external_wrench": _wrench,
+    "external_wrench": lambda true, effect: {
+        "wrench": true.wrench + np.concatenate([effect.force, effect.moment]),
+    },
     "gravity_tilt": _tilt,
-}
+}  # fmt: skip
 
 TRUE_EFFECTS = (*_BODILY, *_SENSING)
 """Names of the effects that a twin can hide."""
