@@ -9,13 +9,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from hoses import Heavier, Hose
-from made_data import measured
+from made_data import measured, printed
 
 import crosscheck
 import seecr
-from crosscheck.cli import main
 from seecr.effects import registry
 
 ROBOT = seecr.load_robot("demobot_cogiro")
@@ -181,34 +179,28 @@ def test_values_of_an_instance_are_checked(effect: Hose, words: str) -> None:
 # --- the command line -----------------------------------------------------------------------------
 
 
-def call(*words: object, status: int = 0) -> str:
-    run = CliRunner().invoke(main, [str(word) for word in words])
-    assert run.exit_code == status, run.output
-    return run.output
-
-
 @pytest.mark.slow
 def test_commands_take_it_from_its_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     own = ("--effect", f"{FILE}:Hose")
-    text = call("twin", "demobot_cogiro", "--hide", 7, *own, "--out", "case")
+    text = printed("twin", "demobot_cogiro", "--hide", 7, *own, "--out", "case")
     assert f"measured.csv --effect {FILE}:Hose" in text
     assert f"twin --open case --effect {FILE}:Hose" in text
     files = ("case/robot.xml", "case/measured.csv")
-    said = call(
+    said = printed(
         "diagnose", *files, *own, "--only", "hose", "--no-recording", "--model-out", "m.toml"
     )
     assert "28 of" not in said and "hose: a hose that pulls" in said
-    assert "Model and data agree" in call("compare", *files, "--model", "m.toml", *own)
-    assert "Written to n.toml: hose" in call("add", "hose", *files, "--model", "n.toml", *own)
-    assert "hose" in call("effects", *own) and "your own" in call("effects", "hose", *own)
-    opened = call("twin", "--open", "case", *own)
+    assert "Model and data agree" in printed("compare", *files, "--model", "m.toml", *own)
+    assert "Written to n.toml: hose" in printed("add", "hose", *files, "--model", "n.toml", *own)
+    assert "hose" in printed("effects", *own) and "your own" in printed("effects", "hose", *own)
+    opened = printed("twin", "--open", "case", *own)
     assert "pull = " in opened and opened.endswith(f"measured.csv --effect {FILE}:Hose\n")
     fresh_catalogue()  # as in another process
-    unnamed = call("twin", "--open", "case")
+    unnamed = printed("twin", "--open", "case")
     assert "pull_N = " in unnamed
     assert "hose: of a file of its own; --effect FILE.py:CLASS names it, here and" in unnamed
-    refused = call("twin", "--open", "case", "--effect", "pulley_radius", status=2)
+    refused = printed("twin", "--open", "case", "--effect", "pulley_radius", status=2)
     assert "leave out all other options but --json and --effect FILE.py:CLASS" in refused
 
 
@@ -240,7 +232,7 @@ def test_a_damaged_file_is_one_sentence(
     text, given, words = DAMAGED[what]
     Path("x.py").write_text(text, encoding="utf-8")
     crosscheck.write_measurements("m.csv", data)
-    out = call("diagnose", "demobot_cogiro", "m.csv", "--effect", given, status=2)
+    out = printed("diagnose", "demobot_cogiro", "m.csv", "--effect", given, status=2)
     assert out.count("\n") == 1
     assert re.search(words, out), out
 
@@ -248,7 +240,7 @@ def test_a_damaged_file_is_one_sentence(
 def test_two_of_one_name_are_refused(tmp_path: Path) -> None:
     other = tmp_path / "another.py"
     other.write_text(GOOD, encoding="utf-8")
-    out = call("effects", "--effect", f"{FILE}:Hose", "--effect", f"{other}:Hose", status=2)
+    out = printed("effects", "--effect", f"{FILE}:Hose", "--effect", f"{other}:Hose", status=2)
     assert "are both called hose; expected a name of its own for each" in out
 
 

@@ -99,17 +99,22 @@ def case(
     return xml, data
 
 
-def run(*arguments: object) -> Result:
-    """The command line; anything but an exit is a failure."""
+def run(*arguments: object, status: int | None = None) -> Result:
+    """The command line; anything but an exit, or another status than a given one, is a failure."""
     result = CliRunner().invoke(main, [str(a) for a in arguments])
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    assert status in (None, result.exit_code), result.output
     return result
+
+
+def printed(*arguments: object, status: int = 0) -> str:
+    """What the command line prints."""
+    return run(*arguments, status=status).output
 
 
 def refused(*arguments: object, status: int = 2) -> str:
     """The one line of a refusal."""
-    result = run(*arguments)
-    assert result.exit_code == status, result.output
+    result = run(*arguments, status=status)
     assert result.stdout == ""
     assert result.stderr.startswith("crosscheck: ")
     assert result.stderr.count("\n") == 1

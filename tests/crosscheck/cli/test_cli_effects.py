@@ -13,16 +13,14 @@ from seecr.effects import catalogue, layout_of
 
 
 def test_all_effects_are_listed_with_their_place() -> None:
-    result = run("effects")
-    assert result.exit_code == 0, result.output
+    result = run("effects", status=0)
     for name, effect in catalogue().items():
         (line,) = [row for row in result.stdout.splitlines() if row.split()[:1] == [name]]
         assert effect.place in line and effect.title in line
 
 
 def test_one_effect_has_its_formula_and_its_size_for_a_robot() -> None:
-    result = run("effects", "pulley_radius", "--robot", COGIRO)
-    assert result.exit_code == 0, result.output
+    result = run("effects", "pulley_radius", "--robot", COGIRO, status=0)
     assert "r (pi - psi)" in result.stdout
     layout = layout_of(catalogue()["pulley_radius"], load_robot(COGIRO))
     assert f"expected size {1e3 * layout.scale[0]:.3g} mm" in result.stdout
@@ -50,8 +48,7 @@ def test_parameters_have_units_and_sizes_for_people(name: str, said: str) -> Non
 
 @pytest.mark.parametrize("name", list(catalogue()))
 def test_every_effect_can_be_described(name: str) -> None:
-    result = run("effects", name)
-    assert result.exit_code == 0, result.output
+    result = run("effects", name, status=0)
     assert "{" not in result.stdout
     assert name != "gravity_tilt" or "depend" not in result.stdout
     for row in json.loads(run("effects", name, "--json").stdout)["parameters"]:
@@ -83,6 +80,5 @@ def test_the_catalogue_is_kept_in_a_folder(tmp_path: Path) -> None:
 
 
 def test_an_unknown_name_names_the_nearest() -> None:
-    result = run("effects", "pully_radius")
-    assert result.exit_code == 2
+    result = run("effects", "pully_radius", status=2)
     assert "pulley_radius" in result.stderr and result.stderr.count("\n") == 1

@@ -11,12 +11,11 @@ from typing import Any
 import made_diagnoses
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from made_data import printed
 from scipy import stats
 
 import crosscheck
 import seecr
-from crosscheck.cli import main
 
 ROBOT = seecr.load_robot("demobot_cogiro")
 KEYS = [f"drum_gain.gain_{i}" for i in range(1, 9)] + ["platform_mass.added_kg"]
@@ -223,26 +222,22 @@ def test_models_that_name_no_robot_need_one(tmp_path: Path) -> None:
 # --- the command ----------------------------------------------------------------------------------
 
 
-def call(*words: object, status: int = 0) -> str:
-    run = CliRunner().invoke(main, [str(word) for word in words])
-    assert run.exit_code == status, run.output
-    return run.output
-
-
 def test_the_command_compares_two_models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     now = TRUTH.copy()
     now[2] += 2e-4
     kept(tmp_path, "a.toml", TRUTH)
     kept(tmp_path, "b.toml", now)
-    out = call("compare", "a.toml", "b.toml", "--model-out", "p.toml", status=1)
+    out = printed("compare", "a.toml", "b.toml", "--model-out", "p.toml", status=1)
     assert "gain_3 is 0.000200 ± 0.000042 larger now" in out
     assert "p.toml was not written: the values differ" in out and not Path("p.toml").exists()
-    call("compare", "a.toml", "b.toml")
-    told = json.loads(call("compare", "a.toml", "b.toml", "--json", "--fail-on", "moved", status=1))
+    printed("compare", "a.toml", "b.toml")
+    told = json.loads(
+        printed("compare", "a.toml", "b.toml", "--json", "--fail-on", "moved", status=1)
+    )
     assert told["moved"] == ["drum_gain.gain_3"] and told["exit_status"] == 1
     assert json.loads(Path("crosscheck-comparison/models.json").read_text()) == told
-    out = call("compare", "a.toml", "a.toml", "--model-out", "p.toml", "--fail-on", "moved")
+    out = printed("compare", "a.toml", "a.toml", "--model-out", "p.toml", "--fail-on", "moved")
     assert "Nothing moved" in out and "Written to p.toml" in out and Path("p.toml").exists()
 
 
@@ -267,6 +262,6 @@ def test_mixtures_are_refused(
     kept(tmp_path, "a.toml", TRUTH)
     Path("d.json").write_text("{")
     Path("e.json").write_text("{}")
-    out = call("compare", *words, status=2)
+    out = printed("compare", *words, status=2)
     assert re.search(said, out), out
     assert not Path("crosscheck-comparison").exists()
