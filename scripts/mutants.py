@@ -112,10 +112,15 @@ def _functions(node: ast.AST, place: str = "") -> Iterator[tuple[str, ast.Functi
 
 
 def _body(node: ast.AST) -> Iterator[ast.AST]:
-    """All nodes of a function's body but annotations, which nobody computes there."""
+    """All nodes of a function's body but those that no result depends on.
+
+    They are annotations, and ``strict=True`` of ``zip``, which says that lengths are equal.
+    """
     for name, value in ast.iter_fields(node):
         outer = isinstance(node, ast.FunctionDef) and name in ("decorator_list", "args")
+        checks = isinstance(node, ast.keyword) and node.arg == "strict"
         for part in value if isinstance(value, list) else [value]:
-            if isinstance(part, ast.AST) and not outer and name not in ("annotation", "returns"):
+            counts = name not in ("annotation", "returns") and not (outer or checks)
+            if isinstance(part, ast.AST) and counts:
                 yield part
                 yield from _body(part)

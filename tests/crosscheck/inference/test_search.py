@@ -18,10 +18,10 @@ from crosscheck.inference.evidence import Linear, MemberColumns
 from crosscheck.inference.fit import Data, fit
 from crosscheck.inference.hypothesis import scored
 from crosscheck.inference.posterior import Posterior, odds_of_place
-from crosscheck.inference.priors import WITHIN
+from crosscheck.inference.priors import LEFTOVER, SURE, WITHIN
 from crosscheck.inference.scores import Scores
 from crosscheck.inference.search import Search
-from crosscheck.inference.verdict import judged
+from crosscheck.inference.verdict import is_beyond_fields, judged
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.read import together
 from crosscheck.preparation.prepare import prepare
@@ -244,3 +244,33 @@ def test_sets_that_no_exchange_leads_to_are_met_in_two() -> None:
     assert other not in fresh.seen
     fresh.widen(best)
     assert fresh.seen[other] == pytest.approx(scores.score(other), abs=1e-6)
+
+
+@pytest.mark.parametrize("loud", [8.0, 20.0])
+def test_a_member_beside_a_field_needs_its_odds_and_more_than_what_the_field_leaves(
+    loud: float,
+) -> None:
+    """Columns at right angles, so that each gain has a closed form: of a, of the field, of both."""
+    x = np.linalg.qr(np.random.default_rng(0).normal(size=(60, 3)))[0]
+    width, cost = 100.0, 3.0
+    groups = {
+        "a": MemberColumns(np.array([0]), np.array([width])),
+        "~place": MemberColumns(np.array([1, 2]), np.array([width])),
+    }
+
+    def gain(power: float, count: int) -> float:
+        square = width**2
+        return float(0.5 * power * square / (1.0 + square) - 0.5 * count * np.log1p(square))
+
+    needed = max(np.log(SURE / (1.0 - SURE)) + cost, LEFTOVER * gain(loud**2, 2))
+    found = []
+    for part in (0.98, 1.02):
+        power = 2.0 * (part * needed + 0.5 * np.log1p(width**2)) * (1.0 + width**-2)
+        assert gain(power, 1) == pytest.approx(part * needed)
+        linear = Linear.of(x, np.sqrt(power) * x[:, 0] + loud * x[:, 1], groups)
+        every = SimpleNamespace(log_prior=lambda key: -cost * len(key), stood_keys=frozenset())
+        about = SimpleNamespace(linear=linear, every=every, prices={})
+        scores = Scores(about, SimpleNamespace(key=frozenset(), score=0.0))  # type: ignore[arg-type]
+        search = SimpleNamespace(last=scores)
+        found.append(is_beyond_fields(search, frozenset("a"), "a"))  # type: ignore[arg-type]
+    assert found == [False, True]

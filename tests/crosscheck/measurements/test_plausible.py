@@ -67,11 +67,12 @@ def test_readings_that_run_against_the_commands_are_of_a_mirrored_axis() -> None
     assert notes_on(told, free=("tracker_frame",), position=mirrored) == []
 
 
+@pytest.mark.parametrize("far", [1.0, 0.3])  # 0.3: no axis alone moves by so much
 @pytest.mark.parametrize(("power", "unit"), [(1, "mm"), (-1, "m")])
 def test_readings_that_spread_a_hundred_times_as_far_are_in_another_unit(
-    power: int, unit: str
+    power: int, unit: str, far: float
 ) -> None:
-    told = poses(x=WAY, y=WAY)
+    told = poses(x=far * WAY, y=far * WAY)
     for times, odd in ((101.0, True), (99.0, False)):
         read = HOME[:3] + times**power * (told[:, :3] - HOME[:3])
         if odd:

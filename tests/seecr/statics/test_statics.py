@@ -125,3 +125,19 @@ def test_slack_is_longer_than_its_way_or_pulls_no_more_than_rounding() -> None:
     at.states[0, 2, SLACK] = 1.0  # hangs through and pulls by its weight
     at.states[1, 4, TENSION] = 1e-12 * tables.scale[1]
     assert np.argwhere(batch.is_slack(tables, at)).tolist() == [[0, 2], [1, 4]]
+
+
+@pytest.mark.parametrize("rows", [3, 70])  # 70 are kept as what tells them apart
+def test_some_rows_keep_what_was_written_to_all(rows: int) -> None:
+    poses = np.tile(experiment_of("demobot_cogiro").robot.reference_pose, (rows, 1))
+    poses[:, 2] += np.linspace(0.0, 0.01, rows)
+    setup = Experiment(experiment_of("demobot_cogiro").robot, Commands(poses)).setup([])
+    plain, tables, some = assemble(setup), assemble(setup), [rows - 1, 1]
+    assert np.array_equal(take(plain, some).cables, assemble(setup).cables[some])
+    tables.cables[:, 2, EA] = 7.0 + np.arange(rows)
+    tables.load[:, 0] = np.arange(rows)
+    there = take(tables, some)
+    assert there.cables[:, 2, EA].tolist() == [6.0 + rows, 8.0]
+    assert there.load[:, 0].tolist() == some
+    for name in ("poses", "scale", "reach", "screws"):
+        assert np.array_equal(getattr(there, name), getattr(tables, name)[some])
