@@ -7,18 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tomlkit
-from click.testing import CliRunner
-from made_data import COGIRO, measured, soft_cogiro, term
+from called import ran
+from made_data import COGIRO, measured, printed, soft_cogiro, term
 
 import crosscheck
 import seecr
-from crosscheck.cli import main
 from crosscheck.inference.held_out import blocks_of
 from crosscheck.measurements.read import together
 from crosscheck.measurements.write import write_measurements
 from crosscheck.preparation.freed import laid_out
 from crosscheck.preparation.prepare import prepare
-from seecr.cli import main as seecr_main
 from seecr.description.mjcf import load_robot
 from seecr.effects import Own, Terms
 
@@ -45,12 +43,9 @@ def days(tmp_path_factory):
     return folder
 
 
-def run(days, *words, model="model.toml", status=0):
+def run(days, *words, model="model.toml"):
     args = [str(days / w) if w.endswith((".xml", ".csv")) else w for w in words]
-    out = ["--out", str(days / f"{words[0]}d")]
-    found = CliRunner().invoke(main, [*args, "--model", str(days / model), *out])
-    assert found.exit_code == status, found.output
-    return found.output
+    return printed(*args, "--model", days / model, "--out", days / f"{words[0]}d")
 
 
 @pytest.fixture(scope="module")
@@ -188,18 +183,5 @@ def test_what_is_wrong_in_a_model_is_said(tmp_path, text, said):
 
 
 def test_predictions_of_no_file_in_particular_say_so(days, added):
-    args = [
-        "pose",
-        str(days / "robot.xml"),
-        "0.4",
-        "0.25",
-        "0.15",
-        "--model",
-        str(days / "model.toml"),
-    ]
-    found = CliRunner().invoke(seecr_main, args)
-    assert found.exit_code == 0, found.output
-    assert (
-        "tracker_frame has separate values for each file: the values for no particular file"
-        in found.output
-    )
+    said = ran(f"seecr pose {days}/robot.xml 0.4 0.25 0.15 --model {days}/model.toml", 0).output
+    assert "tracker_frame has separate values for each file: the values for no particular" in said
