@@ -1,7 +1,8 @@
-"""What a release needs is in place, and what is missing is said."""
+"""Scripts: what a release needs, commands at once in one folder, what corrections gain."""
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import tomllib
@@ -9,8 +10,12 @@ from pathlib import Path
 
 import pytest
 import release
+from load import RESULTS, run
 from packaging.requirements import Requirement
+from score_corrections import score, score_aligned
 from sources import ROOT
+
+from seecr.folders import MANIFEST
 
 
 @pytest.fixture
@@ -65,3 +70,27 @@ def test_what_ci_installs_is_stated_and_within_bounds(python: str) -> None:
         (pin,) = [one for one in chosen if one.name == wanted.name]
         (version,) = pin.specifier
         assert version.operator == "==" and version.version in wanted.specifier, wanted
+
+
+@pytest.mark.slow
+def test_commands_at_once_leave_one_result_and_nothing_over(tmp_path: Path) -> None:
+    ends, left, results = run(8, 4, tmp_path)
+    assert ends == ["0"] * 8, ends
+    assert left == set()
+    assert results == {f"out/{name}" for name in (*RESULTS, MANIFEST)}
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("seed", [1, 4])
+def test_with_the_model_of_the_diagnosis_platforms_come_35_times_nearer(seed: int) -> None:
+    found = re.search(r"; ([0-9]+) of ([0-9]+) reached; .* factor ([0-9]+)$", score(seed))
+    assert found is not None
+    reached, every, factor = map(int, found.groups())
+    assert reached > 0.8 * every and factor >= 35
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("seed", [1, 2])
+def test_with_a_calibrated_model_and_a_tracker_that_is_right_20_times(seed: int) -> None:
+    found = re.search(r"in the base frame: is .* factor ([0-9.]+);", score_aligned(seed))
+    assert found is not None and float(found[1]) >= 19.5
