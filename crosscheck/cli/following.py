@@ -96,8 +96,3 @@ def after_fit(is_noise: bool, written: bool, given: Given) -> str:
     model = given_with(None, given.model) if there else ()
     verb = "compare" if is_noise and written else "diagnose"
     return given.then(verb, given.robot, *given.data, *model)
-
-
-def after_plan(given: Given) -> str:
-    """Once the poses have been measured."""
-    return f"{given.then('diagnose', given.robot, *given.data)}  # once these poses are measured"

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from crosscheck.cli import choices
-from crosscheck.cli.following import Given, after_plan
+from crosscheck.cli.following import Given
 from seecr.cli import options
 from seecr.cli.progress import progress_share, say_duration
 from seecr.cli.results import made_by
@@ -129,5 +129,7 @@ def command(
         click.echo(text)
     else:
         print_plan(choices.untold(plan), out, files)
-        click.echo(after_plan(Given(robot, [poses or out / "poses.csv"], sigmas=sigmas)))
+        to_measure = poses or out / "poses.csv"
+        then = Given(robot, [to_measure], sigmas=sigmas).then("diagnose", robot, to_measure)
+        click.echo(f"{then}  # once these poses are measured")
     return status

@@ -138,7 +138,10 @@ def _give_mass(body: mujoco.MjsBody, mass: float, length: float) -> None:
 def _add_exit(spec: mujoco.MjSpec, true: TrueRobot, i: int) -> None:
     """Parts at and behind an exit point: its site, a sheave, a winch, each if needed."""
     carrier, origin = spec.worldbody, true.exit_points[i]
-    soft = () if true.pulley_radius else _soft_axes(true)
+    # directions in which the exit point yields, with their compliance [m/N]
+    across = np.linalg.svd(true.up[None])[2][1:]
+    every = [*((axis, true.compliance) for axis in across), (true.up, true.compliance_up)]
+    soft = [] if true.pulley_radius else [(axis, by) for axis, by in every if by > 0.0]
     if soft:
         carrier = spec.worldbody.add_body(name=f"x{i}", pos=origin)
         origin = np.zeros(3)
@@ -154,13 +157,6 @@ def _add_exit(spec: mujoco.MjSpec, true: TrueRobot, i: int) -> None:
         carrier.add_site(name=f"p{i}", pos=winch)
     if true.pulley_radius:
         _add_sheave(spec, true, i)
-
-
-def _soft_axes(true: TrueRobot) -> list[tuple[Array, float]]:
-    """Directions in which exit points yield, with their compliance [m/N]."""
-    across = np.linalg.svd(true.up[None])[2][1:]
-    soft = [(axis, true.compliance) for axis in across] + [(true.up, true.compliance_up)]
-    return [(axis, by) for axis, by in soft if by > 0.0]
 
 
 def _add_winch(carrier: mujoco.MjsBody, true: TrueRobot, i: int, place: Array) -> None:

@@ -77,8 +77,12 @@ def trajectory(robot: Robot, points: int = 18, extent: float = 1.0) -> Trajector
     runs["loop"] = _loop(frame, reach, 2 * points)
     change = extent * np.concatenate([*runs.values()])
     poses = onto_joints(robot, pose_add(np.tile(robot.reference_pose, (len(change), 1)), change))
-    counts = [len(change) for change in runs.values()]
-    return Trajectory(poses, np.repeat(np.array(list(runs)), counts), _clock(counts))
+    times, now = list[Array](), 0.0
+    for one in runs.values():
+        times.append(now + _BETWEEN_ROWS_S * np.arange(len(one)))
+        now = times[-1][-1] + _BETWEEN_RUNS_S
+    names = np.repeat(np.array(list(runs)), [len(one) for one in runs.values()])
+    return Trajectory(poses, names, np.concatenate(times))
 
 
 def _frame(robot: Robot) -> tuple[Array, Array]:
@@ -120,14 +124,6 @@ def onto_joints(robot: Robot, poses: Array) -> Array:
     columns = motion_columns(screws, start[:, :3])[0]
     values = pose_difference(poses, start) @ np.linalg.pinv(columns).T
     return pose_of_values(robot, values)[0]
-
-
-def _clock(counts: list[int]) -> Array:
-    times, now = [], 0.0
-    for count in counts:
-        times.append(now + _BETWEEN_ROWS_S * np.arange(count))
-        now = times[-1][-1] + _BETWEEN_RUNS_S
-    return np.concatenate(times)
 
 
 def turning(robot: Robot) -> NDArray[np.bool_]:

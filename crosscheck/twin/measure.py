@@ -412,7 +412,8 @@ def _settle(world: World, springs: Springs, judge: bool = True, limit: int = _LI
 def _note(world: World, out: _Rows, k: int, found: Descent) -> None:
     out.at_rest[k], out.free[k], out.residual[k] = found.at_rest, found.free, found.residual
     if found.balanced:
-        out.tensions[k] = np.concatenate([world.cable_tensions(), world.passive_tensions()])
+        cables = world.cable_tensions()
+        out.tensions[k] = [*cables, *world.tensions()[world.places.tendons.size :]]
         out.pose[k] = world.pose()
 
 

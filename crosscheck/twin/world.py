@@ -205,10 +205,6 @@ class World(Physics):
         pull = self.model.tendon_stiffness * x + poly[:, 0] * x**2 + poly[:, 1] * x**3
         return np.asarray(self.mass_unit * pull + self.constant)
 
-    def passive_tensions(self) -> Array:
-        """Tensions [N] of the passive lines, as of the last update."""
-        return self.tensions()[self.places.tendons.size :]
-
     def cable_tensions(self) -> Array:
         """Tension of each cable (m,) [N] where it leaves its exit point or sheave."""
         self.update()
