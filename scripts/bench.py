@@ -22,6 +22,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import bench_peers
 import numpy as np
 
 import seecr
@@ -61,7 +62,21 @@ Other ways to the same equilibria, in the same run, and how many times longer th
 
 {ratios}
 
-A map of {large} poses in parts on disk (`seecr.store_map`) takes {store:.2f} µs of processor a
+## Other programs
+
+At {few} poses of each robot: how many searches say that they have converged, and how many of these
+are wrong, with more than a thousandth of the load unbalanced where they end. `fsolve` and
+`least_squares` are the paper's searches as printed. [MoorPy](https://github.com/NREL/MoorPy) solves
+the same platform as a body on lines, with a tolerance of 1e-7 m; the weight of all cables is given
+over that of the platform, and 1e-4 is as good as none. With cables that weigh something both solve
+catenaries, and `seecr` takes poses one by one. MoorPy says that it is done where no step is larger
+than its tolerance: if cables are stiff, forces are far from balanced there.
+
+{peers}
+
+## Maps of any size
+
+A map of {large} poses in parts on disk (`seecr map --parts`) takes {store:.2f} µs of processor a
 pose, and {memory:.2f} GB of memory at most.
 """
 # What an older commit is asked: microseconds a pose, the best of three.
@@ -238,8 +253,9 @@ def figures(before: str | None, short: bool) -> dict[str, Any]:
     poses, each, memory = stored()
     for name, older in (of_commit(before) if before else {}).items():
         times[name]["before"] = older
+    peers = [bench_peers.row(*case, poses_of(case[1]), FEW) for case in bench_peers.cases()]
     return {
-        "processors": processors(), "poses": POSES, "before": before,
+        "processors": processors(), "peers": peers, "poses": POSES, "before": before,
         **compared, "maps": [maps(name) for name in DEMOBOTS],
         "stored": {"poses": poses, "microseconds": each, "gigabytes": memory},
     }  # fmt: skip
@@ -260,7 +276,7 @@ def page_of(found: dict[str, Any]) -> str:
         count=f"a machine with {found['processors']} processors",
         table=table(head, found["robots"]),
         maps=table("robot, elastic map, static map, correct", found["maps"]),
-        poses=found["poses"],
+        poses=found["poses"], few=FEW, peers=table(bench_peers.HEAD, found["peers"]),
         before=f', "before" is `seecr.solve` of commit {commit}' if commit else "",
         ratios=table(", ".join(["robot, seecr (µs)", *(f"{ways[w]} (µs)" for w in known)]), lines),
         large=found["stored"]["poses"], store=found["stored"]["microseconds"],
