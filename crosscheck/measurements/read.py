@@ -326,8 +326,8 @@ def _common_source(parts: Sequence[Measurements]) -> str:
     return "dwell_scatter" if "dwell_scatter" in found else next(iter(found), "stated")
 
 
-GivenData: TypeAlias = Measurements | str | Path | Sequence[str | Path]
-"""Measurements, their file, or several files of one robot."""
+GivenData: TypeAlias = Measurements | str | Path | Sequence[Measurements | str | Path]
+"""Measurements, their file, or several of these of one robot."""
 
 _NONE = "there are no commands; expected one or more"
 
@@ -336,7 +336,7 @@ GivenCommands: TypeAlias = Measurements | Commands | str | Path | ArrayLike
 
 
 def load_measurements(
-    path: str | Path | Sequence[str | Path],
+    path: GivenData,
     robot: GivenRobot,
     *,
     sigma: GivenSigma = None,
@@ -346,6 +346,7 @@ def load_measurements(
 
     Args:
         path: CSV or Parquet, or several of them: each has its own TOML, and runs stay separate.
+            Measurements may stand among them.
         robot: the measured robot, or its MJCF.
         sigma: noise, in place of the TOML's for the kinds that it states, in all files.
         sigma_path: the TOML, if its name is not the data file's with ``.toml``.
@@ -364,12 +365,15 @@ def load_measurements(
     noise = Sigma.of(sigma)
     paths = [path] if isinstance(path, str | Path) or not isinstance(path, Sequence) else path
     for one in paths:
-        if not isinstance(one, str | Path):
+        if not isinstance(one, Measurements | str | Path):
             raise InputError(f"expected measurements or their files, got {type(one).__name__}")
     if not paths:
         raise InputError("expected measurements or their files, got none")
     faults = Faults()
-    parts = [faults.of(_measured, Path(one), robot, sigma_path) for one in paths]
+    parts = [
+        one if isinstance(one, Measurements) else faults.of(_measured, Path(one), robot, sigma_path)
+        for one in paths
+    ]
     faults.check()
     return stated(together(parts), noise)
 

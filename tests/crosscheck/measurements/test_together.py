@@ -98,6 +98,8 @@ def test_orientations_meet_as_angles_where_one_file_has_only_these(tmp_path: Pat
     part = case(tmp_path, "b.csv", f"{CMD},meas_rx_rad", "a,0,0,0,0,0.5")
     none = case(tmp_path, "c.csv", f"{CMD},meas_x_m", "a,0,0,0,0,0.5")
     data = load_measurements([whole, part], robot)
+    read = [load_measurements(one, robot) for one in (whole, part)]
+    assert load_measurements(read, robot).to_frame().equals(data.to_frame())
     assert data.quat_wxyz is None
     assert data.angles_rad[0] == pytest.approx(angles, abs=1e-9)
     assert data.angles_rad[1, 0] == 0.5 and np.isnan(data.angles_rad[1, 1:]).all()
