@@ -116,6 +116,28 @@ def test_so_many_copies_are_accused_as_chance_makes_in_one_file_of_a_thousand(of
     assert {True, False} <= {*accused[2:]}
 
 
+@pytest.mark.parametrize("steps", [3, 4, 6])
+def test_of_commands_read_twice_chance_follows_from_the_noise_and_the_last_digit(
+    steps: int,
+) -> None:
+    """Each of 30 places is read twice, so many last digits apart in x and in y."""
+    digit, k = 1e-4, np.arange(30)
+    first = np.column_stack([0.03 * k, 0.03 * (7 * k % 30), np.full(30, 0.1)])
+    first[1, :2] = first[0, :2] + digit  # nothing lies nearer than that
+    read = np.concatenate([first, first + steps * digit * np.array([1.0, 1.0, 0.0])])
+    # the median size of a normal difference is 0.6745 standard deviations
+    alike = digit * stats.norm.pdf(0.0) / (steps * digit / stats.norm.ppf(0.75))
+    accused, expected = [], []
+    for count in range(1, 8):
+        pose = np.tile([0.0, 0, 0, 1, 0, 0, 0], (60 + count, 1))
+        pose[:, 0] = [*k, *k, *range(100, 100 + count)]
+        data = Measurements(Path("m"), 8, np.full(len(pose), "a"), pose,
+                            position=np.concatenate([read, first[:count]]))  # fmt: skip
+        accused.append(bool(repetitions(data)[1].any()))
+        expected.append(bool(stats.poisson.sf(count - 1, 30 * alike**2) <= 1e-3))
+    assert accused == expected and {*accused} == {True, False}
+
+
 def test_rows_that_are_the_same_are_listed_up_to_eight() -> None:
     told = np.tile(ROBOT.reference_pose, (12, 1))
     data = Measurements(Path("a"), 8, np.full(12, "a"), told, position=np.zeros((12, 3)))

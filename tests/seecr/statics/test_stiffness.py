@@ -9,7 +9,7 @@ import pytest
 from random_robots import KINDS, random_poses, random_robot
 
 import seecr
-from seecr import Commands, Experiment
+from seecr import Commands, Experiment, Joint
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.effects.load import ExternalWrench
 from seecr.pose import Array, pose_add, pose_difference, quat_rotate
@@ -98,3 +98,26 @@ def test_a_platform_far_from_its_command_has_not_fallen() -> None:
     found = seecr.solve(robot, Commands(far, lengths=home.rest_lengths, told=False))
     assert found.converged[0]
     assert found.pose == pytest.approx(home.pose, abs=1e-9 * robot.length)
+
+
+@pytest.mark.parametrize("axis", [[-1.0, 0, 0], [0, -1.0, 0], [0, 0, -1.0], [-0.48, -0.6, 0.64]])
+def test_a_moment_works_along_the_sum_of_parallel_hinges_alone(axis: list[float]) -> None:
+    """The torque along one would depend on the other, were they not parallel."""
+    rng = np.random.default_rng(0)
+    robot, moment = random_robot(rng, cables=8), rng.normal(size=3)
+    inner, outer = (Joint("hinge", n, np.array(axis), rng.normal(size=3)) for n in "ab")
+    turns = np.array([[0.0, 0.0], [0.2, 0.1], [0.3, -0.2]])
+
+    def energies(joints: tuple[Joint, ...], effects: list[ExternalWrench]) -> Array:
+        on_hinges = replace(robot, joints=joints)
+        home = Commands(np.tile(robot.reference_pose, (3, 1)))
+        tables = assemble(Experiment(on_hinges, home).setup(effects))
+        at = batch.Evaluation.at_commands(tables)
+        at.values[:] = robot.length * turns
+        return batch.evaluate(tables, at).energy
+
+    push = [ExternalWrench(np.zeros(3), moment)]
+    work = energies((inner, outer), []) - energies((inner, outer), push)
+    assert work == pytest.approx(moment @ axis * turns.sum(axis=1), rel=1e-9)
+    aside = replace(inner, axis=np.roll(axis, 1))
+    assert np.isnan(energies((aside, outer), push)).all()
