@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from random_robots import random_poses, random_robot, with_rest_lengths
+from random_robots import KINDS, random_poses, random_robot, with_rest_lengths
 from scipy.spatial.transform import Rotation
 
 from seecr import Robot, solve
@@ -26,9 +26,9 @@ SIZES = st.sampled_from([2.0**-7, 2.0**-3, 4.0, 2.0**7])
 
 
 def drawn(seed: int) -> tuple[Robot, np.ndarray, np.ndarray]:
-    """A robot, three commands, and a push of a tenth of its weight on each."""
+    """A robot, free or on joints, three commands, and a push of a tenth of its weight on each."""
     rng = np.random.default_rng(seed)
-    robot = random_robot(rng)
+    robot = random_robot(rng, KINDS[seed % len(KINDS)])
     push = 0.1 * robot.mass * 9.81 * rng.uniform(-1, 1, (3, 6))
     push[:, 3:] *= 0.1 * robot.length
     return robot, random_poses(rng, robot, 3), push
@@ -54,6 +54,14 @@ def rests_alike(robot, ours, theirs, expected, tensions, near=0.3) -> None:
     np.testing.assert_allclose(theirs.tensions[rows] / weight, tensions[rows] / weight, atol=1e-4)
 
 
+def carried(robot, direction, moment, point):
+    """Joints of a robot elsewhere: of slides directions, of hinges axes, and of all points."""
+    return tuple(
+        replace(j, axis=(direction if j.kind == "slide" else moment)(j.axis), point=point(j.point))
+        for j in robot.joints
+    )
+
+
 def quats(poses: np.ndarray) -> Rotation:
     return Rotation.from_quat(poses[:, [4, 5, 6, 3]])
 
@@ -77,6 +85,7 @@ def test_rigid_motion(seed, turn, shift):
         robot, exit_points=by.apply(robot.exit_points.copy()) + to,
         gravity=by.apply(robot.gravity.copy()),
         reference_pose=with_turn(place[None], home)[0],
+        joints=carried(robot, by.apply, by.apply, lambda point: by.apply(point) + to),
     )  # fmt: skip
     there = with_turn(by.apply(poses[:, :3]) + to, by * quats(poses))
     push_there = np.concatenate([by.apply(push[:, :3]), by.apply(push[:, 3:])], axis=1)
@@ -95,12 +104,29 @@ def test_mirror(seed, axis):
         robot, exit_points=robot.exit_points * flip, anchor_points=robot.anchor_points * flip,
         centre_of_mass=robot.centre_of_mass * flip, gravity=robot.gravity * flip,
         reference_pose=robot.reference_pose * [*flip, 1.0, *-flip],
+        joints=carried(robot, flip.__mul__, (-flip).__mul__, flip.__mul__),
     )  # fmt: skip
     sign = [*flip, 1.0, *-flip]
     ours = solve(robot, poses, wrench=push)
     theirs = solve(mirrored, poses * sign, wrench=push * [*flip, *-flip])
     there = ours.pose * sign
     expected = there[:, :3], quats(there)
+    rests_alike(robot, ours, theirs, expected, ours.tensions)
+
+
+@given(seed=SEEDS, turn=st.tuples(*[st.floats(-3, 3)] * 3))
+def test_turned_platform_frame(seed, turn):
+    """The platform's own frame may be turned; joints know nothing of it."""
+    robot, poses, push = drawn(seed)
+    by, home = Rotation.from_rotvec(turn), robot.reference_pose[None]
+    other = replace(
+        robot, anchor_points=by.inv().apply(robot.anchor_points.copy()),
+        centre_of_mass=by.inv().apply(robot.centre_of_mass.copy()),
+        reference_pose=with_turn(home[:, :3], quats(home) * by)[0],
+    )  # fmt: skip
+    ours = solve(robot, poses, wrench=push)
+    theirs = solve(other, with_turn(poses[:, :3], quats(poses) * by), wrench=push)
+    expected = ours.pose[:, :3], quats(ours.pose) * by
     rests_alike(robot, ours, theirs, expected, ours.tensions)
 
 
@@ -129,6 +155,7 @@ def test_scale_of_lengths(seed, size):
             anchor_points=robot.anchor_points * size,
             centre_of_mass=robot.centre_of_mass * size,
             reference_pose=robot.reference_pose * [*[size] * 3, 1, 1, 1, 1],
+            joints=carried(robot, np.copy, np.copy, np.array(size).__mul__),
         ),
         robot.rest_lengths * size,
     )

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seecr.description.mjcf import load_robot, model_path
+from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import transform_points
 from seecr.statics.solution import Solution, Status
-from seecr.workspace.margins import feasible, slack_zones
+from seecr.workspace.margins import slack_zones
 from seecr.workspace.planar import bar_equilibria, bar_tilt, midline_point, solution_manifold
 
 EXITS = np.array([[0.0, 0.5], [1.0, 0.5]])
@@ -22,7 +22,7 @@ IN_PLANE = [0, 2]  # x and z of the shipped robots are the paper's x and y
 
 
 def planar(name: str, ea: float | None = None) -> Robot:
-    robot = load_robot(model_path(f"planar_{name}"))
+    robot = load_robot(f"planar_{name}")
     return robot if ea is None else replace(robot, ea=np.full(robot.n_cables, ea))
 
 
@@ -44,20 +44,6 @@ def test_tilt_of_the_digests_example() -> None:
     assert np.rad2deg(bar_tilt(EXITS, PLACE, 0.1)) == pytest.approx(-30.898736, abs=1e-6)
     assert round(float(np.rad2deg(bar_tilt(EXITS, PLACE))), 1) == -25.5
     assert round(float(np.rad2deg(bar_tilt(EXITS, PLACE, 0.1))), 1) == -30.9
-
-
-def test_equations_5_and_6_without_their_misprints() -> None:
-    """As printed but for the corrections; the module's arctangent is the same number."""
-    rng = np.random.default_rng(0)
-    for _ in range(50):
-        a1, a2 = rng.uniform([-1, 0.5], [0, 2]), rng.uniform([0.5, 0.5], [2, 2])
-        px, py = rng.uniform([0.05, -1], [0.45, 0.3])
-        a = (a1[1] - py) * (a2[0] - px) + (a2[1] - py) * (a1[0] - px)
-        b = 2 * (a1[0] - px) * (a2[0] - px)
-        top = 2 * px**2 - 2 * px * (a1[0] + a2[0]) + 2 * a1[0] * a2[0] + np.hypot(b, a)
-        bottom = px * (a1[1] + a2[1] - 2 * py) + py * (a1[0] + a2[0])
-        theta = 2 * np.arctan(top / (bottom - a1[0] * a2[1] - a2[0] * a1[1]))
-        assert bar_tilt([a1, a2], [px, py]) == pytest.approx(theta, abs=1e-11)
 
 
 @pytest.mark.parametrize("h", [1e-9, 1e-6, 0.01, 0.1, 0.3])
@@ -134,10 +120,6 @@ def test_a_balanced_bar_that_would_topple_is_no_answer() -> None:
     assert np.abs(balanced.deviation).max() < 1e-9
     rest = solve(robot, poses=pose, rest_lengths=lengths)
     assert rest.converged[0] and np.abs(rest.deviation[0, :3]).max() > 0.1
-
-
-def test_swapped_cables_hang_the_bar_the_same_without_length() -> None:
-    assert bar_tilt(EXITS[::-1], PLACE) == pytest.approx(bar_tilt(EXITS, PLACE), rel=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -304,15 +286,6 @@ def test_midlines_that_never_meet_are_infinitely_far() -> None:
     assert np.all(np.isinf(midline_point(exits, anchors)))
     towards = anchors + np.array([[0.25, 0], [0.25, 0], [-0.25, 0], [-0.25, 0]])
     assert midline_point(exits, towards) == pytest.approx([0.3, 0.0])
-
-
-def test_vertical_parallelogram_is_feasible_where_four_cables_stay_taut() -> None:
-    robot = planar("vertical")
-    poses = level(ACROSS, 0.15)
-    answer = solve(robot, poses)
-    four = answer.slack.sum(axis=1) == 0
-    assert np.all(feasible(robot, poses)[four])
-    assert not feasible(robot, poses)[:15].any() and np.all(feasible(planar("horizontal"), poses))
 
 
 def test_all_ways_of_a_bar_to_be_in_balance_are_found() -> None:

@@ -1,4 +1,4 @@
-"""What ``import seecr`` gives."""
+"""What ``import seecr`` gives, on first use, and which version it says that it is."""
 
 from __future__ import annotations
 
@@ -6,19 +6,15 @@ import ast
 import inspect
 import subprocess
 import sys
+from email.parser import Parser
 from pathlib import Path
 
-import numpy as np
 import pytest
+from sources import ROOT
 
 import seecr
-
-POSES = [[0.4, 0.25, 0.1, 1, 0, 0, 0], [0.3, 0.2, 0.1, 1, 0, 0, 0]]
-
-
-@pytest.fixture(scope="module")
-def robot() -> seecr.Robot:
-    return seecr.load_robot(seecr.model_path("demobot_cogiro"))
+from seecr import version
+from seecr.lazy import lazily
 
 
 @pytest.mark.parametrize("name", seecr.__all__)
@@ -50,16 +46,6 @@ def test_a_public_folder_gives_what_the_package_gives(folder: str) -> None:
     }
 
 
-def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="module 'seecr' has no attribute 'Solver'"):
-        _ = seecr.Solver
-
-
-def test_no_module_hides_a_public_name() -> None:
-    modules = {path.stem for path in Path(inspect.getfile(seecr)).parent.iterdir()}
-    assert not modules & set(seecr.__all__)
-
-
 @pytest.mark.slow
 def test_importing_all_of_it_by_name_loads_nothing_heavy() -> None:
     code = (
@@ -73,35 +59,73 @@ def test_importing_all_of_it_by_name_loads_nothing_heavy() -> None:
 # --- predict -------------------------------------------------------------------------------------
 
 
-def test_a_prediction_without_effects_is_the_plain_robots(robot: seecr.Robot) -> None:
-    found, plain = seecr.predict(robot, POSES), seecr.solve(robot, POSES)
-    assert found.solved.all() and not found.slack.all()
-    assert np.array_equal(found.pose, plain.pose)
-    assert np.array_equal(found.slack, plain.slack)
+# --- Names of a package that are imported on first use
 
 
-def test_models_terms_and_effects_predict_the_same(robot: seecr.Robot, tmp_path: Path) -> None:
-    term = seecr.Term.of(robot, "pulley_radius", radius_m=0.01)
-    path = tmp_path / "model.toml"
-    path.write_text('[[effect]]\nname = "pulley_radius"\nparameters.radius_m = 0.01\n')
-    model = seecr.load_model(path, robot)
-    commands = seecr.Commands(np.array(POSES))
-    ways = (model, model.terms, [term], seecr.Terms([term]), [term.effect()])
-    found = [seecr.predict(robot, commands, way).readings for way in ways]
-    assert all(np.array_equal(one.position, found[0].position) for one in found)
-    plain = seecr.predict(robot, POSES).readings
-    assert np.abs(found[0].position - plain.position).max() > 1e-4
+def test_names_come_from_the_module_that_defines_them_and_modules_by_themselves() -> None:
+    get = lazily("email", {"Parser": "parser", "header": "nowhere"}, ["header"])
+    assert get("Parser") is Parser
+    assert get("header") is sys.modules["email.header"]
 
 
-def test_wrong_poses_are_refused_as_solve_refuses_them(robot: seecr.Robot) -> None:
-    with pytest.raises(seecr.InputError, match=r"poses must be \(n, 7\).*got \(2, 6\)"):
-        seecr.predict(robot, np.zeros((2, 6)))
+def test_what_is_not_public_is_an_attribute_error_though_the_module_has_it() -> None:
+    """Which ``hasattr`` and ``from package import name`` need."""
+    get = lazily("email", {"Parser": "parser"})
+    for name in ("BytesParser", "parser"):
+        with pytest.raises(AttributeError, match=f"^module 'email' has no attribute '{name}'$"):
+            get(name)
 
 
-def test_a_term_by_name_knows_its_parameters(robot: seecr.Robot) -> None:
-    term = seecr.Term.of(robot, "drum_gain", gain_3=0.002)
-    assert term.vector.tolist() == [0, 0, 0.002, 0, 0, 0, 0, 0]
-    with pytest.raises(seecr.InputError, match=r"drum_gain: no parameter gain3; .*gain_3"):
-        seecr.Term.of(robot, "drum_gain", gain3=0.002)
-    with pytest.raises(seecr.InputError, match="no effect 'drum_gian'; known, nearest first: drum"):
-        seecr.Term.of(robot, "drum_gian")
+# --- The version names the commit, in a checkout, in a worktree, and in a wheel built from one
+
+
+COMMIT = "0123456789abcdef0123456789abcdef01234567"
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An installed package whose folder stands in an empty one."""
+    folder = tmp_path / "seecr"
+    folder.mkdir()
+    monkeypatch.setattr(version, "_PACKAGE", folder)
+    version.full_version.cache_clear()
+    monkeypatch.setattr(version, "full_version", version.full_version.__wrapped__)
+    return folder
+
+
+def test_without_a_commit_it_is_that_of_the_release(package: Path) -> None:
+    assert version.full_version() == seecr.__version__
+    (package / "commit.txt").write_bytes(b"\xff\xfe")
+    assert version.full_version() == seecr.__version__
+
+
+def test_a_wheel_says_what_it_was_built_from(package: Path) -> None:
+    (package / "commit.txt").write_text(f"{COMMIT}\n")
+    assert version.full_version() == f"{seecr.__version__}+g01234567"
+
+
+@pytest.mark.parametrize("kind", ["detached", "loose", "packed", "worktree"])
+def test_a_checkout_says_where_it_stands(package: Path, kind: str) -> None:
+    git = package.parent / ".git"
+    own = git
+    if kind == "worktree":
+        git = package.parent / "main.git"
+        own = git / "worktrees" / "one"
+        (package.parent / ".git").write_text(f"gitdir: {own}\n")
+    own.mkdir(parents=True)
+    if kind == "worktree":
+        (own / "commondir").write_text("../..\n")
+    (own / "HEAD").write_text(f"{COMMIT}\n" if kind == "detached" else "ref: refs/heads/a/b\n")
+    if kind == "packed":
+        (git / "packed-refs").write_text(f"# pack-refs with: peeled\n{COMMIT} refs/heads/a/b\n")
+    else:
+        (git / "refs/heads/a").mkdir(parents=True)
+        (git / "refs/heads/a/b").write_text(f"{COMMIT}\n")
+    assert version.full_version() == f"{seecr.__version__}+g01234567"
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="no checkout of Git")
+def test_it_is_what_git_says() -> None:
+    words = ["git", "-C", str(ROOT), "rev-parse", "HEAD"]
+    commit = subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
+    assert version._checked_out(ROOT) == commit

@@ -21,13 +21,13 @@ HOME = [0.4, 0.25, 0.1, 1, 0, 0, 0]
 
 @pytest.fixture(scope="module")
 def solution() -> seecr.Solution:
-    robot = seecr.load_robot(seecr.model_path("demobot_cogiro"))
+    robot = seecr.load_robot("demobot_cogiro")
     return seecr.solve(robot, [HOME, [0.4, 0.25, 0.1, 1, 0, 0, 0], [0.5, 0.3, 0.1, 1, 0, 0, 0]])
 
 
 @pytest.fixture(scope="module")
 def fallen() -> seecr.Solution:
-    robot = seecr.load_robot(seecr.model_path("demobot_cogiro"))
+    robot = seecr.load_robot("demobot_cogiro")
     return seecr.solve(robot, [HOME] * 11, wrench=[0, 0, -1e9, 0, 0, 0])
 
 
@@ -107,14 +107,14 @@ def test_names_of_a_users_robot_are_escaped(solution: seecr.Solution) -> None:
 
 
 def test_a_prediction_shows_what_would_be_read() -> None:
-    robot = seecr.load_robot(seecr.model_path("demobot_cogiro"))
+    robot = seecr.load_robot("demobot_cogiro")
     found = seecr.predict(robot, [HOME], [seecr.Term.of(robot, "tracker_scale", factor=2.0)])
     assert str(found).startswith("demobot_cogiro: 1 of 1 pose at rest")
     assert found.to_frame().to_pydict()["x_m"] == pytest.approx([2.0 * found.pose[0, 0]])
 
 
 def test_a_model_prints_its_effects(tmp_path: Path) -> None:
-    robot = seecr.load_robot(seecr.model_path("demobot_cogiro"))
+    robot = seecr.load_robot("demobot_cogiro")
     path = tmp_path / "m.toml"
     path.write_text(
         '[[effect]]\nname = "pulley_radius"\n'

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from made_columns import columns_of
-from rectangle import RECTANGLE
+from robots import RECTANGLE
 
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.plausible import check_readings

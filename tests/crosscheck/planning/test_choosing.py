@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_data import SIGMA, measured, soft_cogiro, term
-from three_cables import THREE
+from robots import THREE
 
 import crosscheck
 from crosscheck.errors import CrosscheckError

@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from called import ran, refused_in_a_line
-from rejointed import WAYS, rejointed
+from robots import WAYS, rejointed, turned
 from scipy import optimize
-from turned import turned
 
 import crosscheck
 from crosscheck.planning.design import candidate_poses

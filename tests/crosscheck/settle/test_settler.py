@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 from random_robots import write_mjcf
-from rejointed import WAYS, rejointed
+from robots import WAYS, rejointed
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.settle import newton, relaxation

@@ -13,17 +13,15 @@ from typing import Any
 import numpy as np
 import pytest
 from called import BARE, as_json, drawn_bare, ran, refused_in_a_line
-from turned import turned
+from robots import turned
 
-from seecr import InputError, load_robot, solve
+from seecr import InputError, load_robot
 from seecr.cli import COMMANDS
 from seecr.cli.arguments import axes_of, robot_at
 from seecr.columns.commands import read_commands
 from seecr.columns.plausible import scalar_last
 from seecr.folders import MANIFEST, staged
-from seecr.pose import transform_points
 from seecr.workspace.grid import own_directions
-from seecr.workspace.planar import midline_point
 
 COGIRO, PARALLEL = "demobot_cogiro", "demobot_parallel"
 PLACE = "0.17 0.25 0.1"
@@ -83,18 +81,6 @@ def test_a_bar_is_told_what_is_done(words: str, monkeypatch: pytest.MonkeyPatch)
 
 
 # --- pose ------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("name", "letter"), [("planar_vertical", "V"), ("planar_horizontal", "H")])
-def test_the_papers_points_are_printed(name: str, letter: str) -> None:
-    robot = load_robot(name)
-    place = " ".join(map(str, robot.reference_pose[:3]))
-    lines = ran(f"seecr pose {name} --alone {place}").output.splitlines()
-    (line,) = [x for x in lines if x.startswith("midlines")]
-    ends = transform_points(solve(robot, robot.reference_pose).pose, robot.anchor_points)[0]
-    x, z = 1e3 * midline_point(robot.exit_points[:, [0, 2]], ends[:, [0, 2]])
-    assert f"meet at x and z {x:.2f} {z:.2f} mm (the paper's {letter}), +0.00 mm" in line
-    assert "midlines" not in ran("seecr pose planar_two_cable --alone 0.4 0 0.2").output
 
 
 def test_a_pose_tells_its_zone_the_papers_points_and_all_tilts_of_a_bar() -> None:

@@ -53,16 +53,6 @@ def test_a_payload_is_a_heavier_platform_with_its_centre_of_mass_between(kind: s
     assert np.abs(loaded.pose - solved(experiment).pose).max() > 1e-5
 
 
-def test_only_the_row_with_a_payload_is_moved_by_it() -> None:
-    experiment = experiment_of("demobot_cogiro")
-    n = len(experiment.commands)
-    loads = Loads.of(n, mass=PAYLOAD * (np.arange(n) == 2))
-    loaded, bare = solved(with_loads(experiment, loads)), solved(experiment)
-    others = [0, 1, 3, 4, 5]
-    assert np.array_equal(loaded.pose[others], bare.pose[others])
-    assert loaded.pose[2, 2] < bare.pose[2, 2]
-
-
 def test_no_load_changes_nothing_bit_for_bit() -> None:
     experiment = experiment_of("demobot_cogiro")
     nothing = with_loads(experiment, Loads.of(len(experiment.commands), centre=CENTRE))

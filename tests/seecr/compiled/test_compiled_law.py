@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numba
 import numpy as np
 import pytest
-from from_python import from_python
 from one_cable import UP as ABOVE
 from one_cable import cable, in_direction, pull
 from scipy.integrate import quad
@@ -440,6 +441,16 @@ def test_the_lift_is_found_also_about_kinks(
 
 
 # --- The history of a cable: creep against its closed form, friction by hand
+
+
+def from_python(function: Any) -> Callable[..., Any]:
+    """A function that only compiled functions can call, with a wrapper for calls from Python."""
+
+    @numba.njit  # type: ignore[misc]
+    def call(*given):  # type: ignore[no-untyped-def]
+        return function(*given)
+
+    return call  # type: ignore[no-any-return]
 
 
 take, keep = from_python(take_past), from_python(keep_past)

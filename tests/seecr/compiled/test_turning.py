@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from random_robots import random_poses, random_robot
-from rejointed import WAYS, rejointed
+from robots import WAYS, rejointed
 
 from seecr import Commands, Experiment, Joint, Robot, bar_tilt, load_robot
 from seecr.compiled.orientation import straight_balance_batch

@@ -12,15 +12,19 @@ import numpy as np
 import pytest
 from called import BARE, as_json, ran, refused_in_a_line
 from passive_files import FOLDER, KINDS
+from recordings import Readback
 from scipy.linalg import null_space
+from shown import Page
 
+import crosscheck
 import seecr
+from crosscheck.show.control import write_timed_recording
 from seecr.controlled.belief import Belief, TensionLimits
 from seecr.controlled.stiffest import stiffest_tensions
 from seecr.pose import Array
-from seecr.show.control import schemes_json
+from seecr.show.control import control_figure, schemes_json, write_control_recording
 
-COGIRO = seecr.load_robot(seecr.model_path("demobot_cogiro"))
+COGIRO = seecr.load_robot("demobot_cogiro")
 POSES = np.array([[x, 0.25, 0.15, 1, 0, 0, 0] for x in (0.2, 0.4, 0.6)])
 TEXT = "cmd_x_m,cmd_y_m,cmd_z_m\n0.2,0.25,0.15\n0.4,0.25,0.15\n"
 
@@ -326,11 +330,80 @@ def test_where_solving_fails_the_status_says_so(program: str) -> None:
 
 
 def test_robots_without_a_cable_to_spare_have_no_tensions_to_control() -> None:
-    robot = seecr.load_robot(seecr.model_path("planar_two_cable"))
+    robot = seecr.load_robot("planar_two_cable")
     with pytest.raises(seecr.InputError, match="has no taut cable to spare at these poses"):
         seecr.control(robot, robot.reference_pose, scheme="tension_feedback")
     with pytest.raises(seecr.InputError, match="stiffness grows with the tensions without end"):
-        ipanema = seecr.load_robot(seecr.model_path("ipanema"))
+        ipanema = seecr.load_robot("ipanema")
         seecr.control(ipanema, ipanema.reference_pose, scheme="stiffness", lowest=10.0)
     with pytest.raises(seecr.InputError, match="expected least or one of x, y, z, rx, ry, rz"):
         seecr.control(COGIRO, POSES, scheme="stiffness", stiff="up")
+
+
+# --- The page on schemes of control prints what it shows
+
+
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "control.md"
+
+
+@pytest.mark.slow
+def test_the_page_works_as_written(tmp_path: Path) -> None:
+    page = Page(tmp_path)
+    page.run(PAGE.read_text(encoding="utf-8"))
+    used = [tuple(command.split()[:2]) for command in page.commands]
+    assert used == [("seecr", "control"), ("seecr", "control"), *2 * [("crosscheck", "control")]]
+
+
+# --- Recordings and figures of control: what they show is what was computed
+
+
+SHOWN = np.array([[x, 0.25, 0.15, 1, 0, 0, 0] for x in (0.3, 0.4, 0.5)])
+TRUE = [seecr.Term.of(COGIRO, "stiffness", factor=0.7)]
+
+
+def test_a_recording_shows_wanted_believed_true_and_read(tmp_path: Path) -> None:
+    tracker = seecr.Term.of(COGIRO, "tracker_frame", shift_x_m=0.01)
+    found = seecr.control(COGIRO, SHOWN, scheme="elastic", true=[*TRUE, tracker])
+    write_control_recording(found, tmp_path / "one.rrd")
+    seen = Readback(tmp_path / "one.rrd")
+    one = found["elastic"]
+    for name, poses in (
+        ("wanted", SHOWN), ("believed", SHOWN), ("elastic", one.solution.pose),
+        ("read", one.solution.pose + np.array([0.01, 0, 0, 0, 0, 0, 0])),
+    ):  # fmt: skip
+        centres = np.array(seen.column(f"/scene/{name}/platform", "Boxes3D:centers"))[:, 0]
+        assert np.allclose(centres, poses[:, :3], atol=2e-6), name
+    off = np.linalg.norm(one.solution.deviation[:, :3], axis=1)
+    assert np.allclose(seen.scalars("/plot/error/elastic"), np.log10(1e3 * off))
+
+
+def test_several_schemes_are_drawn_beside_each_other(tmp_path: Path) -> None:
+    names = ["geometric", "elastic+pose_feedback"]
+    found = seecr.control(COGIRO, SHOWN, scheme=names, true=TRUE)
+    write_control_recording(found, tmp_path / "two.rrd")
+    drawn = Readback(tmp_path / "two.rrd").entities("pose")
+    assert {"/scene/wanted/platform", "/scene/geometric/platform"} <= drawn
+    assert sum(entity.endswith("/platform") for entity in drawn) == 3
+    for kind in ("png", "svg"):
+        control_figure(tmp_path / f"two.{kind}", found)
+    text = (tmp_path / "two.svg").read_text()
+    for words in (*names, "position error [mm]", "rotation error [°]", "wanted x [mm]", "step"):
+        assert words in text
+
+
+def test_a_timed_recording_goes_by_the_clock(tmp_path: Path) -> None:
+    timing = crosscheck.Timing(0.2, 2.0, 5.0)
+    given = {"scheme": "elastic+pose_feedback", "true": TRUE, "timing": timing}
+    one = crosscheck.control_in_time(COGIRO, SHOWN[:2], **given)["elastic+pose_feedback"]
+    write_timed_recording(one, tmp_path / "timed.rrd")
+    seen = Readback(tmp_path / "timed.rrd")
+    drawn = seen.entities("settling_time")
+    assert {f"/scene/{who}/platform" for who in ("wanted", "believed", "read", "mujoco")} <= drawn
+    assert {
+        "/plot/error/elastic\\+pose_feedback",
+        "/plot/tension/cable1",
+        "/plot/winches/cable8",
+    } <= drawn
+    assert np.allclose(seen.seconds("/plot/error/elastic\\+pose_feedback"), one.trace.t, atol=1e-6)
+    pulls = seen.scalars("/plot/tension/cable3", "settling_time")
+    assert np.allclose(pulls, one.trace.tensions[:, 2])

@@ -17,7 +17,7 @@ from seecr.controlled.belief import Belief, TensionLimits
 from seecr.controlled.loop import largest_delay, largest_gain, loop_eigenvalues, spectral_radius
 from seecr.pose import Array, pose_difference, quat_from_rotvec, quat_rotate
 
-COGIRO = seecr.load_robot(seecr.model_path("demobot_cogiro"))
+COGIRO = seecr.load_robot("demobot_cogiro")
 POSES = np.array([[x, 0.22, 0.15, 1, 0, 0, 0] for x in (0.25, 0.4, 0.55)])
 LOOP = "elastic+pose_feedback"
 
@@ -227,7 +227,7 @@ def test_noise_is_read_and_the_same_for_a_seed() -> None:
 
 
 def test_winches_hold_tensions() -> None:
-    robot = seecr.load_robot(seecr.model_path("ipanema"))
+    robot = seecr.load_robot("ipanema")
     poses = seecr.Commands(robot.reference_pose[None].copy())
     given = {"lowest": 100.0, "highest": 2000.0, "true": softer(robot, 0.8)}
     names = [robot.cable_names[k] for k in (0, 6)]

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from effect_cases import experiment_of, moved, robot_of
-from random_robots import random_poses, random_robot
+from robots import RECTANGLE
 
 import seecr
+from seecr import Commands, Effect, Readings, Setup, layout_of
 from seecr.compiled.cable_law import pulley_geometry
 from seecr.effects.cable import usual_strain
+from seecr.effects.geometry import FrameCompliance
+from seecr.effects.load import CentreOfMass, PlatformMass
+from seecr.effects.sensing import TensionScale, TrackerFrame, TrackerScale, TrackerTarget
 from seecr.effects.setup import plain_setup
 from seecr.pose import (
-    pose_add,
+    Array,
     pose_difference,
     quat_from_rotvec,
     quat_multiply,
@@ -123,16 +128,6 @@ def test_the_sheave_swivels_to_face_the_anchor_point() -> None:
             assert length == pytest.approx(pulley_geometry(flat, (b - a)[2], r)[0], rel=1e-13)
 
 
-def test_a_pulley_changes_little_at_the_reference_pose_where_the_winches_were_zeroed() -> None:
-    """What is left there is the bend of the cable's direction, not the length of the wrap."""
-    robot = replace(robot_of("demobot_cogiro"), ea=np.full(8, STIFF))
-    pulley = effect("pulley_radius", radius=0.01)
-    at_home = np.abs(moved(at_reference(robot), [pulley])[:, :3]).max()
-    assert at_home < 1e-6
-    away = seecr.Experiment(robot, experiment_of("demobot_cogiro").commands)
-    assert np.abs(moved(away, [pulley])[:, :3]).max() > 100 * at_home
-
-
 @pytest.mark.parametrize("name", ["exit_point_error", "anchor_point_error"])
 def test_wrong_points_are_the_robot_with_these_points_zeroed_at_its_reference(name: str) -> None:
     experiment = experiment_of("demobot_parallel")
@@ -151,36 +146,6 @@ def test_wrong_points_are_the_robot_with_these_points_zeroed_at_its_reference(na
 
 
 # --- cable, structure and load: twins ------------------------------------------------------------
-
-
-@pytest.mark.parametrize("kind", ["demobot_cogiro", "demobot_parallel", "planar_vertical"])
-def test_cables_f_times_as_stiff_move_as_a_platform_of_mass_m_over_f(kind: str) -> None:
-    experiment = experiment_of(kind)
-    mass = experiment.robot.mass
-    stiff = experiment.predict([effect("stiffness", factor=1.25)])
-    light = experiment.predict([effect("platform_mass", added=mass / 1.25 - mass)])
-    apart = change(stiff, light)
-    assert np.abs(apart[:, :6]).max() < 1e-11
-    assert stiff.tensions == pytest.approx(1.25 * light.tensions, rel=1e-8, abs=1e-9)
-
-
-@pytest.mark.parametrize("kind", ["demobot_cogiro", "demobot_parallel", "planar_vertical"])
-def test_a_yielding_frame_is_a_length_behind_the_exit_point(kind: str) -> None:
-    experiment = experiment_of(kind)
-    robot = experiment.robot
-    compliance = 0.3 / robot.ea[0]
-    assert np.all(robot.ea == pytest.approx(robot.ea[0]))
-    frame = experiment.predict(
-        [effect("frame_compliance", sideways=compliance, upwards=compliance)]
-    )
-    behind = experiment.predict([effect("winch_side_length", length=0.3)])
-    assert np.abs(change(frame, behind)).max() < 1e-9
-
-
-def test_factors_for_all_cables_are_the_factors_of_each() -> None:
-    experiment = experiment_of("demobot_parallel")
-    each = experiment.predict([effect("cable_stiffness", factor=[0.8] * 8)])
-    assert np.abs(change(each, experiment.predict([effect("stiffness", factor=0.8)]))).max() == 0
 
 
 HUNG = seecr.Robot(
@@ -300,18 +265,6 @@ def test_gravity_tilts_by_the_right_hand_and_is_a_horizontal_force() -> None:
     assert np.abs(change(as_force, leaning)).max() < 1e-10  # centre of mass at the origin
 
 
-def test_a_tilt_of_gravity_is_the_robot_turned_the_other_way() -> None:
-    rng = np.random.default_rng(4)
-    robot = random_robot(rng, "free", 8)
-    poses = random_poses(rng, robot, 4)
-    leaning = seecr.Experiment(robot, seecr.Commands(poses)).predict(
-        [effect("gravity_tilt", tilt_x=0.02, tilt_y=-0.03)]
-    )
-    turn = quat_from_rotvec(np.array([0.02, -0.03, 0.0]))
-    own = seecr.solve(replace(robot, gravity=quat_rotate(turn, robot.gravity)), poses)
-    assert pose_difference(leaning.pose, own.pose) == pytest.approx(np.zeros((4, 6)), abs=1e-11)
-
-
 # --- sensing -------------------------------------------------------------------------------------
 
 
@@ -335,17 +288,98 @@ def test_trackers_report_what_their_docstrings_say() -> None:
     assert np.array_equal(cells.tensions, plain.tensions)  # the cables know nothing of it
 
 
-def test_all_exit_points_and_the_zero_moved_alike_are_the_trackers_frame() -> None:
-    """Seen in a tracker's frame that moved with them, nothing has happened."""
-    robot = robot_of("demobot_cogiro")
-    experiment = experiment_of("demobot_cogiro")
-    shift = np.array([2e-3, -1e-3, 3e-3])
-    together = experiment.predict([
-        effect("exit_point_error", error=np.tile(shift, robot.n_cables)),
-        effect("initial_pose_error", position=shift, rotation=[0.0] * 3),
-        effect("tracker_frame", shift=-shift, rotation=[0.0] * 3),
-    ])  # fmt: skip
-    assert np.abs(change(together, experiment.predict())).max() < 1e-9
-    assert pose_add(robot.reference_pose, np.r_[shift, 0, 0, 0])[:3] == pytest.approx(
-        plain_setup(robot, experiment.commands).zero_pose[:3] + shift
-    )
+# --- What the cables carry: how effects add up, and what no platform can be
+
+
+def setup_of(rows: int = 2) -> Setup:
+    return plain_setup(RECTANGLE, Commands(np.tile(RECTANGLE.reference_pose, (rows, 1))))
+
+
+@pytest.mark.parametrize(("added", "mass"), [
+    (0.5, 2.5), (-0.5, 1.5), (-1.998, 0.002), (-1.9999, 0.002), (-50.0, 0.002),
+])  # fmt: skip
+def test_a_platform_keeps_a_thousandth_of_its_two_kilograms(added: float, mass: float) -> None:
+    setup = setup_of()
+    PlatformMass(added).edit_setup(setup)
+    assert setup.mass == pytest.approx(mass, rel=1e-12)
+    PlatformMass(0.25).edit_setup(setup)
+    assert setup.mass == pytest.approx(mass + 0.25, rel=1e-12)
+
+
+def test_a_scale_shows_the_whole_mass_of_which_a_twentieth_is_the_least() -> None:
+    total = PlatformMass(0.5).totals(RECTANGLE)["mass"]
+    assert (total.value, total.nominal, total.unit) == (2.5, 2.0, "kg")
+    assert PlatformMass(-1.89).totals(RECTANGLE)["mass"].possible
+    assert not PlatformMass(-1.91).totals(RECTANGLE)["mass"].possible
+
+
+@pytest.mark.parametrize(("axis", "least", "most"), [
+    ("x", -1.3, 1.3),
+    ("y", -1.4, 1.4),
+    ("z", -1.0, 1.0),
+])  # fmt: skip
+def test_a_centre_is_at_most_two_lengths_outside_of_the_anchor_points(
+    axis: str, least: float, most: float
+) -> None:
+    """They are at +-0.3 m and +-0.4 m, and the robot's length is 0.5 m."""
+    direction = np.eye(3)["xyz".index(axis)]
+    for value, possible in {
+        least + 0.01: True, most - 0.01: True, least - 0.01: False, most + 0.01: False,
+    }.items():  # fmt: skip
+        totals = CentreOfMass(value * direction).totals(RECTANGLE)
+        assert {key: total.possible for key, total in totals.items()} == {
+            **dict.fromkeys("xyz", True), axis: possible,
+        }  # fmt: skip
+
+
+def test_a_search_never_takes_the_whole_platform_away() -> None:
+    assert layout_of(PlatformMass, RECTANGLE).lower == pytest.approx([-1.98])
+
+
+# --- What a person who measures would find
+
+
+# --- A frame that yields: sideways and upwards are two compliances, kept as one and a differenc
+
+
+def test_a_compliance_of_old_files_is_that_of_both_directions() -> None:
+    layout = layout_of(FrameCompliance, RECTANGLE)
+    assert FrameCompliance.renamed["compliance_m_per_N"] == layout.names
+
+
+# --- What sensors report, by quarter turns: nothing has to be computed
+
+
+ABOUT_X, ABOUT_Z = np.array([np.pi / 2, 0.0, 0.0]), np.array([0.0, 0.0, np.pi / 2])
+LEVEL = [1.0, 0, 0, 0]
+NOTHING = np.zeros(3)
+# not needed by what sensors report
+SETUP: Any = None
+
+
+def read(effect: Effect, position: list[float], quat: list[float]) -> tuple[Array, Array]:
+    """What is reported of a platform at a position with an orientation."""
+    readings = Readings(np.array([position]), np.array([quat]), np.array([[3.0, 5.0]]))
+    effect.edit_readings(readings, SETUP)
+    return readings.position[0], readings.quat_wxyz[0]
+
+
+@pytest.mark.parametrize("effect", [
+    TrackerFrame(NOTHING, NOTHING), TrackerFrame(np.array([1.0, 0, 0]), NOTHING),
+    TrackerTarget(NOTHING, NOTHING), TrackerTarget(np.array([1.0, 0, 0]), NOTHING),
+])  # fmt: skip
+def test_without_a_turn_orientations_keep_every_bit(effect: Effect) -> None:
+    quat = [0.1, 0.2, 0.3, 0.4]  # of no norm in particular: a multiplication would change bits
+    assert read(effect, [1, 2, 3], quat)[1].tolist() == quat
+
+
+def test_what_was_read_is_not_written_over() -> None:
+    """The arrays of the readings may be those of the solved poses."""
+    position, tensions = np.array([[1.0, 2.0, 3.0]]), np.array([[4.0]])
+    readings = Readings(position, np.array([LEVEL]), tensions)
+    for effect in (
+        TrackerFrame(np.ones(3), ABOUT_Z), TrackerTarget(np.ones(3), ABOUT_X),
+        TrackerScale(2.0), TensionScale(2.0),
+    ):  # fmt: skip
+        effect.edit_readings(readings, SETUP)
+    assert position.tolist() == [[1.0, 2.0, 3.0]] and tensions.tolist() == [[4.0]]

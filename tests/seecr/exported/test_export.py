@@ -7,11 +7,11 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from three_cables import THREE
+from robots import THREE
 
 from crosscheck.settle.settler import Settler, settle_batch
 from seecr.compiled.catenary import catenary_span
-from seecr.description.mjcf import load_robot, model_path
+from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.effects import Term, Terms
 from seecr.equilibrium.solving import solve
@@ -20,7 +20,7 @@ from seecr.exported.bodies import SEGMENTS, HangingCable, hanging
 from seecr.exported.export import Export, export
 from seecr.pose import Array, pose_difference
 
-COGIRO = load_robot(model_path("demobot_cogiro"))
+COGIRO = load_robot("demobot_cogiro")
 POSES = np.array([[0.3, 0.2, 0.15, 1, 0, 0, 0], [0.5, 0.3, 0.1, 0.995, 0, 0.0998749, 0]])
 POSES[:, 3:] /= np.linalg.norm(POSES[:, 3:], axis=1, keepdims=True)
 # Each case of the promise: MuJoCo within this part of the robot's size.
@@ -145,7 +145,7 @@ def test_a_cable_that_goes_straight_up_has_its_sheave_turned_anywhere() -> None:
 
 
 def test_a_planar_robot_keeps_its_joints() -> None:
-    robot = load_robot(model_path("planar_vertical"))
+    robot = load_robot("planar_vertical")
     at = robot.reference_pose + np.array([0.05, 0, 0.03, 0, 0, 0, 0])
     exported = export(robot, [term(robot, "pulley_radius", radius_m=0.01)], at)
     assert exported.mujoco_text is not None and exported.solution is not None
@@ -270,7 +270,7 @@ def test_what_mjcf_cannot_say_is_said() -> None:
 
 def test_a_law_that_seecr_keeps_from_falling_is_in_no_file_where_it_would_fall() -> None:
     """MuJoCo takes the bare polynomial: the keyframe had 2449 N on a platform of 0.4 kg."""
-    robot = load_robot(model_path("demobot_parallel"))
+    robot = load_robot("demobot_parallel")
     soft = [term(robot, "nonlinear_elasticity", cubic=-4.29e5)]
     far = export(robot, soft, [0.17, 0.25, 0.2, 1, 0, 0, 0])
     assert far.softens and far.mujoco_text is None and far.solution is None

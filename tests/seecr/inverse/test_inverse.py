@@ -19,10 +19,6 @@ MANY = ("hysteresis", "creep", "exit_friction", "backlash", "cable_weight")
 TENSION_ONLY = {"tracker_frame", "tracker_target", "tracker_scale", "tension_scale"}
 
 
-def robot_named(name: str) -> seecr.Robot:
-    return seecr.load_robot(name)
-
-
 def line(n: int = 12, first: float = 0.33, last: float = 0.47, z: float = 0.15) -> np.ndarray:
     poses = np.zeros((n, 7))
     poses[:, 0], poses[:, 1], poses[:, 2] = np.linspace(first, last, n), 0.25, z
@@ -39,7 +35,7 @@ def typical(robot: seecr.Robot, effect: type) -> seecr.Term:
 
 @pytest.mark.parametrize("name", [k for k in seecr.catalogue() if k not in TENSION_ONLY])
 def test_every_effect_is_corrected(name: str) -> None:
-    robot = robot_named("demobot_off_centre")
+    robot = seecr.load_robot("demobot_off_centre")
     commands = seecr.Commands(line(), time=5.0 * np.arange(12), temperature=np.linspace(18, 25, 12))
     found = seecr.correct(robot, commands, effects=[typical(robot, seecr.catalogue()[name])])
     assert found.reached.all()
@@ -47,7 +43,7 @@ def test_every_effect_is_corrected(name: str) -> None:
 
 
 def test_many_effects_with_a_memory_are_corrected_together() -> None:
-    robot = robot_named("demobot_cogiro")
+    robot = seecr.load_robot("demobot_cogiro")
     names = ("pulley_radius", "drum_gain", "drum_eccentricity", "backlash", "hysteresis", "creep",
              "exit_friction", "cable_weight", "frame_compliance", "gravity_tilt")  # fmt: skip
     effects = [typical(robot, seecr.catalogue()[name]) for name in names]
@@ -59,7 +55,7 @@ def test_many_effects_with_a_memory_are_corrected_together() -> None:
 
 
 def test_the_commands_keep_what_they_are_for() -> None:
-    robot = robot_named("demobot_cogiro")
+    robot = seecr.load_robot("demobot_cogiro")
     n, names = 6, ("thermal_expansion", "hysteresis", "creep")
     effects = [typical(robot, seecr.catalogue()[name]) for name in names]
     wanted = seecr.Commands(
@@ -73,7 +69,7 @@ def test_the_commands_keep_what_they_are_for() -> None:
 
 
 def test_tensions_stay_within_limits_and_near_their_aim() -> None:
-    robot = robot_named("demobot_cogiro")
+    robot = seecr.load_robot("demobot_cogiro")
     low, high = 0.3, 3.0
     least = seecr.correct(robot, line(), lowest=low, highest=high)
     middle = seecr.correct(robot, line(), lowest=low, highest=high, aim="middle")
@@ -89,7 +85,7 @@ def test_tensions_stay_within_limits_and_near_their_aim() -> None:
 
 @pytest.mark.slow
 def test_the_parallel_robot_holds_what_its_workspace_says() -> None:
-    robot, poses = robot_named("demobot_parallel"), line(10, 0.17, 0.63, 0.1)
+    robot, poses = seecr.load_robot("demobot_parallel"), line(10, 0.17, 0.63, 0.1)
     found = seecr.correct(robot, poses, prefer="position")
     np.testing.assert_array_equal(found.held, seecr.feasible(robot, poses))
     np.testing.assert_array_equal(found.reached, found.held)
@@ -108,7 +104,7 @@ def test_the_parallel_robot_holds_what_its_workspace_says() -> None:
     ("name", "x"), [("demobot_parallel", 0.2), ("demobot_parallel", 0.29), ("demobot_cogiro", 0.9)]
 )
 def test_the_nearest_pose_is_the_nearest(name: str, x: float) -> None:
-    robot = robot_named(name)
+    robot = seecr.load_robot(name)
     want = np.array([x, 0.25, 0.1, 1, 0, 0, 0])
     found = seecr.correct(robot, want)
     assert not found.held[0] and found.found[0] and found.solution.converged[0]
@@ -133,7 +129,7 @@ def test_the_nearest_pose_is_the_nearest(name: str, x: float) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["demobot_parallel", "ipanema"])
 def test_poses_far_outside_have_a_nearest_one_too(name: str) -> None:
-    robot = robot_named(name)
+    robot = seecr.load_robot(name)
     limits = {"lowest": 50.0, "highest": 3000.0} if name == "ipanema" else {}
     size = float(np.ptp(robot.exit_points, axis=0).max())
     toward = np.random.default_rng(3).normal(size=(4, 3))
@@ -159,7 +155,7 @@ def test_poses_far_outside_have_a_nearest_one_too(name: str) -> None:
 
 @pytest.mark.slow
 def test_no_other_rows_answer_is_nearer_than_the_own() -> None:
-    robot = robot_named("ipanema")
+    robot = seecr.load_robot("ipanema")
     want = np.tile(robot.reference_pose, (6, 1))
     want[:, 0] += np.linspace(6.4, 20.0, 6)
     found = seecr.correct(robot, want, lowest=50.0, highest=3000.0)
@@ -173,7 +169,7 @@ def test_no_other_rows_answer_is_nearer_than_the_own() -> None:
 
 
 def test_a_robot_with_too_few_cables_keeps_the_position() -> None:
-    robot = robot_named("planar_two_cable")
+    robot = seecr.load_robot("planar_two_cable")
     want = robot.reference_pose + np.array([0.1, 0, 0.05, 0, 0, 0, 0])
     found = seecr.correct(robot, want, prefer="position")
     assert not found.held[0] and found.found[0] and found.solution.converged[0]
@@ -182,7 +178,7 @@ def test_a_robot_with_too_few_cables_keeps_the_position() -> None:
 
 @pytest.mark.slow
 def test_what_nothing_holds_has_no_numbers() -> None:
-    robot = robot_named("demobot_cogiro")
+    robot = seecr.load_robot("demobot_cogiro")
     found = seecr.correct(robot, line(2), highest=0.4)  # eight of them are less than the weight
     assert not found.found.any() and np.isnan(found.lengths).all()
     assert "2 of them: no pose nearby was found that can be held" in str(found)
@@ -191,7 +187,7 @@ def test_what_nothing_holds_has_no_numbers() -> None:
 @pytest.mark.slow
 def test_a_pose_far_above_the_frame_comes_down_to_where_tensions_still_hold_it() -> None:
     """At the wanted pose every cable pulls the wrong way: the search goes on from home."""
-    robot = robot_named("demobot_cogiro")
+    robot = seecr.load_robot("demobot_cogiro")
     found = seecr.correct(robot, np.array([0.4, 0.25, 3.0, 1, 0, 0, 0]), highest=30.0)
     assert found.found[0] and found.solution.converged[0]
     # one cable stops it; level and turned about the vertical alone it is farther, 2.5094
@@ -203,7 +199,7 @@ def test_a_pose_far_above_the_frame_comes_down_to_where_tensions_still_hold_it()
 
 @pytest.mark.slow
 def test_it_is_told_which_cable_cannot_do_what_it_would_have_to() -> None:
-    robot = robot_named("demobot_cogiro")
+    robot = seecr.load_robot("demobot_cogiro")
     held, pulled = seecr.correct(robot, line(1, 0.4, 0.4, 0.1)), line(1, 0.4, 0.4, 0.1)
     assert held.why_not == ("",)
     most = float(held.solution.tensions.max())
@@ -223,7 +219,7 @@ def test_it_is_told_which_cable_cannot_do_what_it_would_have_to() -> None:
 @pytest.mark.parametrize("highest", [np.inf, 50.0])
 def test_without_a_load_it_is_the_lower_limit_that_is_told(highest: float) -> None:
     """Refused once as if no pulls could balance nothing; slack cables do."""
-    robot = replace(robot_named("planar_two_cable"), gravity=np.zeros(3))
+    robot = replace(seecr.load_robot("planar_two_cable"), gravity=np.zeros(3))
     found = seecr.correct(robot, np.array([0.3, 0, 0.3, 1, 0, 0, 0]), lowest=2.0, highest=highest)
     cable = robot.cable_names
     assert found.why_not == (
@@ -234,7 +230,7 @@ def test_without_a_load_it_is_the_lower_limit_that_is_told(highest: float) -> No
 
 
 def test_what_cannot_be_asked_is_said() -> None:
-    robot = robot_named("demobot_cogiro")
+    robot = seecr.load_robot("demobot_cogiro")
     with pytest.raises(seecr.InputError, match="prefer must be one of pose, position, got 'both'"):
         seecr.correct(robot, line(), prefer="both")
     with pytest.raises(seecr.InputError, match=r"correct needs wanted poses \(n, 7\); got lengths"):
@@ -245,7 +241,7 @@ def test_what_cannot_be_asked_is_said() -> None:
 
 def test_no_poses_have_no_corrections() -> None:
     """It ended in a ValueError of NumPy."""
-    robot = robot_named("demobot_cogiro")
+    robot = seecr.load_robot("demobot_cogiro")
     found = seecr.correct(robot, np.zeros((0, 7)))
     assert len(found.commands) == 0 and found.lines() == ["demobot_cogiro: 0 of 0 poses reached"]
     backlash = seecr.Term(seecr.layout_of(seecr.catalogue()["backlash"], robot), np.full(8, 1e-4))
@@ -254,7 +250,7 @@ def test_no_poses_have_no_corrections() -> None:
 
 def test_without_a_highest_tension_the_nearest_poses_strain_cables_by_5_percent() -> None:
     """Poses beyond the edge were aimed at with 26 times the length of each cable."""
-    robot = robot_named("camera")
+    robot = seecr.load_robot("camera")
     poses = np.tile(robot.reference_pose, (4, 1))
     poses[:, 2] = 10.0, 24.9, 26.0, 40.0
     poses[2, 0] = 90.0
@@ -283,7 +279,7 @@ def test_without_a_highest_tension_the_nearest_poses_strain_cables_by_5_percent(
 
 
 def test_without_gravity_slack_cables_are_named_as_what_leaves_the_platform_free() -> None:
-    robot = replace(robot_named("ipanema"), gravity=np.zeros(3))
+    robot = replace(seecr.load_robot("ipanema"), gravity=np.zeros(3))
     found = seecr.correct(robot, robot.reference_pose)
     assert not found.stays.any() and found.lines()[-1] == (
         "1 where forces balance but the platform does not come to rest: pose 0: without gravity, "
@@ -293,14 +289,14 @@ def test_without_gravity_slack_cables_are_named_as_what_leaves_the_platform_free
 
 
 def test_rotations_that_are_rounding_are_printed_as_none() -> None:
-    robot = robot_named("camera")
+    robot = seecr.load_robot("camera")
     found = seecr.correct(robot, robot.reference_pose + np.array([0, 0, 40.0, 0, 0, 0, 0]))
     found.solution.pose[0, 4] = 1e-15
     assert found.left[0, 3] > 0.0 and " mm and 0 deg away" in "\n".join(found.lines())
 
 
 def test_positions_that_are_kept_are_printed_as_kept() -> None:
-    robot = robot_named("planar_two_cable")
+    robot = seecr.load_robot("planar_two_cable")
     found = seecr.correct(robot, robot.reference_pose - [0.3, 0, 0, 0, 0, 0, 0], prefer="position")
     kept = replace(found, wanted=found.wanted + 5e-16)  # such were printed: 1.241e-13 mm
     assert np.linalg.norm(kept.left[0, :3]) > 0.0
@@ -309,7 +305,7 @@ def test_positions_that_are_kept_are_printed_as_kept() -> None:
 
 def test_lengths_of_crept_cables_are_found_from_the_history_they_have() -> None:
     """Sought from plain cables they were slack where they were to pull: few rows stayed."""
-    robot, n = robot_named("ipanema"), 12
+    robot, n = seecr.load_robot("ipanema"), 12
     poses = np.tile(robot.reference_pose, (n, 1))
     poses[:, 0] += np.linspace(-1.0, 1.0, n)
     commands = seecr.Commands(poses, time=10.0 * np.arange(n))
@@ -324,7 +320,7 @@ def test_lengths_of_crept_cables_are_found_from_the_history_they_have() -> None:
 
 def test_lengths_that_come_nearer_by_a_few_percent_a_round_are_found() -> None:
     """Small moves, at which cables stick at their exit points: two of these rows did not stay."""
-    robot, n = robot_named("ipanema"), 40
+    robot, n = seecr.load_robot("ipanema"), 40
     apart = np.random.default_rng(1).random((n, 3)) - 0.5
     poses = np.tile(robot.reference_pose, (n, 1))
     poses[:, :3] += 0.02 * np.ptp(robot.exit_points, axis=0) * apart
@@ -338,7 +334,7 @@ def test_lengths_that_come_nearer_by_a_few_percent_a_round_are_found() -> None:
 
 def test_drums_whose_run_out_is_nearly_their_radius_pay_out_what_is_wanted() -> None:
     """At some angles they pay out next to nothing: round by round one comes nearer by 1 %."""
-    robot, n = robot_named("camera"), 30
+    robot, n = seecr.load_robot("camera"), 30
     apart = np.random.default_rng(1).random((n, 3)) - 0.5
     poses = np.tile(robot.reference_pose, (n, 1))
     poses[:, :3] += 0.1 * np.ptp(robot.exit_points, axis=0) * apart
@@ -370,7 +366,7 @@ def test_lengths_are_found_where_cables_slip_only_on_the_way(
     name: str, n: int, stands: int
 ) -> None:
     """Lengths went from one end of the sticking range to the other, for ever."""
-    robot = robot_named(name)
+    robot = seecr.load_robot(name)
     curve = along_a_curve(robot, n)
     poses = np.repeat(curve.pose[::stands], stands, axis=0)[:n]
     every = ("exit_friction", "hysteresis", "creep")
@@ -388,7 +384,7 @@ def test_lengths_are_found_where_cables_slip_only_on_the_way(
 ])  # fmt: skip
 def test_lengths_that_go_to_and_fro_come_to_rest(n: int, names: tuple[str, ...]) -> None:
     """A tenth of the first was not reached; the second ended in an error of NumPy."""
-    robot = robot_named("camera")
+    robot = seecr.load_robot("camera")
     effects = [typical(robot, seecr.catalogue()[name]) for name in names]
     found = seecr.correct(robot, along_a_curve(robot, n), effects=effects)
     assert found.held.all() and found.reached.all()
@@ -398,7 +394,7 @@ def test_lengths_that_go_to_and_fro_come_to_rest(n: int, names: tuple[str, ...])
 @pytest.mark.parametrize("name", ["ipanema", pytest.param("cogiro_large", marks=pytest.mark.sweep)])
 def test_lengths_are_found_where_poses_are_repeated_with_every_history(name: str) -> None:
     """A third of these rows was not reached: each change disturbed all that come after it."""
-    robot = robot_named(name)
+    robot = seecr.load_robot(name)
     curve = along_a_curve(robot, 200)
     effects = [
         typical(robot, seecr.catalogue()[one])
@@ -416,7 +412,7 @@ def test_the_strain_that_ends_the_search_is_by_the_law_of_the_models_cables(
     name: str, values: list[float]
 ) -> None:
     """Cables that soften were strained by 357 % at 5 % of E S, and wound in accordingly."""
-    robot = robot_named("camera")
+    robot = seecr.load_robot("camera")
     poses = np.tile(robot.reference_pose, (2, 1))
     poses[:, 2] = 26.0, 40.0
     poses[0, 0] = 90.0

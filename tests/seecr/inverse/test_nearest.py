@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 import score_nearest
 from random_robots import random_robot
-from rejointed import WAYS, rejointed
-from slab import REACH, slab
+from robots import WAYS, rejointed, slides
 
 import seecr
 from seecr.description.joints import freedoms, pose_of_values, values_of_pose
 from seecr.effects.cable import CableWeight
 from seecr.inverse.nearest import nearest
-from seecr.inverse.nearest_problem import NearestProblem, PlatformMotion
+from seecr.inverse.nearest_problem import NearestProblem, PlatformMotion, Rows
 from seecr.inverse.nearest_sqp import solve_sqp
 from seecr.pose import Array, pose_difference, quat_from_rotvec, transform_points
 from seecr.workspace.margins import balance_equations
@@ -250,6 +249,32 @@ def begun(problem, x):  # type: ignore[no-untyped-def]
     return problem.start(
         np.stack([np.array(x, float), np.full(len(x), 0.5)], axis=1), np.arange(len(x))
     )
+
+
+REACH = 0.25
+"""Largest distance [m] from the reference pose, along x, at which tensions of up to 4 N hold."""
+
+# Two cables pull along x, one each way, and one carries the weight of 1 N along z.
+_MATRIX = np.array([[1.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
+_STIFF = 10.0
+
+
+def slab(wanted_x: list[float], stays_from: float = -np.inf) -> NearestProblem:
+    """A platform on two slides, held where |x - x0| <= REACH; stable only from some x on."""
+    robot = slides()
+    wanted = np.tile(robot.reference_pose, (len(wanted_x), 1))
+    wanted[:, 0] += wanted_x
+
+    def balance(poses: Array, rows: Rows, about: Array | None = None) -> tuple[Array, Array]:
+        load = np.ones((len(poses), 2))
+        load[:, 0] = _STIFF * (poses[:, 0] - robot.reference_pose[0])
+        return np.tile(_MATRIX, (len(poses), 1, 1)), load
+
+    def stays(poses: Array, rows: Rows) -> np.ndarray:
+        return np.asarray(poses[:, 0] - robot.reference_pose[0] >= stays_from)
+
+    limits = np.zeros(3), np.array([_STIFF * REACH, _STIFF * REACH, 2.0])
+    return NearestProblem.within(robot, wanted, balance, stays, limits, np.ones(len(wanted)))
 
 
 def test_a_search_ends_where_the_slab_ends_and_at_the_wanted_height() -> None:

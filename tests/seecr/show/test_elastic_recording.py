@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from recordings import Readback, headless_viewer
-from slab import slides
+from robots import slides
 
-from seecr.description.mjcf import load_robot, model_path
+from seecr.description.mjcf import load_robot
 from seecr.show import map_recording
 from seecr.show.colours import scale_colours
 from seecr.show.map_recording import Elastic, write_map_recording
@@ -19,8 +19,8 @@ from seecr.statics.solution import Status
 from seecr.workspace.grid import NEVER, Workspace, colour_end, evenly_picked
 from seecr.workspace.maps import workspace_map
 
-PARALLEL = load_robot(model_path("demobot_parallel"))
-VERTICAL = load_robot(model_path("planar_vertical"))
+PARALLEL = load_robot("demobot_parallel")
+VERTICAL = load_robot("planar_vertical")
 X, Y, Z = np.linspace(0.1, 0.7, 7), np.linspace(0.1, 0.4, 4), np.array([0.05, 0.1, 0.2])
 
 

@@ -12,9 +12,9 @@ import pytest
 from kept_figures import keep_figures
 from matplotlib.colors import to_hex
 from PIL import Image
-from slab import slides
+from robots import slides
 
-from seecr.description.mjcf import load_robot, model_path
+from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.show.batch_words import softest_line
@@ -41,7 +41,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Drawn:
 
 def a_map(*margins: float) -> Workspace:
     """Nine poses with these margins, y goes faster than x."""
-    robot = load_robot(model_path("demobot_cogiro"))
+    robot = load_robot("demobot_cogiro")
     found = workspace_map(robot, AXIS, AXIS, 0.1, elastic=False)
     return replace(found, margin=np.array(margins).reshape(3, 3, 1))
 
@@ -109,7 +109,7 @@ def test_the_edge_of_a_map_of_yes_and_no_is_half_way(drawn: Drawn) -> None:
 
 def few(no: float, yes: float) -> Workspace:
     """A map of a robot with fewer cables than freedoms."""
-    robot = load_robot(model_path("planar_two_cable"))
+    robot = load_robot("planar_two_cable")
     found = workspace_map(robot, AXIS, 0.0, AXIS, elastic=False)
     return replace(found, margin=np.array([no] * 3 + [yes] * 6).reshape(3, 1, 3))
 

@@ -14,7 +14,7 @@ from recordings import Readback
 
 from seecr.columns.commands import CommandFile, read_commands
 from seecr.commands import Commands, Loads
-from seecr.description.mjcf import load_robot, model_path
+from seecr.description.mjcf import load_robot
 from seecr.equilibrium.solving import solve
 from seecr.files import json_pieces, json_text, write_text
 from seecr.inverse.correction import correct
@@ -30,7 +30,7 @@ POSES = [[x, 0.25, 0.1, 1, 0, 0, 0] for x in (0.17, 0.3, 0.4)]
 
 @pytest.fixture(scope="module")
 def sweep() -> Solution:
-    return solve(load_robot(model_path("demobot_parallel")), POSES)
+    return solve(load_robot("demobot_parallel"), POSES)
 
 
 def test_rows_are_the_solution(sweep: Solution) -> None:

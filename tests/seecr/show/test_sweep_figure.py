@@ -13,10 +13,10 @@ import pytest
 from calibrated import KEPT, MODEL, ROBOT, model_of
 from click.testing import CliRunner
 from kept_figures import keep_figures
-from slab import slides
+from robots import slides
 
 from seecr.cli import main
-from seecr.description.mjcf import load_robot, model_path
+from seecr.description.mjcf import load_robot
 from seecr.equilibrium.following import Jump
 from seecr.equilibrium.solving import solve
 from seecr.prediction.uncertainty import Spread, spread_of
@@ -143,7 +143,7 @@ def test_rotations_are_drawn_where_the_platform_turns(drawn: Drawn, sweep: Solut
 
 def test_zones_are_shaded_to_their_edges_and_slack_cables_change_there(drawn: Drawn) -> None:
     """Also a zone between two poses, in which no pose is."""
-    robot = load_robot(model_path("planar_vertical"))
+    robot = load_robot("planar_vertical")
     poses = np.tile(robot.reference_pose, (4, 1))
     poses[:, 0], poses[:, 2] = [0.18, 0.28, 0.30, 0.40], 0.2
     solution = solve(robot, poses)
@@ -165,7 +165,7 @@ def test_zones_are_shaded_to_their_edges_and_slack_cables_change_there(drawn: Dr
 
 
 def test_slack_cables_break_between_runs_and_where_the_platform_does_not_rest(drawn: Drawn) -> None:
-    robot = load_robot(model_path("planar_vertical"))
+    robot = load_robot("planar_vertical")
     poses = np.tile(robot.reference_pose, (4, 1))
     solution = solve(robot, poses)
     (zone,) = slack_spans(solution)
@@ -198,7 +198,7 @@ def test_jumps_are_marked_where_they_are(drawn: Drawn, sweep: Solution) -> None:
 
 
 def test_the_tilt_of_a_bar_is_drawn_beside_the_manifold(drawn: Drawn) -> None:
-    robot = load_robot(model_path("planar_two_cable"))
+    robot = load_robot("planar_two_cable")
     poses = np.tile(robot.reference_pose, (3, 1))
     poses[:, 0] = [0.2, 0.4, 0.5]
     solution = solve(robot, poses)

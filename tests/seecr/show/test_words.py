@@ -29,7 +29,7 @@ AT_HOME = seecr.solve(PARALLEL, [PARALLEL.reference_pose])
 
 
 def test_rounding_is_no_turn() -> None:
-    robot = seecr.load_robot(model_path("demobot_cogiro"))
+    robot = seecr.load_robot("demobot_cogiro")
     found = seecr.solve(robot, [robot.reference_pose])
     rounding = np.array([[1e-17, 0.0, -2e-4, 1e-19, 2e-19, 0.0]])
     text = "\n".join(pose_lines(replace(found, deviation=rounding)))
@@ -60,7 +60,7 @@ def test_a_stiff_robot_has_no_exponent() -> None:
 
 def test_a_platform_that_hangs_twisted_is_told_so() -> None:
     """It may rest where no way leads from the reference pose."""
-    robot = seecr.load_robot(model_path("ipanema"))
+    robot = seecr.load_robot("ipanema")
     text = "\n".join(pose_lines(seecr.solve(robot, [[0.0, 0, 0, 1, 0, 0, 0]])))
     assert "hangs twisted, more than a right angle from its command" in text
     assert "twisted" not in "\n".join(pose_lines(seecr.solve(robot, [robot.reference_pose])))
@@ -91,7 +91,7 @@ def test_what_has_no_energy_gets_no_number() -> None:
 
 def test_joints_move_along_slides_and_turn_about_hinges() -> None:
     """Names that MuJoCo gives to joints without any say nothing, and no hinge is moved along."""
-    robot = seecr.load_robot(model_path("planar_vertical"))
+    robot = seecr.load_robot("planar_vertical")
     slides, hinges = robot.joints[:2], robot.joints[2:]
     unnamed = replace(robot, joints=tuple(
         replace(joint, name=f"joint{k}") for k, joint in enumerate((*slides, *hinges))
@@ -160,7 +160,7 @@ def test_the_largest_position_error_is_told_beside_the_largest_rotation() -> Non
 
 def test_what_slack_means_is_said_where_cables_have_weight() -> None:
     """On a large robot cables that pull with 180 kN are longer than the straight line."""
-    robot = seecr.load_robot(model_path("cogiro_large"))
+    robot = seecr.load_robot("cogiro_large")
     sag = seecr.load_model(model_path("cogiro_large").with_name("sag.toml"), robot)
     pose = np.array([6.0, 4.0, 1.5, 1.0, 0.0, 0.0, 0.0])
     heavy, light = seecr.solve(robot, pose, effects=sag), seecr.solve(robot, pose)
@@ -171,7 +171,7 @@ def test_what_slack_means_is_said_where_cables_have_weight() -> None:
 
 def test_a_pose_has_one_kind_of_minus() -> None:
     """Numbers with errors had a typographic one, the others beside them a hyphen."""
-    robot = seecr.load_robot(model_path("cogiro_large"))
+    robot = seecr.load_robot("cogiro_large")
     found = seecr.solve(robot, np.array([-3.0, -2.0, 1.5, 1.0, 0.0, 0.0, 0.0]))
     off = np.full((1, 3), 1e-3)
     spread = Spread(off, off, np.full((1, 8), 0.1), np.full((1, 6), 1e-3))
@@ -220,7 +220,7 @@ def test_frequencies_say_that_cables_have_no_inertia_where_that_matters() -> Non
 
 def test_in_a_plane_the_turn_is_one_angle() -> None:
     """A bar upside down was turned by rx ry rz 180, -11.66, 180 deg."""
-    robot = seecr.load_robot(model_path("planar_vertical"))
+    robot = seecr.load_robot("planar_vertical")
     over = np.array([*robot.reference_pose[:3], *quat_from_rotvec(np.radians([0.0, 168.34, 0.0]))])
     found = replace(seecr.solve(robot, [robot.reference_pose]), pose=over[None])
     text = "\n".join(pose_lines(found))

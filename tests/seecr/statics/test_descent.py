@@ -9,17 +9,26 @@ import pytest
 from numba import njit
 from random_robots import KINDS, random_poses, random_robot
 
-from seecr import Commands, Robot
+from seecr import Commands, Experiment, Robot, load_robot
 from seecr.compiled.algebra import rotated_less
-from seecr.compiled.columns import EXTERNAL_MOMENT, GAP, N_LOAD, REST, STRAIN, TENSION
+from seecr.compiled.columns import (
+    CONVERGED,
+    EXTERNAL_MOMENT,
+    GAP,
+    ITERATIONS,
+    N_LOAD,
+    REST,
+    STRAIN,
+    TENSION,
+)
 from seecr.compiled.joint_kinematics import N_CURRENT, place_joints
 from seecr.compiled.platform import work_of_moment
 from seecr.description.joints import pose_of_values
 from seecr.effects.setup import plain_setup
 from seecr.pose import pose_difference, quat_from_rotvec, quat_multiply
 from seecr.statics import batch
-from seecr.statics.batch import Evaluation, Tables
-from seecr.statics.tables import assemble
+from seecr.statics.batch import Evaluation
+from seecr.statics.tables import Tables, assemble
 
 
 def tables_of(robot: Robot, poses: np.ndarray, **changes: object) -> Tables:
@@ -189,10 +198,36 @@ def test_a_moment_has_an_energy_where_its_work_does_not_depend_on_the_way() -> N
             assert torque == pytest.approx(along, abs=1e-8), (axes, about)
 
 
-def test_threads_change_nothing() -> None:
-    rng = np.random.default_rng(5)
-    robot = random_robot(rng)
-    tables = tables_of(robot, random_poses(rng, robot, 200))
-    one, two = batch.descend(tables, threads=1), batch.descend(tables, threads=2)
-    assert np.array_equal(one.deviation, two.deviation)
-    assert np.array_equal(one.count, two.count)
+# --- Which robots are solved again with a stiffness that is raised in stages, and which rows never
+
+
+SOFT = load_robot("demobot_parallel")
+STIFF = replace(SOFT, ea=SOFT.ea * 1e4)
+LIMIT = 30  # evaluations; most of these poses of the stiff robot need more
+
+
+def tables_about_home(robot) -> Tables:
+    poses = np.tile(robot.reference_pose, (40, 1))
+    poses[:, :3] += np.random.default_rng(1).uniform(-0.15, 0.15, (40, 3))
+    return assemble(Experiment(robot, Commands(poses)).setup(()))
+
+
+def test_rows_of_a_stiff_robot_that_do_not_settle_are_solved_again_in_stages():
+    tables = tables_about_home(STIFF)
+    plain, found = (
+        batch.descend(tables, limit=LIMIT, staged=False),
+        batch.descend(tables, limit=LIMIT),
+    )
+    late = plain.outcome == ITERATIONS
+    assert 0 < late.sum() < len(late) and np.all(plain.outcome[~late] == CONVERGED)
+    assert np.all(found.outcome == CONVERGED) and np.all(found.residual < 1e-9)
+    # what was found at once is not touched, and the others' first attempt counts
+    assert np.array_equal(found.count[~late], plain.count[~late])
+    assert np.array_equal(found.deviation[~late], plain.deviation[~late])
+    assert np.all(found.count[late] > LIMIT)
+
+
+def test_a_soft_robot_is_never_solved_in_stages():
+    """It may come to another equilibrium by them."""
+    found = batch.descend(tables_about_home(SOFT), limit=LIMIT // 3)
+    assert np.any(found.outcome == ITERATIONS) and found.count.max() <= LIMIT // 3

@@ -69,7 +69,7 @@ def commanded(robot: seecr.Robot, n: int = 60) -> np.ndarray:
 
 @pytest.mark.parametrize("name", HALLS)
 def test_lengths_alone_bring_the_platform_where_the_poses_do(name: str) -> None:
-    robot = seecr.load_robot(seecr.model_path(name))
+    robot = seecr.load_robot(name)
     at = seecr.solve(robot, commanded(robot))
     home = np.tile(robot.reference_pose, (len(at), 1))
     fallen = seecr.solve(robot, rest_lengths=at.rest_lengths, start=home)
@@ -85,7 +85,7 @@ def test_lengths_alone_bring_the_platform_where_the_poses_do(name: str) -> None:
 
 
 def test_data_with_lengths_are_predicted_where_the_runs_lead() -> None:
-    robot = seecr.load_robot(seecr.model_path("ipanema"))
+    robot = seecr.load_robot("ipanema")
     pose = commanded(robot)
     at = seecr.solve(robot, pose)
     run = np.repeat(np.arange(6), 10)
@@ -101,12 +101,12 @@ def test_data_with_lengths_are_predicted_where_the_runs_lead() -> None:
 
 
 def test_poses_lead_nowhere() -> None:
-    robot = seecr.load_robot(seecr.model_path("ipanema"))
+    robot = seecr.load_robot("ipanema")
     assert poses_from_lengths(robot, Commands(commanded(robot))) is None
 
 
 def test_where_a_search_is_to_start_is_kept() -> None:
-    robot = seecr.load_robot(seecr.model_path("ipanema"))
+    robot = seecr.load_robot("ipanema")
     pose = commanded(robot)
     lengths = seecr.solve(robot, pose).rest_lengths
     assert poses_from_lengths(robot, Commands(pose, lengths=lengths)) is None
@@ -114,7 +114,7 @@ def test_where_a_search_is_to_start_is_kept() -> None:
 
 @pytest.mark.parametrize("name", ["planar_two_cable", "planar_vertical", "camera"])
 def test_joints_and_few_cables_have_a_start_that_fits(name: str) -> None:
-    robot = seecr.load_robot(seecr.model_path(name))
+    robot = seecr.load_robot(name)
     at = seecr.solve(robot, robot.reference_pose[None])
     lengths = at.rest_lengths * np.linspace(0.97, 1.05, 9)[:, None]
     first = poses_from_lengths(
@@ -127,7 +127,7 @@ def test_joints_and_few_cables_have_a_start_that_fits(name: str) -> None:
 
 
 def test_lengths_that_nothing_fits_have_a_start_all_the_same() -> None:
-    robot = seecr.load_robot(seecr.model_path("ipanema"))
+    robot = seecr.load_robot("ipanema")
     home = robot.reference_pose[None]
     first = poses_from_lengths(robot, Commands(home, lengths=1e-3 * robot.rest_lengths[None]))
     assert first is not None and np.isfinite(first).all()

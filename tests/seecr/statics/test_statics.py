@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from effect_cases import experiment_of, lengthened
+from effect_cases import experiment_of
 
 from seecr import Commands, Experiment
 from seecr.compiled.cable_law import lengths_at
@@ -20,38 +20,6 @@ KINDS = ("demobot_cogiro", "demobot_parallel", "planar_vertical")
 def solved(kind: str) -> tuple[Tables, batch.Evaluation]:
     tables = assemble(experiment_of(kind).setup([]))
     return tables, batch.descend(tables)
-
-
-def edited(tables: Tables, by: float) -> Tables:
-    """The same with another stiffness of one cable and more load."""
-    other = take(tables, np.arange(len(tables)))
-    other.cables[:, 1, EA] *= 1.0 + by
-    other.load[:, :3] *= 1.0 + by
-    return other
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_change_is_the_difference_of_what_both_tables_say(kind: str) -> None:
-    tables, at = solved(kind)
-    plus, minus = edited(tables, 0.01), edited(tables, -0.01)
-    force, tension = batch.change(plus, minus, at)
-    ahead, behind = batch.evaluate(plus, at), batch.evaluate(minus, at)
-    scale = tables.scale.max()
-    assert force == pytest.approx(ahead.gradient - behind.gradient, abs=1e-12 * scale)
-    both = (ahead.states - behind.states)[..., TENSION]
-    assert tension == pytest.approx(both, abs=1e-12 * scale)
-    assert np.abs(force).max() > 1e-3 * scale
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_each_cables_own_change_adds_up_to_that_of_all(kind: str) -> None:
-    tables, at = solved(kind)
-    plus, minus = lengthened(tables, 1e-4), lengthened(tables, -1e-4)
-    force, tension = batch.change(plus, minus, at)
-    each, own = batch.change_by_cable(plus, minus, at)
-    assert each.shape == (*force.shape, tables.cables.shape[1])
-    assert each.sum(axis=-1) == pytest.approx(force, abs=1e-12 * tables.scale.max())
-    assert own == pytest.approx(tension, abs=1e-12 * tables.scale.max())
 
 
 def test_a_row_that_cannot_be_evaluated_changes_nothing() -> None:

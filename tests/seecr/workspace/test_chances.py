@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from calibrated import KEPT, MODEL, POSES, ROBOT, model_of
+from robots import RECTANGLE
 
-from seecr.description.mjcf import load_robot, model_path
+from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.effects import Term, Terms
 from seecr.equilibrium.solving import solve
-from seecr.errors import InputError
+from seecr.errors import InputError, InputFileError
 from seecr.inverse.correction import correct
 from seecr.pose import Array
 from seecr.prediction.model import Model, load_model
@@ -23,7 +25,7 @@ from seecr.statics.solution import Solution
 from seecr.workspace import edges
 from seecr.workspace.edges import boundary, held_chance, kept_chance, margins_at
 from seecr.workspace.maps import workspace_map
-from seecr.workspace.margins import margins_with, tension_margin
+from seecr.workspace.margins import feasible, is_held, margins_with, tension_margin
 
 
 def drawn(model: Model, n: int) -> list[Terms]:
@@ -100,7 +102,7 @@ def test_two_cables_hold_a_position_as_often_as_the_mass_allows(
 ) -> None:
     """In the middle of two cables the tension is proportional to the mass, whatever else."""
     monkeypatch.setattr(edges, "_STAGES", ((4, 15.0), (64, 0.0)))
-    two = load_robot(model_path("planar_two_cable"))
+    two = load_robot("planar_two_cable")
     (tmp_path / "model.toml").write_text(
         'format = 1\n[[effect]]\nname = "platform_mass"\n[effect.parameters]\n'
         "added_kg = { value = 0.0, stderr = 0.02 }\n[calibration]\n"
@@ -120,17 +122,9 @@ def test_two_cables_hold_a_position_as_often_as_the_mass_allows(
     assert found.chance.ravel() == pytest.approx([0.5, 0.0], abs=0.02)
 
 
-def test_without_effects_margins_are_those_of_the_plain_robot() -> None:
-    pushes = [[0.3, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0.01, 0]]
-    for more in (None, pushes):
-        own = margins_with(ROBOT, POSES, [], 0.1, 6.0, more)
-        expected = tension_margin(ROBOT, POSES, lowest=0.1, highest=6.0, wrenches=more)
-        np.testing.assert_allclose(own, expected, rtol=1e-6)
-
-
 def test_wrenches_on_joints_count_along_them_with_effects_as_without() -> None:
     """A planar robot with a model had been refused a set of wrenches."""
-    robot = load_robot(model_path("planar_vertical"))
+    robot = load_robot("planar_vertical")
     poses = np.tile(robot.reference_pose, (3, 1))
     poses[:, 0] += [-0.04, 0.0, 0.03]
     # what pushes across the plane is carried by the joints
@@ -267,3 +261,86 @@ upwards_m_per_N = { value = 0.0, stderr = 1e-3 }
     # out of all reach no pose is held by any of them
     far = POSES + np.array([9.0, 0, 0, 0, 0, 0, 0])
     np.testing.assert_array_equal(held_chance(ROBOT, far, model, lowest=0.02), 0.0)
+
+
+# --- Margins at poses, and whether they mean that a pose is held
+
+
+COGIRO = load_robot("demobot_cogiro")
+HOME = COGIRO.reference_pose[None]
+
+
+def test_a_pose_is_held_to_within_rounding_of_the_load() -> None:
+    margins = 20.0 * np.array([0.0, -9e-10, -1.1e-9, np.inf, -np.inf, np.nan])
+    assert is_held(RECTANGLE, margins).tolist() == [True, True, False, True, False, False]
+    floating = replace(RECTANGLE, gravity=np.zeros(3))  # of the cables, without a load
+    margins = 1e-3 * 1000.0 * np.array([-9e-10, -1.1e-9])
+    assert is_held(floating, margins).tolist() == [True, False]
+
+
+PUSHES = [[0.3, 0, 0, 0, 0, 0], [-0.3, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0.01, 0]]
+# Effects of load, geometry and cables; with the last the balance is not linear in the tensions.
+ACTING = {
+    "none": (),
+    "mass": (("platform_mass", {"added_kg": 0.1}),),
+    "pulleys": (("pulley_radius", {"radius_m": 0.02}), ("platform_mass", {"added_kg": 0.1})),
+    "weight": (("cable_weight", {"weight_N_per_m": 0.02}),),
+}
+
+
+@pytest.mark.parametrize("acting", ACTING)
+@pytest.mark.parametrize("pushed", [False, True])
+def test_poses_are_held_as_on_a_map_with_its_effects_and_wrenches(
+    acting: str, pushed: bool
+) -> None:
+    """Only maps took effects, and only maps and margins a set of wrenches."""
+    x, y = np.linspace(0.05, 0.75, 8), np.linspace(0.05, 0.45, 5)
+    effects = [Term.of(COGIRO, name, **values) for name, values in ACTING[acting]]
+    asked = {
+        "lowest": 0.05, "highest": 4.0, "effects": effects,
+        "wrenches": PUSHES if pushed else None,
+    }  # fmt: skip
+    found = workspace_map(COGIRO, x, y, 0.1, elastic=False, **asked)
+    places = np.stack(np.meshgrid(x, y, 0.1, indexing="ij"), axis=-1).reshape(-1, 3)
+    poses = np.column_stack([places, np.tile(HOME[0, 3:], (len(places), 1))])
+    np.testing.assert_array_equal(tension_margin(COGIRO, poses, **asked), found.margin.ravel())
+    held = feasible(COGIRO, poses, **asked)
+    np.testing.assert_array_equal(held, found.feasible.ravel())
+    assert 0 < held.sum() < len(held)
+    plain = tension_margin(COGIRO, poses, lowest=0.05, highest=4.0)
+    assert (acting == "none" and not pushed) == np.array_equal(plain, found.margin.ravel())
+
+
+@pytest.mark.parametrize("acting", ["pulleys", "weight"])
+def test_a_wrench_adds_to_effects_and_to_each_of_a_set(acting: str) -> None:
+    effects = [Term.of(COGIRO, name, **values) for name, values in ACTING[acting]]
+    wrench = np.array([0.1, -0.05, 0.2, 0.001, 0.002, -0.003])
+    names = ("force_x_N", "force_y_N", "force_z_N", "moment_x_Nm", "moment_y_Nm", "moment_z_Nm")
+    values = dict(zip(names, wrench.tolist(), strict=True))
+    outside = [*effects, Term.of(COGIRO, "external_wrench", **values)]
+    poses, limits = np.repeat(HOME, 2, axis=0), {"lowest": 0.05, "highest": 6.0}
+    for more in (None, PUSHES):
+        expected = tension_margin(COGIRO, poses, wrenches=more, effects=outside, **limits)
+        own = tension_margin(COGIRO, poses, wrench=wrench, wrenches=more, effects=effects, **limits)
+        np.testing.assert_allclose(own, expected, rtol=1e-9)
+    each = np.array([wrench, np.zeros(6)])
+    by_row = tension_margin(COGIRO, poses, wrench=each, effects=effects, **limits)
+    alone = tension_margin(COGIRO, poses, effects=effects, **limits)
+    np.testing.assert_allclose(
+        by_row, [tension_margin(COGIRO, HOME, effects=outside, **limits)[0], alone[1]], rtol=1e-9
+    )
+    assert abs(by_row[0] - by_row[1]) > 1e-3
+
+
+def test_a_wrong_model_or_wrench_is_refused(tmp_path: Path) -> None:
+    for ask in (feasible, tension_margin):
+        with pytest.raises(InputFileError, match=r"no\.toml: no such file"):
+            ask(COGIRO, HOME, effects=tmp_path / "no.toml")
+        with pytest.raises(InputError, match="effect"):
+            ask(COGIRO, HOME, effects=[3])  # type: ignore[list-item]
+        with pytest.raises(InputError, match=r"wrenches must be \(k, 6\) \[N, N m\], got \(2,\)"):
+            ask(COGIRO, HOME, wrenches=[1.0, 2.0])
+        path = tmp_path / "m.toml"
+        path.write_text('[[effect]]\nname = "platform_mass"\nparameters.added_kg = 0.2\n')
+        term = Term.of(COGIRO, "platform_mass", added_kg=0.2)
+        assert ask(COGIRO, HOME, effects=path) == ask(COGIRO, HOME, effects=[term])

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kept_figures import keep_figures
-from turned import turned
+from robots import turned
 
 from seecr.description.mjcf import load_robot
 from seecr.errors import InputError

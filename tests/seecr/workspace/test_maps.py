@@ -14,7 +14,7 @@ from random_robots import random_poses, random_robot
 from unbalanced import unbalanced
 
 from seecr import parallel
-from seecr.description.mjcf import load_robot, model_path
+from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.effects import Term
 from seecr.equilibrium.solving import solve
@@ -33,10 +33,6 @@ from seecr.workspace.planar import bar_tilt
 NAMES = ["demobot_cogiro", "demobot_parallel", "demobot_off_centre", "planar_vertical"]
 
 
-def robot_named(name: str) -> Robot:
-    return load_robot(model_path(name))
-
-
 def some_poses(robot: Robot, n: int = 60) -> np.ndarray:
     random = np.random.default_rng(1)
     poses = np.tile(robot.reference_pose, (n, 1))
@@ -51,7 +47,7 @@ def some_poses(robot: Robot, n: int = 60) -> np.ndarray:
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize(("low", "high"), [(0.0, np.inf), (0.5, 6.0)])
 def test_margins_are_those_of_highs(name: str, low: float, high: float) -> None:
-    robot = robot_named(name)
+    robot = load_robot(name)
     poses = some_poses(robot)
     margins = tension_margin(robot, poses, lowest=low, highest=high)
     expected = [margin_by_highs(*each, low, high)
@@ -132,7 +128,7 @@ def test_margins_without_a_bound_are_infinite(tmp_path: Path) -> None:
 
 
 def test_a_set_of_wrenches_has_the_least_margin() -> None:
-    robot = robot_named("demobot_cogiro")
+    robot = load_robot("demobot_cogiro")
     poses = some_poses(robot, 20)
     pushes = np.array([[0.3, 0, 0, 0, 0, 0], [-0.3, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0.01, 0]])
     each = [tension_margin(robot, poses, wrench=one) for one in pushes]
@@ -144,7 +140,7 @@ def test_a_set_of_wrenches_has_the_least_margin() -> None:
 
 
 def test_the_boundary_is_where_the_margin_vanishes() -> None:
-    robot = robot_named("demobot_parallel")
+    robot = load_robot("demobot_parallel")
     inside = np.array([[0.4, 0.25, 0.1, 1, 0, 0, 0]] * 2)
     outside = inside.copy()
     outside[:, 0] = [0.1, 0.7]
@@ -159,7 +155,7 @@ def test_the_boundary_is_where_the_margin_vanishes() -> None:
 
 
 def test_the_edge_is_looked_for_between_neighbours_of_the_grid() -> None:
-    robot = robot_named("demobot_parallel")
+    robot = load_robot("demobot_parallel")
     x, y = np.linspace(0.05, 0.75, 8), np.linspace(0.1, 0.4, 5)
     found = workspace_map(robot, x, y, [0.1, 0.2], elastic=False)
     inside, outside = found.crossings(found.feasible)
@@ -176,7 +172,7 @@ def test_the_edge_is_looked_for_between_neighbours_of_the_grid() -> None:
 
 @pytest.mark.slow
 def test_a_map_is_what_each_pose_says() -> None:
-    robot = robot_named("demobot_parallel")
+    robot = load_robot("demobot_parallel")
     axes = np.linspace(0.2, 0.6, 5), np.linspace(0.2, 0.3, 2), np.array([0.1, 0.2])
     done: list[int] = []
     found = workspace_map(robot, *axes, progress=done.append)
@@ -213,7 +209,7 @@ def test_a_map_says_why_the_platform_is_not_at_rest(
     name: str, axes: tuple[list[float], ...], why: str, tmp_path: Path
 ) -> None:
     """They had been NaN without a reason: some balance and are free to turn."""
-    robot = robot_named(name)
+    robot = load_robot(name)
     found = workspace_map(robot, *axes)
     places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     poses = np.column_stack([places, np.tile(robot.reference_pose[3:], (len(places), 1))])
@@ -242,7 +238,7 @@ def test_a_map_says_why_the_platform_is_not_at_rest(
 
 
 def test_a_map_without_the_elastic_robot_has_no_status(tmp_path: Path) -> None:
-    found = workspace_map(robot_named("demobot_cogiro"), 0.4, 0.25, [0.1, 0.2], elastic=False)
+    found = workspace_map(load_robot("demobot_cogiro"), 0.4, 0.25, [0.1, 0.2], elastic=False)
     assert found.status is None and not found.free.any() and "status" not in found.records()[0]
     assert found.as_json()["not_at_rest"] == []
     write_arrays(tmp_path / "map.npz", found)
@@ -251,7 +247,7 @@ def test_a_map_without_the_elastic_robot_has_no_status(tmp_path: Path) -> None:
 
 
 def test_a_map_is_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot = robot_named("demobot_parallel")
+    robot = load_robot("demobot_parallel")
     axes = np.linspace(0.1, 0.7, 10), np.linspace(0.1, 0.4, 4), np.linspace(0.1, 0.4, 4)
     whole, done = workspace_map(robot, *axes), list[int]()
 
@@ -272,7 +268,7 @@ def test_a_map_is_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.slow
 def test_too_few_cables_are_mapped_by_position() -> None:
-    robot = robot_named("planar_two_cable")
+    robot = load_robot("planar_two_cable")
     x, z = np.linspace(-0.15, 1.15, 7), np.linspace(0.05, 1.05, 4)
     found = workspace_map(robot, x, 0.0, z, elastic=False)
     places = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1)
@@ -285,7 +281,7 @@ def test_too_few_cables_are_mapped_by_position() -> None:
 
 @pytest.mark.slow
 def test_positions_of_four_cables_are_held_where_a_correction_keeps_them() -> None:
-    robot = only_cables(robot_named("demobot_parallel"), [0, 2, 4, 6])
+    robot = only_cables(load_robot("demobot_parallel"), [0, 2, 4, 6])
     places = np.array([[0.4, 0.25, 0.1], [0.3, 0.2, 0.3], [0.03, 0.25, 0.1], [0.2, 0.4, 0.05]])
     poses = np.column_stack([places, np.tile([1.0, 0.0, 0.0, 0.0], (len(places), 1))])
     kept = correct(robot, poses, prefer="position", highest=6.0)
@@ -299,7 +295,7 @@ def test_positions_of_four_cables_are_held_where_a_correction_keeps_them() -> No
 def test_an_orientation_from_which_the_platform_goes_elsewhere_does_not_hold(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    robot = robot_named("planar_two_cable")
+    robot = load_robot("planar_two_cable")
     below, above = robot.reference_pose[:3], [0.5, 0.0, 1.05]
     poses = np.tile([*below, 1.0, 0.0, 0.0, 0.0], (2, 1))
     poses[1, :3] = above  # the cables' ends are above their exit points: balanced, but not stable
@@ -313,7 +309,7 @@ def test_an_orientation_from_which_the_platform_goes_elsewhere_does_not_hold(
 @pytest.mark.parametrize("some", [[0, 2, 5], [0, 2, 4, 6], [0, 2, 3, 4, 6]])
 def test_platforms_that_must_turn_over_are_found(some: list[int]) -> None:
     """Each position for itself: a search for the nearest orientation holds no more of them."""
-    robot = only_cables(robot_named("demobot_parallel"), some)
+    robot = only_cables(load_robot("demobot_parallel"), some)
     found = workspace_map(robot, *default_axes(robot, 5), elastic=False)
     held = found.feasible.ravel()
     places = np.stack(np.meshgrid(*found.axes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -329,7 +325,7 @@ def test_platforms_that_must_turn_over_are_found(some: list[int]) -> None:
 def test_margins_of_too_few_cables_are_those_of_tensions_that_hold(name: str) -> None:
     """A limit at which the margin was is the end: with it, nothing is left of the margin."""
     four = name == "four"
-    robot = robot_named("demobot_parallel" if four else name)
+    robot = load_robot("demobot_parallel" if four else name)
     robot = only_cables(robot, [0, 2, 4, 6]) if four else robot
     poses = np.tile(robot.reference_pose, (3, 1))
     poses[:, 0] += [0.0, 0.05 * robot.length, 0.1 * robot.length]
@@ -360,15 +356,15 @@ def only_cables(robot: Robot, some: list[int]) -> Robot:
 
 
 def test_the_default_grid_lies_between_the_exit_points() -> None:
-    x, y, z = default_axes(robot_named("demobot_cogiro"), 3)
+    x, y, z = default_axes(load_robot("demobot_cogiro"), 3)
     np.testing.assert_allclose([x[0], x[-1], y[0], y[-1], z[-1]], [0.04, 0.76, 0.04, 0.46, 0.485])
-    assert [len(axis) for axis in default_axes(robot_named("planar_vertical"), 3)] == [3, 1, 3]
+    assert [len(axis) for axis in default_axes(load_robot("planar_vertical"), 3)] == [3, 1, 3]
     with pytest.raises(InputError, match="values: expected a whole number from 1 on, got -2"):
-        default_axes(robot_named("demobot_cogiro"), -2)
+        default_axes(load_robot("demobot_cogiro"), -2)
 
 
 def test_the_default_grid_ends_where_the_platform_stands_on_the_floor() -> None:
-    robot = robot_named("demobot_cogiro")  # anchor points down to 18 mm below its origin
+    robot = load_robot("demobot_cogiro")  # anchor points down to 18 mm below its origin
     assert robot.floor == 0.0
     assert default_axes(robot, 3)[2].tolist() == pytest.approx([0.018, 0.2515, 0.485])
     upended = default_axes(robot, 3, [np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0])[2]
@@ -384,7 +380,7 @@ def test_the_default_grid_ends_where_the_platform_stands_on_the_floor() -> None:
 
 
 def test_a_map_says_where_it_is_and_whether_it_ends_at_the_floor() -> None:
-    robot = robot_named("demobot_cogiro")
+    robot = load_robot("demobot_cogiro")
     found = workspace_map(robot, *default_axes(robot, 2), elastic=False)
     ends = "x 0.04 to 0.76 m, y 0.04 to 0.46 m, z 0.018 to 0.485 m"
     assert found.region == f"region: {ends}, down to the floor"
@@ -395,7 +391,7 @@ def test_a_map_says_where_it_is_and_whether_it_ends_at_the_floor() -> None:
 
 
 def test_the_size_of_a_map_is_words_of_their_own_and_one_dead_pose_is_told_as_one() -> None:
-    robot = robot_named("planar_vertical")
+    robot = load_robot("planar_vertical")
     home = robot.reference_pose
     found = workspace_map(robot, [home[0], home[0] + 0.25], home[1], home[2], elastic=False)
     assert found.size_words(np.ones((2, 1, 1), bool)) == "0.25 m"
@@ -407,7 +403,7 @@ def test_the_size_of_a_map_is_words_of_their_own_and_one_dead_pose_is_told_as_on
 
 
 def test_all_of_a_grid_is_as_large_as_its_box() -> None:
-    robot = robot_named("demobot_cogiro")
+    robot = load_robot("demobot_cogiro")
     axes = np.linspace(0.1, 0.7, 7), np.array([0.1, 0.2, 0.4]), np.linspace(0.05, 0.25, 2)
     found = workspace_map(robot, *axes, elastic=False)
     everywhere = np.ones(found.margin.shape, dtype=bool)
@@ -420,7 +416,7 @@ def test_all_of_a_grid_is_as_large_as_its_box() -> None:
 
 def test_a_single_pose_has_no_size() -> None:
     """It was 1.0, without a unit."""
-    one = workspace_map(robot_named("demobot_cogiro"), 0.4, 0.25, 0.1, elastic=False)
+    one = workspace_map(load_robot("demobot_cogiro"), 0.4, 0.25, 0.1, elastic=False)
     document = replace(one, chance=np.ones((1, 1, 1))).as_json(0.95)
     assert document["feasible"] == document["likely"]["poses"] == 1
     sizes = document["cell"], document["size_feasible"], document["likely"]["size"]
@@ -429,7 +425,7 @@ def test_a_single_pose_has_no_size() -> None:
 
 def test_the_size_of_a_ball_is_that_of_a_ball() -> None:
     """Cut by the grid's end through its middle, too: half of it is left."""
-    robot = robot_named("demobot_cogiro")
+    robot = load_robot("demobot_cogiro")
     for first, part in ((-1.2, 1.0), (0.0, 0.5)):
         axes = np.linspace(first, 1.2, 61), np.linspace(-1.2, 1.2, 61), np.linspace(-1.2, 1.2, 61)
         x, y, z = np.meshgrid(*axes, indexing="ij")
@@ -440,7 +436,7 @@ def test_the_size_of_a_ball_is_that_of_a_ball() -> None:
 
 def test_a_grid_tells_between_which_sizes_the_true_one_lies() -> None:
     """Four digits had been printed of areas that are a tenth off."""
-    bar = robot_named("planar_two_cable")
+    bar = load_robot("planar_two_cable")
     held = [workspace_map(bar, *default_axes(bar, n), elastic=False) for n in (7, 41)]
     coarse, fine = (one.size(one.feasible) for one in held)
     low, high = held[0].size_between(held[0].feasible)
@@ -456,7 +452,7 @@ def test_a_grid_tells_between_which_sizes_the_true_one_lies() -> None:
 
 def test_why_there_is_no_edge_of_a_probability() -> None:
     """Where no pose is that likely, all of them "can be held" had been the reason."""
-    found = workspace_map(robot_named("demobot_cogiro"), [0.4, 0.5], 0.25, [0.1], elastic=False)
+    found = workspace_map(load_robot("demobot_cogiro"), [0.4, 0.5], 0.25, [0.1], elastic=False)
     none = np.zeros((0, 7))
     for chance, reason in (
         (0.5, "no pose of the grid is held"),
@@ -468,7 +464,7 @@ def test_why_there_is_no_edge_of_a_probability() -> None:
 
 
 def test_effects_with_a_memory_have_no_elastic_map() -> None:
-    robot = robot_named("demobot_cogiro")
+    robot = load_robot("demobot_cogiro")
     slow = [Term.of(robot, "hysteresis", amplitude_N=0.05)]
     with pytest.raises(InputError, match=r"in no order, and hysteresis would dep.*--no-elastic"):
         workspace_map(robot, [0.3, 0.4], 0.25, 0.1, effects=slow)
@@ -477,7 +473,7 @@ def test_effects_with_a_memory_have_no_elastic_map() -> None:
 
 
 def test_the_default_grid_has_a_zero_and_no_rounding_beside_it() -> None:
-    robot = robot_named("demobot_cogiro")
+    robot = load_robot("demobot_cogiro")
     high = np.array(robot.exit_points)
     high[:, 2] += 2.0 - high[:, 2].max()
     home = np.array([0.4, 0.25, 0.8, 1, 0, 0, 0])

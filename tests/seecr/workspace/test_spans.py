@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from seecr.commands import Commands, Loads
-from seecr.description.mjcf import load_robot, model_path
+from seecr.description.mjcf import load_robot
 from seecr.effects import Term
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
@@ -37,7 +37,7 @@ def test_zones_are_those_of_a_much_finer_sweep(
     name: str, z: float, y: float, counts: list[int], rows: int
 ) -> None:
     """Figs 7, 8 and 11; with two rows nothing but the search sees the middle."""
-    robot = load_robot(model_path(name))
+    robot = load_robot(name)
     if rows == 2:
         # half of it: from end to end the whole middle would be on the way between two rows
         poses, counts = line(z, y, 2, last=0.4), counts[: len(counts) // 2 + 1]
@@ -78,7 +78,7 @@ def test_rows_at_which_a_search_gave_up_are_passed_by() -> None:
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
 def test_an_edge_is_as_near_as_it_is_told_to_be(tolerance: float) -> None:
-    robot = load_robot(model_path("planar_vertical"))
+    robot = load_robot("planar_vertical")
     spans = slack_spans(solve(robot, line(0.2, 0.0, 24)), tolerance=tolerance)
     for before, after in pairwise(spans):
         within = before.within[1]
@@ -93,7 +93,7 @@ def test_an_edge_is_as_near_as_it_is_told_to_be(tolerance: float) -> None:
 
 
 def test_runs_are_apart_and_turning_alone_has_an_angle() -> None:
-    robot = load_robot(model_path("demobot_parallel"))
+    robot = load_robot("demobot_parallel")
     poses = np.concatenate([line(0.1, 0.25, 3, 0.2, 0.4), line(0.1, 0.25, 3, 0.4, 0.2)])
     spans = slack_spans(solve(robot, poses), Commands(poses, run=np.repeat([5, 8], 3)))
     assert [span.run for span in spans] == [0, 0, 0, 1, 1, 1]
@@ -109,7 +109,7 @@ def test_runs_are_apart_and_turning_alone_has_an_angle() -> None:
 
 def test_a_load_hangs_on_the_way_to_its_row() -> None:
     """The one of the row before does not: with it the edge would be elsewhere."""
-    robot = load_robot(model_path("planar_vertical"))
+    robot = load_robot("planar_vertical")
     poses = line(0.2, 0.0, 2, 0.25, 0.4)
     aside = Loads.of(2, wrench=np.array([[0.0] * 6, [0.3, 0.0, 0.0, 0.0, 0.0, 0.0]]))
     commands = Commands(poses, loads=aside)
@@ -120,7 +120,7 @@ def test_a_load_hangs_on_the_way_to_its_row() -> None:
 
 
 def test_what_remembers_is_told_half_way_between_rows() -> None:
-    robot = load_robot(model_path("planar_vertical"))
+    robot = load_robot("planar_vertical")
     poses = line(0.2, 0.0, 24)
     plain = slack_spans(solve(robot, poses))
     friction = [Term.of(robot, "hysteresis", amplitude_N=1e-3)]
@@ -132,7 +132,7 @@ def test_what_remembers_is_told_half_way_between_rows() -> None:
 
 
 def test_what_is_followed_has_the_same_zones_where_there_is_one_rest() -> None:
-    robot = load_robot(model_path("planar_vertical"))
+    robot = load_robot("planar_vertical")
     poses = line(0.2, 0.0, 24)
     plain, led = (slack_spans(solve(robot, poses, follow=way)) for way in (False, True))
     assert [span.slack for span in led] == [span.slack for span in plain]
@@ -143,7 +143,7 @@ def test_what_is_followed_has_the_same_zones_where_there_is_one_rest() -> None:
 @pytest.mark.slow
 def test_what_is_followed_changes_where_it_jumps() -> None:
     """Solved from the command alone the platform rests elsewhere than where the way leads it."""
-    robot = load_robot(model_path("demobot_parallel"))
+    robot = load_robot("demobot_parallel")
     poses = np.tile(robot.reference_pose, (6, 1))
     turn = np.zeros((6, 3))
     turn[:, 0] = np.radians(np.linspace(140.0, 155.0, 6))
@@ -164,7 +164,7 @@ def test_what_is_followed_changes_where_it_jumps() -> None:
 
 
 def test_where_it_does_not_rest_is_a_zone_of_its_own() -> None:
-    robot = load_robot(model_path("demobot_parallel"))
+    robot = load_robot("demobot_parallel")
     poses = line(0.1, 0.25, 2, 0.1, 0.17)
     poses[0, 1] = 0.1
     found = solve(robot, poses)
@@ -180,7 +180,7 @@ def test_where_it_does_not_rest_is_a_zone_of_its_own() -> None:
 
 
 def test_nothing_and_one_pose() -> None:
-    robot = load_robot(model_path("planar_vertical"))
+    robot = load_robot("planar_vertical")
     assert slack_spans(solve(robot, np.zeros((0, 7)))) == ()
     (span,) = slack_spans(solve(robot, line(0.2, 0.0, 1)))
     assert span.slack == ("cable2", "cable3") and span.width == span.turn == 0.0
@@ -188,7 +188,7 @@ def test_nothing_and_one_pose() -> None:
 
 
 def test_refusals() -> None:
-    robot = load_robot(model_path("planar_vertical"))
+    robot = load_robot("planar_vertical")
     found = solve(robot, line(0.2, 0.0, 3))
     with pytest.raises(InputError, match="tolerance must be one number above zero"):
         slack_spans(found, tolerance=0.0)

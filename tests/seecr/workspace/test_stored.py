@@ -17,7 +17,7 @@ import seecr
 from seecr.workspace import stored
 from seecr.workspace.stored import boxes
 
-ROBOT = seecr.load_robot(seecr.model_path("demobot_parallel"))
+ROBOT = seecr.load_robot("demobot_parallel")
 AXES = np.linspace(0.04, 0.6, 5), np.linspace(0.1, 0.3, 4), np.array([0.1, 0.2, 0.4])
 
 
