@@ -77,7 +77,7 @@ def trajectory(robot: Robot, points: int = 18, extent: float = 1.0) -> Trajector
     runs["loop"] = _loop(frame, reach, 2 * points)
     change = extent * np.concatenate([*runs.values()])
     poses = onto_joints(robot, pose_add(np.tile(robot.reference_pose, (len(change), 1)), change))
-    times, now = list[Array](), 0.0
+    times, now = [], 0.0
     for one in runs.values():
         times.append(now + _BETWEEN_ROWS_S * np.arange(len(one)))
         now = times[-1][-1] + _BETWEEN_RUNS_S
