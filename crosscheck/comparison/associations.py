@@ -220,9 +220,9 @@ def _binned(quantity: Abscissa, some: NDArray[np.bool_]) -> tuple[NDArray[np.int
     """Bin of each row, -1 for none, and the labels of the bins."""
     values = quantity.values
     index = np.full(len(values), -1, dtype=np.int64)
-    if values.dtype.kind == "U":
+    if values.dtype.kind == "U" or quantity.groups:
         names, index[some] = np.unique(values[some], return_inverse=True)
-        return index, [str(name) for name in names]
+        return index, [quantity.groups[k] if quantity.groups else str(k) for k in names]
     some = some & np.isfinite(values)
     rounded = np.round(values[some], 9)
     levels, place = np.unique(rounded, return_inverse=True)

@@ -173,12 +173,9 @@ def _few(problem: Problem, history: bool) -> NDArray[np.intp]:
 
 def _part(problem: Problem, rows: NDArray[np.intp]) -> Problem:
     """The problem of some rows alone."""
-    some = {
-        name: None if values is None else values[rows]
-        for name in ("groups", "far_off")
-        for values in [getattr(problem, name)]
-    }
-    return replace(problem, data=problem.data.rows(rows), use=problem.use[rows], **some)
+    groups = None if problem.groups is None else problem.groups[rows]
+    data, use = problem.data.rows(rows), problem.use[rows]
+    return replace(problem, data=data, use=use, groups=groups, far_off=None)
 
 
 def _cut(chain: Chain, rows: NDArray[np.intp]) -> Chain:

@@ -5,7 +5,7 @@ Measured ones are not among them: a reading with an error would be associated wi
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Any
@@ -64,22 +64,35 @@ def _sums(place: Array, values: Array, size: int) -> Array:
 # the motion at friction or backlash.
 
 
+# Rows at a time, whose vectors of all cables take some megabytes.
+_BLOCK = 2_000
+
+
 def cable_errors(problem: Problem, raw: Array, prediction: Prediction) -> tuple[Array, Array]:
     """Errors of cable length and their noise, each (n, m) [m], from residuals (n, 6 + m).
 
     Rows without a complete pose give NaN.
     """
-    unit, arm = _cables(problem, prediction)
-    turned = np.cross(raw[:, None, ORIENTATION], arm)
-    errors = -np.sum(unit * (raw[:, None, POSITION] + turned), axis=-1)
-    lever = np.linalg.norm(np.cross(arm, unit), axis=-1)
-    sigma, ratio = problem.sigma, problem.data.sigma_ratio
-    turn = (sigma.orientation_rad or 0.0) * ratio[:, 1:2] * lever
-    noise = np.hypot((sigma.position_m or 0.0) * ratio[:, :1], turn)
-    if problem.uses_angles:
-        # differences of Euler angles are not a rotation vector
-        errors = np.full_like(errors, np.nan)
-    return np.where(problem.use[:, None], errors, np.nan), noise
+    sigma, ratio, raw = problem.sigma, problem.data.sigma_ratio, np.asarray(raw)
+
+    def at(some: slice) -> Array:
+        unit, arm = _cables(problem, prediction.pose[some])
+        turned = np.cross(raw[some, None, ORIENTATION], arm)
+        errors = -np.sum(unit * (raw[some, None, POSITION] + turned), axis=-1)
+        lever = np.linalg.norm(np.cross(arm, unit), axis=-1)
+        turn = (sigma.orientation_rad or 0.0) * ratio[some, 1:2] * lever
+        return np.stack([errors, np.hypot((sigma.position_m or 0.0) * ratio[some, :1], turn)])
+
+    errors, noise = in_blocks(at, len(raw), axis=1)
+    # differences of Euler angles are not a rotation vector
+    known = problem.use[:, None] & (not problem.uses_angles)
+    return np.where(known, errors, np.nan), noise
+
+
+def in_blocks(of_rows: Callable[[slice], Array], count: int, axis: int = 0) -> Array:
+    """What is computed row by row, of some thousands of rows at a time: it needs less memory."""
+    starts = range(0, max(count, 1), _BLOCK)
+    return np.concatenate([of_rows(slice(k, k + _BLOCK)) for k in starts], axis=axis)
 
 
 def cable_lengths(problem: Problem, prediction: Prediction) -> Array:
@@ -93,19 +106,22 @@ def independent_part(problem: Problem, prediction: Prediction) -> float:
     The number of independent errors is m^2/tr(C^2) with the correlations C. That is m if they are
     independent, and the number of groups if they are identical within groups.
     """
-    unit, arm = _cables(problem, prediction)
     sigma = problem.sigma
-    turn = (sigma.orientation_rad or 0.0) * np.cross(arm, unit)
-    columns = np.concatenate([(sigma.position_m or 0.0) * unit, turn], axis=-1)
-    columns /= np.maximum(np.linalg.norm(columns, axis=-1, keepdims=True), 1e-300)
-    m = columns.shape[1]
-    together = np.einsum("nik,njk->nij", columns, columns)
-    return float(np.mean(m / np.sum(together**2, axis=(1, 2))))
+
+    def at(some: slice) -> Array:
+        unit, arm = _cables(problem, prediction.pose[some])
+        turn = (sigma.orientation_rad or 0.0) * np.cross(arm, unit)
+        columns = np.concatenate([(sigma.position_m or 0.0) * unit, turn], axis=-1)
+        columns /= np.maximum(np.linalg.norm(columns, axis=-1, keepdims=True), 1e-300)
+        together = np.einsum("nik,njk->nij", columns, columns)
+        return np.asarray(columns.shape[1] / np.sum(together**2, axis=(1, 2)))
+
+    return float(np.mean(in_blocks(at, len(prediction.pose))))
 
 
-def _cables(problem: Problem, prediction: Prediction) -> tuple[Array, Array]:
-    """Unit vectors to the exit points and arms R b_i, (n, m, 3)."""
-    robot, pose = problem.robot, prediction.pose
+def _cables(problem: Problem, pose: Array) -> tuple[Array, Array]:
+    """Unit vectors to the exit points and arms R b_i, (n, m, 3), at poses (n, 7)."""
+    robot = problem.robot
     arm = quat_rotate(pose[:, None, 3:], robot.anchor_points[None])
     reach = robot.exit_points - pose[:, None, :3] - arm
     return reach / np.linalg.norm(reach, axis=-1, keepdims=True), arm
@@ -152,9 +168,9 @@ def travel(problem: Problem, prediction: Prediction) -> Travel:
     weighed = step * np.repeat([1.0, problem.robot.length], 3)
     axis = np.argmax(np.abs(weighed), axis=1)
     most = weighed[np.arange(len(step)), axis]
-    words = [("+" if v > 0 else "-") + AXES[k] for k, v in zip(axis, most, strict=True)]
+    words = np.array([[sign + name for sign in "-+"] for name in AXES])
     moves = np.abs(most) > 1e-6 * problem.robot.length
-    direction = np.where(moves, np.array(words), STILL)
+    direction = np.where(moves, words[axis, (most > 0).astype(int)], STILL)
     speed = np.full(len(pose), np.nan)
     time = problem.data.t_s
     if time is not None:
@@ -190,15 +206,16 @@ def regions_of(problem: Problem, pose: Array) -> Names:
     used = place[problem.use] if problem.use.any() else place
     low, high = used.min(axis=0), used.max(axis=0)
     spread = high - low
-    words: list[list[str]] = [[] for _ in place]
+    names, number = [""], np.zeros(len(place), dtype=np.int64)
     for k, axis in enumerate("xyz"):
         if spread[k] <= _FLAT * spread.max() or spread[k] == 0:
             continue
         middle = 0.5 * (low[k] + high[k])
         edge = middle - _ROUNDING * spread[k]
-        for row, value in zip(words, place[:, k], strict=True):
-            row.append(f"{axis} {'below' if value < edge else 'from'} {middle:.3g} m")
-    return np.array([", ".join(row) or "everywhere" for row in words], dtype=np.str_)
+        halves = [f"{axis} {word} {middle:.3g} m" for word in ("below", "from")]
+        names = [f"{name}, {half}".lstrip(", ") for name in names for half in halves]
+        number = 2 * number + (place[:, k] >= edge)
+    return np.array([name or "everywhere" for name in names], dtype=np.str_)[number]
 
 
 EVERYWHERE = "nothing: it is the same everywhere"
@@ -228,12 +245,14 @@ class Abscissa:
     Attributes:
         kind: kind of the quantity. name: its name in words.
         values: (k,) numbers, or names of groups. unit: unit of the numbers.
+        groups: names in alphabetical order, whose indices the values are, if there are any.
     """
 
     kind: QuantityKind
     name: str
     values: NDArray[Any]
     unit: str = ""
+    groups: tuple[str, ...] = ()
 
 
 def channels(problem: Problem) -> tuple[list[str], list[str]]:
@@ -274,20 +293,21 @@ def of_rows(problem: Problem, prediction: Prediction, way: Travel) -> Iterator[A
         yield Abscissa(QuantityKind.TENSION, f"{name} tension of the taut cables", values, "N")
 
 
-def of_cables(problem: Problem, prediction: Prediction, way: Travel) -> tuple[Abscissa, ...]:
+def of_cables(problem: Problem, prediction: Prediction, way: Travel) -> Iterator[Abscissa]:
     """Quantities that change from cable to cable, with (n m,) values, row by row."""
     robot, n = problem.robot, problem.data.n_rows
-    lengths = cable_lengths(problem, prediction)
+    names, which = np.unique(np.array(robot.cable_names), return_inverse=True)
+    each = np.tile(which.astype(np.int32), n)
+    yield Abscissa(QuantityKind.CABLE, "the cable", each, groups=tuple(names.tolist()))
+    lengths = cable_lengths(problem, prediction).ravel()
+    yield Abscissa(QuantityKind.CABLE, "the cable's length", lengths, "m")
+    yield Abscissa(QuantityKind.CABLE, "the cable's tension", prediction.tensions.ravel(), "N")
     nominal = robot.nominal_lengths(way.pose)
     home = robot.nominal_lengths(robot.reference_pose[None])[0]
     paid = nominal - problem.experiment.commands.before(nominal, home)
-    motion = np.select([paid > 0.0, paid < 0.0], ["paid out", "reeled in"], STILL)
-    return (
-        Abscissa(QuantityKind.CABLE, "the cable", np.tile(np.array(robot.cable_names), n)),
-        Abscissa(QuantityKind.CABLE, "the cable's length", lengths.ravel(), "m"),
-        Abscissa(QuantityKind.CABLE, "the cable's tension", prediction.tensions.ravel(), "N"),
-        Abscissa(QuantityKind.CABLE, "whether the cable was paid out or reeled in", motion.ravel()),
-    )
+    motion = np.select([paid > 0.0, paid < 0.0], [np.int32(0), np.int32(1)], np.int32(2)).ravel()
+    name = "whether the cable was paid out or reeled in"
+    yield Abscissa(QuantityKind.CABLE, name, motion, groups=("paid out", "reeled in", STILL))
 
 
 def in_time(problem: Problem, table: Array) -> tuple[Abscissa | None, int]:

@@ -315,14 +315,12 @@ def nearest_rows(problem: Problem) -> NDArray[np.int64]:
         place = np.concatenate([place, apart], axis=1)
     tree = spatial.cKDTree(place)
     _distance, index = tree.query(place, k=min(4, len(rows)))
-    pairs = set()
-    for a, neighbours in enumerate(np.atleast_2d(index)):
-        for b in neighbours:
-            if b != a and abs(int(rows[b]) - int(rows[a])) > 1:
-                pairs.add((min(a, int(b)), max(a, int(b))))
-                break
-    some = [(rows[a], rows[b]) for a, b in sorted(pairs)]
-    return np.array(some, dtype=np.int64).reshape(-1, 2)
+    here, others = np.arange(len(rows))[:, None], index.reshape(len(rows), -1)
+    apart = (others != here) & (np.abs(rows[others] - rows[here]) > 1)
+    some = np.flatnonzero(apart.any(axis=1))
+    beside = others[some, np.argmax(apart[some], axis=1)]
+    pairs = np.unique(np.sort(np.stack([some, beside], axis=1), axis=1), axis=0)
+    return np.asarray(rows[pairs], dtype=np.int64)
 
 
 # A single row is an outlier if it is so many robust standard deviations above the median; if more

@@ -6,8 +6,10 @@ Noise does not repeat all numbers of a row, unless they are so coarse that chanc
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.measurements.data import Mask, Measurements
 from seecr.counted import plural, some
@@ -55,39 +57,49 @@ def repetitions(data: Measurements, across: bool = False) -> tuple[list[str], Ma
 
 def _pairs(data: Measurements, across: bool) -> tuple[list[Pair], list[Pair]]:
     """Rows that repeat another one whole, and those that do beside another command or load."""
-    read = _readings(data)
-    columns = {k: v for k, v in data.columns() if k != "run" and not k.startswith(_READ)}
-    whole = list(zip(*columns.values(), strict=True))
-    commands = list(zip(_commands(data), data.file.tolist(), strict=True))
+    read, rows = _readings(data), np.arange(data.n_rows)
     number = np.isfinite(read).sum(axis=1)
-    same, first = dict[object, int](), dict[object, int]()
-    twice, copies = list[Pair](), list[Pair]()
-    for row in np.flatnonzero(number).tolist():
-        key = read[row].tobytes()
-        whole_before = same.setdefault((key, whole[row]), row)
-        before = first.setdefault(key, row)
-        if whole_before != row and not (across and data.file[whole_before] == data.file[row]):
-            twice.append((row, whole_before))
-        if across and data.file[before] == data.file[row]:
-            continue
-        if number[row] >= _LEAST_COLUMNS and commands[before] != commands[row]:
-            copies.append((row, before))
-    return twice, copies
+    whole = _first_like(_table(data, lambda name: name != "run"))
+    before = _first_like(read)
+    commands = np.column_stack([_commands(data), data.file])
+    twice = (number > 0) & (whole != rows)
+    copies = (number >= _LEAST_COLUMNS) & (commands != commands[before]).any(axis=1)
+    if across:
+        twice &= data.file[whole] != data.file
+        copies &= data.file[before] != data.file
+    return _listed(twice, whole), _listed(copies, before)
+
+
+def _listed(some: Mask, before: NDArray[np.intp]) -> list[Pair]:
+    return [(row, int(before[row])) for row in np.flatnonzero(some).tolist()]
+
+
+def _first_like(table: Array) -> NDArray[np.intp]:
+    """For each row (n, k) the first one with the same numbers, bit for bit."""
+    if table.shape[1] == 0:
+        return np.zeros(len(table), dtype=np.intp)
+    whole = np.ascontiguousarray(table).view(np.dtype((np.void, 8 * table.shape[1])))
+    _rows, first, which = np.unique(whole.ravel(), return_index=True, return_inverse=True)
+    return np.asarray(first[which.ravel()])
 
 
 _READ = ("meas_", "tension_")
 
 
-def _commands(data: Measurements) -> list[tuple[object, ...]]:
-    """The command and the load of each row, with what else it states beside its readings."""
-    but = (*_READ, "t_s", "run")
-    return list(zip(*(v for k, v in data.columns() if not k.startswith(but)), strict=True))
+def _commands(data: Measurements) -> NDArray[np.intp]:
+    """(n,) the first row with the same command, load, and what else is stated but readings."""
+    return _first_like(_table(data, lambda name: not name.startswith((*_READ, "t_s", "run"))))
 
 
 def _readings(data: Measurements) -> Array:
-    """The readings (n, k) as written; 0 and -0 are the same, NaN is not read."""
-    columns = [values for name, values in data.columns() if name.startswith(_READ)]
-    return np.array(columns, dtype=float).reshape(len(columns), data.n_rows).T + 0.0
+    """The readings (n, k) as written."""
+    return _table(data, lambda name: name.startswith(_READ))
+
+
+def _table(data: Measurements, wanted: Callable[[str], bool]) -> Array:
+    """Columns (n, k) as written; 0 and -0 are the same, NaN is not stated."""
+    columns = [np.array(values, dtype=float) for name, values in data.columns() if wanted(name)]
+    return np.array(columns).reshape(len(columns), data.n_rows).T + 0.0
 
 
 def _by_chance(data: Measurements, count: int) -> float:

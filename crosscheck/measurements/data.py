@@ -345,8 +345,8 @@ class Measurements(Result):
     @property
     def run_index(self) -> NDArray[np.int64]:
         """(n,) index of each row's run in :attr:`runs`."""
-        number = {name: i for i, name in enumerate(self.runs)}
-        return np.array([number[name] for name in self.run.tolist()], dtype=np.int64)
+        _names, first, which = np.unique(self.run, return_index=True, return_inverse=True)
+        return np.argsort(np.argsort(first))[which.ravel()]
 
     @property
     def absolute(self) -> bool:

@@ -27,12 +27,12 @@ from crosscheck.show.blocks import Bold
 from crosscheck.show.comparison import pose_errors_text, verdict_text
 from crosscheck.show.diagnosis import diagnosis_text, pose_of_step_text, step_text
 from crosscheck.show.residuals import Misfit, drawn_words, predicted_poses
-from seecr.compiled.columns import REST
 from seecr.pose import Array
 from seecr.show import colours, layout, plots
 from seecr.show.plots import Legend, legend_of
 from seecr.show.scene import Scene, States, extent
 from seecr.show.stream import MODEL_STEP, POSE, Index, Recording, pose_index, recording_file
+from seecr.statics.tables import rest_lengths_of
 from seecr.units import short
 
 VERDICT, NOW = "text/verdict", "text/now"
@@ -259,7 +259,7 @@ def states_of(state: State, rows: NDArray[np.int64] | slice) -> States:
     """The model's platform and cables at some rows; NaN without equilibrium."""
     prediction = state.prediction
     pose = np.where(prediction.solved[:, None], prediction.pose, np.nan)
-    lengths = prediction.tables.cables[..., REST]
+    lengths = rest_lengths_of(prediction.tables)
     return States(pose[rows], prediction.tensions[rows], lengths[rows], prediction.slack[rows])
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.commands import Commands, Path, waypoints_of
-from seecr.compiled.columns import CONVERGED, ITERATIONS, SINGULAR, STALLED, STRAIN, TENSION
+from seecr.compiled.columns import CONVERGED, ITERATIONS, SINGULAR, STALLED, STRAIN
 from seecr.description.joints import reachable
 from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
@@ -100,7 +100,7 @@ class Prediction(Result):
     @property
     def pulls(self) -> Array:
         """(n, m) [N] how each cable pulls the platform, with all falls of its line."""
-        return self.found.states[..., TENSION]
+        return self.found.tension
 
     def with_rows(self, other: Prediction, rows: NDArray[np.bool_]) -> Prediction:
         """The same with some rows (n,) of another prediction that differs only in length errors.

@@ -12,6 +12,7 @@ from scipy import signal
 
 from crosscheck.comparison.quantities import (
     STILL,
+    Abscissa,
     QuantityKind,
     cable_errors,
     in_time,
@@ -49,7 +50,8 @@ def test_a_run_that_starts_at_its_first_row_has_no_motion_to_it(
     assert way.direction[first] == STILL != before.direction[first] and not way.step[first].any()
     assert np.delete(way.step, first, axis=0) == pytest.approx(np.delete(before.step, first, 0))
     cables = {q.name: q for q in of_cables(there, prediction, way)}
-    moved = cables["whether the cable was paid out or reeled in"].values.reshape(-1, m)
+    words = words_of(cables["whether the cable was paid out or reeled in"])
+    moved = np.array(words).reshape(-1, m)
     assert set(moved[first]) == {STILL} and STILL not in moved[second]
 
 
@@ -83,6 +85,10 @@ def test_regions_are_halves_of_what_was_used(case: tuple[Problem, Prediction]) -
     assert set(regions_of(problem, pose)[[2, 3]]) == {"x from 0.5 m"}, "on the plane"
 
 
+def words_of(quantity: Abscissa) -> list[str]:
+    return [quantity.groups[k] for k in quantity.values]
+
+
 def test_quantities_are_of_rows_or_of_cables(case: tuple[Problem, Prediction]) -> None:
     problem, prediction = case
     way, n, m = travel(problem, prediction), problem.data.n_rows, problem.robot.n_cables
@@ -92,9 +98,9 @@ def test_quantities_are_of_rows_or_of_cables(case: tuple[Problem, Prediction]) -
     assert rows["the run"].kind is QuantityKind.RUN
     cables = {q.name: q for q in of_cables(problem, prediction, way)}
     assert all(len(q.values) == n * m for q in cables.values())
-    assert cables["the cable"].values[:m].tolist() == list(problem.robot.cable_names)
+    assert words_of(cables["the cable"])[:m] == list(problem.robot.cable_names)
     assert cables["the cable's tension"].values[m] == prediction.tensions[1, 0]
-    moved = cables["whether the cable was paid out or reeled in"].values
+    moved = words_of(cables["whether the cable was paid out or reeled in"])
     home = problem.robot.nominal_lengths(problem.robot.reference_pose[None])[0]
     first = problem.robot.nominal_lengths(way.pose[:1])[0] > home
     assert [word == "paid out" for word in moved[:m]] == first.tolist()
