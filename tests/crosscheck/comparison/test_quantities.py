@@ -149,9 +149,12 @@ def test_noise_of_errors_of_cables_is_that_of_noise_of_the_pose(
     assert independent_part(noisy, prediction) == pytest.approx(np.mean(parts), rel=0.02)
 
 
-def test_a_period_is_found_in_time(case: tuple[Problem, Prediction]) -> None:
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+def test_a_period_is_found_in_time(case: tuple[Problem, Prediction], unit: float) -> None:
     problem, _ = case
     assert problem.data.t_s is not None
+    data = replace(problem.data, t_s=unit * problem.data.t_s)
+    problem = Problem(problem.robot, data, problem.sigma, problem.use)
     span = float(np.ptp(problem.data.t_s))
     table = np.sin(2.0 * np.pi * problem.data.t_s / (span / 5.0))[:, None]
     found, tried = in_time(problem, table)

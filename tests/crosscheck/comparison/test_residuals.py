@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -129,6 +130,10 @@ def test_errors_are_traced_to_what_they_follow(robot, against):
     means = [b.mean for b in first.bins]
     assert max(np.abs(means)) == pytest.approx(np.abs(error).max(), rel=0.5)
     assert sum(b.rows for b in first.bins) == plain.n_rows
+    if against == "time":  # bins follow one another, from the first row to the last
+        ends = [float(end) for b in first.bins for end in re.findall(r"[\d.]+", b.label)]
+        assert len(ends) == 12 and ends == sorted(ends) and ends[0] == 0.0
+        assert ends[-1] == pytest.approx(np.ptp(plain.t_s), rel=1e-3)
 
 
 @pytest.mark.slow

@@ -267,10 +267,27 @@ def test_a_member_beside_a_field_needs_its_odds_and_more_than_what_the_field_lea
     for part in (0.98, 1.02):
         power = 2.0 * (part * needed + 0.5 * np.log1p(width**2)) * (1.0 + width**-2)
         assert gain(power, 1) == pytest.approx(part * needed)
-        linear = Linear.of(x, np.sqrt(power) * x[:, 0] + loud * x[:, 1], groups)
-        every = SimpleNamespace(log_prior=lambda key: -cost * len(key), stood_keys=frozenset())
-        about = SimpleNamespace(linear=linear, every=every, prices={})
-        scores = Scores(about, SimpleNamespace(key=frozenset(), score=0.0))  # type: ignore[arg-type]
-        search = SimpleNamespace(last=scores)
-        found.append(is_beyond_fields(search, frozenset("a"), "a"))  # type: ignore[arg-type]
+        y = np.sqrt(power) * x[:, 0] + loud * x[:, 1]
+        found.append(a_is_beyond(Linear.of(x, y, groups), cost))
     assert found == [False, True]
+
+
+def a_is_beyond(linear: Linear, cost: float) -> bool:
+    every = SimpleNamespace(log_prior=lambda key: -cost * len(key), stood_keys=frozenset())
+    about = SimpleNamespace(linear=linear, every=every, prices={})
+    scores = Scores(about, SimpleNamespace(key=frozenset(), score=0.0))  # type: ignore[arg-type]
+    return is_beyond_fields(SimpleNamespace(last=scores), frozenset("a"), "a")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("part", "is_beyond"), [(0.4, True), (0.6, False)])
+def test_only_a_field_that_explains_half_of_what_the_best_does_may_stand_for_a_member(
+    part: float, is_beyond: bool
+) -> None:
+    """The other field can do all that the member does, and explains such a part of the rest."""
+    x = np.linalg.qr(np.random.default_rng(0).normal(size=(60, 3)))[0][:, [0, 1, 0, 2]]
+    places = {"a": [0], "~place": [1], "~other": [2, 3]}
+    groups = {k: MemberColumns(np.array(own), np.array([100.0])) for k, own in places.items()}
+    best = 0.5 * 20.0**2 - 0.5 * np.log1p(1e4)
+    other = np.sqrt(2.0 * part * best + np.log1p(1e4))
+    y = x @ np.array([15.0, 20.0, 0.0, other])
+    assert a_is_beyond(Linear.of(x, y, groups), 3.0) is is_beyond
