@@ -77,7 +77,14 @@ than its tolerance: if cables are stiff, forces are far from balanced there.
 ## Maps of any size
 
 A map of {large} poses in parts on disk (`seecr map --parts`) takes {store:.2f} µs of processor a
-pose, and {memory:.2f} GB of memory at most.
+pose, and {memory:.2f} GB of memory at most. Time is proportional to the number of poses, and memory
+is not; measured once, with `seecr map demobot_cogiro --parts --grid` and ever finer axes:
+
+| poses | processor (s) | a pose (µs) | memory (GB) | on disk (GB) |
+| ---: | ---: | ---: | ---: | ---: |
+| 1,000,000 | 6.2 | 6.2 | 0.55 | 0.07 |
+| 10,000,000 | 48.3 | 4.8 | 0.58 | 0.7 |
+| 100,000,000 | 459.9 | 4.6 | 0.59 | 7.4 |
 """
 # What an older commit is asked: microseconds a pose, the best of three.
 OLDER = """

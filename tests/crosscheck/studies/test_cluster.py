@@ -80,6 +80,9 @@ def test_commands_take_a_scheduler(workers: Any, tmp_path: Path) -> None:
     assert {k: v for k, v in here.items() if k != "made"} == {
         k: v for k, v in there.items() if k != "made"
     }
+    ran(f"{map_at} --parts --out {tmp_path / 'a'}", 0)
+    ran(f"{map_at} --parts --out {tmp_path / 'b'} {at}", 0)
+    assert parts_of(tmp_path / "a") == parts_of(tmp_path / "b")
     ran(f"crosscheck run --case planar-two-cable {at} --out {tmp_path / 'c'}", 0)
     assert (tmp_path / "c" / "planar-two-cable.rrd").exists()
     cases = tmp_path / "cases.csv"
