@@ -2,16 +2,18 @@
 
     python scripts/score_moves.py ../shared/data/labs3               all numbers, on all cases
     python scripts/score_moves.py ../shared/data/labs3 SURE UNKNOWN   some numbers
+    python scripts/score_moves.py ../shared/data/labs3 --cases D05 R01   on some cases
 
-Probabilities move by odds, ln odds by ln 2, everything else is doubled and halved. A row is a
-number: its values, and the cases whose verdict or names change, with what they become. Which of
-these are still right, answers.json tells.
+Probabilities move by odds, ln odds by ln 2, everything else is doubled and halved. FALSE_ALARM is of
+``add`` alone and stays. A row is a number: its values, and the cases whose verdict or names change,
+with what they become. Which of these are still right, answers.json tells.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -43,12 +45,12 @@ def moved(name: str, factor: float) -> Any:
     return type(value)(round(factor * value)) if isinstance(value, int) else factor * value
 
 
-def answers(folder: Path, name: str, value: Any = None) -> dict[str, str]:
+def answers(folder: Path, cases: Sequence[str], name: str, value: Any = None) -> dict[str, str]:
     """The verdict and names of each case, with one number moved."""
     if name:
         move(name, value)
     out = {}
-    for case in sorted(json.loads((folder / "answers.json").read_text(encoding="utf-8"))):
+    for case in cases or sorted(json.loads((folder / "answers.json").read_text(encoding="utf-8"))):
         files = [folder / case / file for file in ("measured.csv", "second.csv")]
         data = [file for file in files if file.exists()]
         found = crosscheck.diagnose(folder / case / "robot.xml", data)
@@ -60,15 +62,16 @@ def answers(folder: Path, name: str, value: Any = None) -> dict[str, str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
-    every = [name for name in vars(priors) if name.isupper()]
+    every = [name for name in vars(priors) if name.isupper() and name != "FALSE_ALARM"]
     parser.add_argument("names", nargs="*", choices=[[], *every], default=[])
+    parser.add_argument("--cases", nargs="+", default=[])
     parser.add_argument("--workers", type=int, default=2)
     chosen = parser.parse_args()
     steps = [(name, moved(name, by)) for name in chosen.names or every for by in FACTORS]
     # a process for each move, which leaves no other number moved
     with ProcessPoolExecutor(chosen.workers, max_tasks_per_child=1) as pool:
-        first = pool.submit(answers, chosen.folder, "")
-        later = [pool.submit(answers, chosen.folder, *step) for step in steps]
+        first = pool.submit(answers, chosen.folder, chosen.cases, "")
+        later = [pool.submit(answers, chosen.folder, chosen.cases, *step) for step in steps]
         base = first.result()
         for (name, value), found in zip(steps, later, strict=True):
             other = {k: v for k, v in found.result().items() if v != base[k]}
