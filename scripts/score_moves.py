@@ -4,9 +4,9 @@
     python scripts/score_moves.py ../shared/data/labs3 SURE UNKNOWN   some numbers
     python scripts/score_moves.py ../shared/data/labs3 --cases D05 R01   on some cases
 
-Probabilities move by odds, ln odds by ln 2, everything else is doubled and halved. FALSE_ALARM is of
-``add`` alone and stays. A row is a number: its values, and the cases whose verdict or names change,
-with what they become. Which of these are still right, answers.json tells.
+Probabilities move by odds, ln odds by ln 2, everything else is doubled and halved. A row is a
+number: its values, and the cases whose verdict or names change, with what they become. Which of
+these are still right, answers.json tells.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def answers(folder: Path, cases: Sequence[str], name: str, value: Any = None) ->
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
-    every = [name for name in vars(priors) if name.isupper() and name != "FALSE_ALARM"]
+    every = [name for name in vars(priors) if name.isupper()]
     parser.add_argument("names", nargs="*", choices=[[], *every], default=[])
     parser.add_argument("--cases", nargs="+", default=[])
     parser.add_argument("--workers", type=int, default=2)

@@ -270,7 +270,8 @@ def _credible(
 
     An effect may be 0.7 probable and another in its place 0.28. Then it is sure that one of the two
     is missing: the likeliest that exchange for a member join its class until that is sure. Those
-    that are equal anyway count as one.
+    that are equal anyway count as one. Of names that are just sure, one in twenty would be false.
+    So more join if these few leave no more than FALSE_ALARM outside.
     """
     out = {members: set(members) for members in classes}
     for members in classes:
@@ -279,15 +280,17 @@ def _credible(
                 next(iter(key - best)): score for key, score in scores.items()
                 if best - key == {own} and len(key - best) == 1
             }  # fmt: skip
+            # sure enough for a name, and then, if few more do it, for one that is not a false alarm
             grown, joined = set(members), 1
-            for other in sorted(others, key=lambda k: (-others[k], k)):
-                if chance(grown) >= priors.SURE or joined >= priors.FEW:
-                    break
-                alone = next((m for m in classes if other in m), (other,))
-                if other not in grown and not set(alone) & best:
-                    grown, joined = grown | set(alone), joined + 1
-            if chance(grown) >= priors.SURE:
-                out[members] = grown
+            for enough in (priors.SURE, 1.0 - priors.FALSE_ALARM):
+                for other in sorted(others, key=lambda k: (-others[k], k)):
+                    if chance(grown) >= enough or joined >= priors.FEW:
+                        break
+                    alone = next((m for m in classes if other in m), (other,))
+                    if other not in grown and not set(alone) & best:
+                        grown, joined = grown | set(alone), joined + 1
+                if chance(grown) >= enough:
+                    out[members] = set(grown)
     taken = [grown for members, grown in out.items() if len(grown) > len(members)]
     done = list[tuple[str, ...]]()
     for members, grown in out.items():

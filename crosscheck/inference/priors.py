@@ -49,7 +49,8 @@ SURE = 0.95
 """Probability from which on an effect is named, or something unknown said to be there."""
 
 FALSE_ALARM = 0.01
-"""p-value below which an effect that a user adds explains more than chance does."""
+"""p-value below which an effect that a user adds explains more than chance does; and chance that
+an effect is missing instead of all that are named as indistinguishable, if a few more do it."""
 
 OPEN = 1.0
 """Expected number of effects that are left open (sum of min(P, 1 - P)) below which a few named

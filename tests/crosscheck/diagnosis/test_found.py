@@ -337,3 +337,14 @@ def test_structure_is_a_verdict_only_where_it_matters() -> None:
     assert found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
     assert "The structure that remains is too small to matter: " in found.sentence
     assert found.measure_next[-1].startswith("nothing that matters is missing;")
+
+
+def test_what_chance_puts_second_is_named_beside_what_it_puts_first() -> None:
+    """Softer cables whose noise happens to look like a bent law, by odds of a hundred to one."""
+    robot = load_robot(COGIRO)
+    alike = ("stiffness", "winch_side_length", "frame_compliance", "platform_mass",
+             "exit_friction", "nonlinear_elasticity", "hysteresis")  # fmt: skip
+    data = measured(robot, [term(robot, "stiffness", factor=1.105)], seed=37)
+    (found,) = diagnose(robot, data, only=alike).missing
+    assert "stiffness" in {found.effect, *found.indistinguishable}
+    assert found.probability > 0.99
