@@ -153,8 +153,8 @@ def note_on_few(problem: Problem) -> list[str]:
         return []
     return [
         f"Whether what is left is noise with correlation from row to row was asked of about "
-        f"{_MOST_ASKED} of {count} rows: of stretches of {_STRETCH} rows, evenly spaced, or where "
-        "the model has a history of the first rows of each run."
+        f"{_MOST_ASKED} of {counted(count, 'row')}: of stretches of {_STRETCH} rows, evenly "
+        "spaced, or where the model has a history of the first rows of each run."
     ]
 
 

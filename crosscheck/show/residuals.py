@@ -174,8 +174,8 @@ def drawn_words(count: int) -> str:
         return ""
     half = _MOST_DRAWN // 2
     return (
-        f"Drawn are {_MOST_DRAWN} of {count} rows: the {half} with the largest errors in units of "
-        f"the noise, and {half} evenly spaced among the others."
+        f"Drawn are {_MOST_DRAWN} of {counted(count, 'row')}: the {half} with the largest errors "
+        f"in units of the noise, and {half} evenly spaced among the others."
     )
 
 

@@ -122,7 +122,7 @@ COUNTED = re.compile(rf"\{{[^{{}}]*\}} (?:(?!on )\w+ )?(?:{NOUNS})s\b")
 # What is no number, and numbers that are never one.
 ALLOWED = {
     "{name} rows", "{what} columns", "{kind.name} readings", "{effect.name} leaves readings",
-    "{MOST_POSES:.0e} poses", "{_ROWS} rows", "{tried} effects", "{m} cables",
+    "{most:.0e} poses", "{_STRETCH} rows", "{_ROWS} rows", "{tried} effects", "{m} cables",
     "{_MOST_CHANGES} poses",
 }  # fmt: skip
 
