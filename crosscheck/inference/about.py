@@ -122,12 +122,16 @@ def linear_of(
         at = first + np.arange(columns.shape[1])
         groups[key] = MemberColumns(at, np.array(FIELD_WIDTHS))
         first += len(at)
-    white = fit.metric.white(np.column_stack([x, *fields.values(), y]))
-    more = np.zeros((sum(map(len, readings)), first))
-    more[:, :count] = np.concatenate([np.zeros((0, count)), *known])
-    whole = np.concatenate([white[:, :-1], more])
-    left = np.concatenate([white[:, -1], *readings])
-    return Linear.of(whole, left, groups), np.append(z, np.zeros(first - count))
+    white = np.empty((len(y), first))  # one by one: together fields may be a gigabyte
+    white[:, :count] = fit.metric.white(x)
+    for key, columns in fields.items():
+        white[:, groups[key].columns] = fit.metric.white(columns)
+    linear = Linear.of(white, fit.metric.white(y), groups)
+    if known:
+        more = np.zeros((sum(map(len, readings)), first))
+        more[:, :count] = np.concatenate(known)
+        linear = linear.with_readings(more, np.concatenate(readings))
+    return linear, np.append(z, np.zeros(first - count))
 
 
 class About:

@@ -72,6 +72,12 @@ class Linear:
         """The normal equations of whitened columns (N, p) and readings (N,)."""
         return cls(x.T @ x, x.T @ y, float(y @ y), groups)
 
+    def with_readings(self, x: Array, y: Array) -> Linear:
+        """The same with further whitened columns (n, p) and readings (n,)."""
+        more = Linear.of(x, y, self.groups)
+        normal, gradient = self.normal + more.normal, self.gradient + more.gradient
+        return Linear(normal, gradient, self.power + more.power, self.groups)
+
     def solved(self, chosen: Widths) -> Solved:
         """The normal equations of one set, solved."""
         none = np.zeros(0, dtype=np.intp)

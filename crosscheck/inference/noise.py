@@ -140,8 +140,11 @@ def _less_foretold(chain: Chain, noise: Noise, unit: Array) -> Array:
     phi = foretold(chain, noise)
     if not phi.any():
         return unit
-    left = unit - _along(unit, phi) * unit[np.maximum(chain.before, 0)]
-    return np.asarray(left / _along(unit, np.sqrt(1.0 - phi**2)))
+    left = unit[np.maximum(chain.before, 0)]  # of many columns: one copy is enough
+    left *= -_along(unit, phi)
+    left += unit
+    left /= _along(unit, np.sqrt(1.0 - phi**2))
+    return left
 
 
 def _along(values: Array, factor: Array) -> Array:
