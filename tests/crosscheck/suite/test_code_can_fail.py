@@ -452,7 +452,7 @@ FAULTS = {
         ("precise - np.eye(len(own)) / self.chosen[name] ** 2", "precise", evidence),
     ),
     "crosscheck.inference.noise": (
-        ("np.sqrt(1.0 - phi**2)))", "(1.0 - phi**2)))", noise),
+        ("np.sqrt(1.0 - phi**2))", "(1.0 - phi**2))", noise),
         ("np.sum(np.log1p(-(phi**2)))", "0.0", noise),
         ("by_kind(squares - 1.0), by_kind(slope)", "by_kind(squares - 1.2), by_kind(slope)", noise),
         ("prior - 0.5 * each_power[:, None] / sizes**2", "prior", noise),
