@@ -3,9 +3,10 @@
     P(A) = sum of exp(score) over the fitted hypotheses in A / sum over all
 
 Two effects belong to one class if exchanging them costs less than EQUAL of ln evidence: these data
-cannot tell them apart. The probability of a class is that of at least one of its members. Something
-unknown is there in hypotheses with a field, and in those whose noise is louder than stated and goes
-along from row to row (:meth:`crosscheck.inference.noise.NoisePrior.is_unknown`).
+cannot tell them apart. The likeliest other exchanges join it until it holds SURE, and if a few more
+do that all but FALSE_ALARM. The probability of a class is that of at least one of its members.
+Something unknown is there in hypotheses with a field, and in those whose noise is louder than
+stated and slow, or goes by the place (:meth:`crosscheck.inference.noise.NoisePrior.is_unknown`).
 """
 
 from __future__ import annotations
@@ -26,9 +27,8 @@ from seecr.effects.base import Layout
 
 # An effect of at most so many parameters is small, see EQUAL.
 _SMALL = 3
-# The key of a function of the place that stands for noise, and after which parts of half the range
-# of an axis it is forgotten: any that a cubic follows, and the finest that a grid of a dozen places
-# along an axis shows.
+# The key of a function of the place that stands for noise. It is forgotten after a part of half the
+# range of an axis: after 1, a cubic follows it; 0.15 is the distance of a dozen places on an axis.
 _PLACE, _SMOOTH, _ROUGH = "~place", 1.0, 0.15
 
 Scored = Mapping[Key, float]
