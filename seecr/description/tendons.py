@@ -191,7 +191,7 @@ def _check_way(
 def _one_line(model: mujoco.MjModel, platform: Platform, way: Way) -> bool:
     """Whether all parts are between the same two points, but for rounding."""
     ends = np.array([_points(model, platform, span) for span in way.spans])
-    return bool(np.ptp(ends, axis=0).max() <= _SAME * max(1.0, np.abs(ends).max()))
+    return np.allclose(ends, ends[:1], rtol=_SAME, atol=_SAME)  # infinite ones are refused later
 
 
 def _points(

@@ -1,8 +1,10 @@
-"""Hypothesis' strategy of spoiled files: valid bytes with a few random edits."""
+"""Spoiled files: valid bytes with a few random edits."""
 
 from __future__ import annotations
 
-from hypothesis import strategies as st
+import os
+from collections.abc import Iterator
+from random import Random
 
 # What typing errors, spreadsheets and broken disks leave in files.
 _PIECES = [
@@ -13,15 +15,23 @@ _PIECES = [
 ]  # fmt: skip
 
 
-@st.composite
-def spoiled(draw: st.DrawFn, whole: bytes) -> bytes:
-    """The bytes with one to four edits: a stretch removed, repeated, or replaced by a piece."""
-    data = bytearray(whole)
-    for _ in range(draw(st.integers(1, 4))):
-        at = draw(st.integers(0, len(data)))
-        length = draw(st.sampled_from([0, 0, 1, 1, 2, 5, 20, 200]))
-        piece = draw(st.sampled_from(_PIECES) | st.binary(max_size=3))
-        if draw(st.integers(0, 9)) == 0:
-            piece = bytes(data[at : at + length]) * 2
-        data[at : at + length] = piece
-    return bytes(data)
+def spoiled(whole: bytes) -> Iterator[bytes]:
+    """As many spoiled files as ``SEECR_EXAMPLES`` says, drawn with the seed ``SEECR_SEED``.
+
+    Each has one to four edits: a stretch removed, repeated, or replaced by a piece. Hypothesis is
+    not asked: it takes longer to draw a file than our programs to read it, and with so few edits
+    there is little to shrink.
+    """
+    random = Random(int(os.environ.get("SEECR_SEED", "0")))
+    for _ in range(int(os.environ.get("SEECR_EXAMPLES", "40"))):
+        data = bytearray(whole)
+        for _ in range(random.randint(1, 4)):
+            at = random.randint(0, len(data))
+            length = random.choice([0, 0, 1, 1, 2, 5, 20, 200])
+            piece = random.choice(_PIECES)
+            if random.random() < 0.5:
+                piece = random.randbytes(random.randint(0, 3))
+            if random.random() < 0.1:
+                piece = bytes(data[at : at + length]) * 2
+            data[at : at + length] = piece
+        yield bytes(data)

@@ -326,10 +326,12 @@ def test_a_platform_far_larger_than_its_frame_is_refused(tmp_path: Path) -> None
 
 
 def test_numbers_that_no_robot_has_name_the_file_and_the_cable(tmp_path: Path) -> None:
-    far = WORLD.replace("1 0 2", "1e300 0 2")
-    assert refusal(mjcf(tmp_path, world=far)) == (
-        "robot two ropes: exit_points of right holds a number that is not finite, or beyond 1e+30"
-    )
+    told = "robot two ropes: {} of right holds a number that is not finite, or beyond 1e+30"
+    for number in ("1e300", "inf", "-inf"):
+        far = WORLD.replace("1 0 2", f"1 0 {number}")
+        assert refusal(mjcf(tmp_path, world=far)) == told.format("exit_points")
+        away = PLATFORM.replace('"0.1 0 0"', f'"0.1 {number} 0"')
+        assert refusal(mjcf(tmp_path, platform=away)) == told.format("anchor_points")
     stiff = TENDONS.replace('"200"', '"1e150"')
     text = refusal(mjcf(tmp_path, tendons=stiff))
     assert text.startswith("robot two ropes: stiffness x rest length of left holds a number that")
