@@ -378,9 +378,11 @@ class _Cable:
             wheel, "geom", name=f"sheave{number}", type="cylinder", size=numbers_text(r, 0.2 * r),
             pos=numbers_text(r, 0.0, 0.0), quat=_ACROSS, contype="0", conaffinity="0", mass="0",
         )  # fmt: skip
-        # on top: as seen from the centre, between the normals of the two tangents
-        lean = 0.9 * np.arctan2(r, self.tail)
-        side = [r + 2.0 * r * np.sin(lean), 0.0, 2.0 * r * np.cos(lean)]
+        # On top, where MuJoCo is to lay the cable. MuJoCo 4 wants this between the normals of both
+        # tangents, 3.13 nearer to the arc's middle than to that of the way round below. For every
+        # direction of a cable of half to twice its length, both hold by this angle to the exit.
+        lean = 0.5 * np.arctan2(r, self.tail)
+        side = [r - 2.0 * r * np.sin(lean), 0.0, 2.0 * r * np.cos(lean)]
         ET.SubElement(wheel, "site", name=f"over{number}", pos=numbers_text(side))
 
     def _ahead(self) -> Array:

@@ -139,7 +139,8 @@ def test_welded_bodies_are_merged_as_mujoco_fuses_them(name: str, tmp_path: Path
     inertia = axes.reshape(3, 3) @ np.diag(model.body_inertia[1]) @ axes.reshape(3, 3).T
     assert ours.mass == pytest.approx(float(model.body_mass[1]), rel=1e-14)
     assert ours.centre_of_mass == pytest.approx(model.body_ipos[1], abs=1e-14)
-    assert ours.inertia == pytest.approx(inertia, abs=1e-14)
+    # MuJoCo 3.13 turns its axes until they are right to 1e-6
+    assert ours.inertia == pytest.approx(inertia, abs=1e-6 * inertia.max())
     assert ours.anchor_points == pytest.approx(theirs.anchor_points, abs=1e-14)
 
 

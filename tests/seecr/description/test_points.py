@@ -161,7 +161,8 @@ def test_a_saved_robot_loads_back_equal(robot: seecr.Robot, tmp_path: Path) -> N
     assert model.nbody == 2 and model.body_mass[1] == robot.mass
     axes = Rotation.from_quat(model.body_iquat[1], scalar_first=True).as_matrix()
     compiled = axes * model.body_inertia[1] @ axes.T
-    np.testing.assert_allclose(compiled, robot.inertia, atol=1e-12 * robot.inertia.max())
+    # whose axes MuJoCo 3.13 turns until they are right to 1e-6
+    np.testing.assert_allclose(compiled, robot.inertia, atol=1e-6 * robot.inertia.max())
 
 
 def test_without_an_inertia_it_is_that_of_a_box_around_the_anchor_points() -> None:

@@ -144,6 +144,29 @@ def test_a_cable_that_goes_straight_up_has_its_sheave_turned_anywhere() -> None:
     assert np.abs(away).max() < NEAR * THREE.length
 
 
+@pytest.mark.parametrize("height", [-1.0, 0.0, 1.0, 1.9])
+@pytest.mark.parametrize("aside", [-0.6, 0.6])
+def test_cables_lie_on_top_of_their_sheaves_wherever_the_platform_is(
+    height: float, aside: float
+) -> None:
+    """From nearly straight up to nearly straight down: winch, arc and tangent of a circle."""
+    r = 0.02
+    exported = export(THREE, [term(THREE, "pulley_radius", radius_m=r)])
+    assert exported.mujoco_text is not None and exported.solution is not None
+    model = mujoco.MjModel.from_xml_string(exported.mujoco_text)
+    data = mujoco.MjData(model)
+    data.qpos[:2] = [aside, height - THREE.reference_pose[2]]
+    mujoco.mj_forward(model, data)
+    anchors = THREE.anchor_points[:2] + np.array([THREE.reference_pose[0] + aside, 0.0, height])
+    ways = anchors - THREE.exit_points[:2]
+    flat, up = np.abs(ways[:, 0]), ways[:, 2]
+    # seen from the sheave's centre, with angles from the exit point over the top
+    far = np.hypot(flat - r, up)
+    arc = np.arctan2(up, r - flat) % (2 * np.pi) - np.arccos(r / far)
+    below = exported.solution.rest_lengths[0, :2]  # where the file has the winches
+    np.testing.assert_allclose(data.ten_length[:2], below + r * arc + np.sqrt(far**2 - r**2))
+
+
 def test_a_planar_robot_keeps_its_joints() -> None:
     robot = load_robot("planar_vertical")
     at = robot.reference_pose + np.array([0.05, 0, 0.03, 0, 0, 0, 0])

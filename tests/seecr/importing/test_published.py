@@ -130,7 +130,7 @@ def test_the_pose_at_the_joints_initial_values(
     turn = Rotation.identity()
     if expected:
         # rotations about moving axes are upper case for SciPy
-        turn = Rotation.from_euler(expected.upper(), angles)
+        turn = Rotation.from_euler(expected.upper(), angles if angles[1:] else angles[0])
     letters = {"PLANAR_XZ": [0, 2], "PLANAR_YZ": [1, 2]}.get(joint, list(range(slides)))
     place = np.array([0.1, 0.2, 0.3])
     place[letters] += start[:slides]
