@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         parameter,
     )
     from seecr.effects.setup import Setup
+    from seecr.equilibrium.lower import LowerEquilibria, lower_equilibria
     from seecr.equilibrium.saddles import Barrier, barriers
     from seecr.equilibrium.search import equilibria
     from seecr.equilibrium.solving import solve
@@ -109,6 +110,7 @@ _MODULES = {
     "workspace.stored": ("StoredMap", "store_map"),
     "description.mjcf": ("load_robot", "model_names", "model_path",),
     "prediction.model": ("Model", "load_model", "new_model"),
+    "equilibrium.lower": ("LowerEquilibria", "lower_equilibria"),
     "equilibrium.search": ("equilibria",),
     "workspace.planar": (
         "BarRest", "bar_equilibria", "bar_tilt", "midline_point", "solution_manifold",
@@ -130,7 +132,8 @@ __all__ = [
     "BarBalance", "BarManifold", "BarRest", "Barrier", "Commands", "Control", "Controlled",
     "Correction", "Effect", "ExecutorError", "Experiment", "Export", "FeedForward", "Feedback",
     "InputError",
-    "InputFileError", "Joint", "Jump", "Knowledge", "Loads", "Midlines", "MissingPackageError",
+    "InputFileError", "Joint", "Jump", "Knowledge", "Loads", "LowerEquilibria", "Midlines",
+    "MissingPackageError",
     "Model", "NoRestError", "Prediction", "Readings", "Robot", "RobotError", "Scheme",
     "SeecrError", "SensorNoise", "Setup", "SlackSpan", "Solution", "Spread", "Status", "StoredMap",
     "Term",
@@ -138,7 +141,8 @@ __all__ = [
     "barriers", "boundary", "catalogue", "control", "correct", "default_axes", "effect_named",
     "equilibria", "export", "feasible", "held_chance", "introduce", "kept_chance", "layout_of",
     "load_model",
-    "load_robot", "midline_point", "midline_points", "model_names", "model_path", "new_model",
+    "load_robot", "lower_equilibria", "midline_point", "midline_points", "model_names",
+    "model_path", "new_model",
     "parameter", "placed", "predict", "sensitivities", "slack_spans", "slack_zones",
     "solution_manifold", "solve", "spread_of", "store_map", "tension_margin", "tracked",
     "with_history", "workspace_map",

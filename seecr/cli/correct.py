@@ -81,6 +81,10 @@ def command(
     tracker is known to read the platform in the base frame, calibrate with --exclude
     tracker_frame,tracker_target.
 
+    Another stable equilibrium with the same lengths that is lower, and turned by less than a right
+    angle from the pose reached, is told: a short search, which may miss some, as seecr sweep makes
+    it. seecr sweep --follow says which of them the way from the reference pose leads to.
+
     Writes corrected.csv and corrected.toml, which every command reads as commands, and
     correction.json. Poses without any answer are left out of corrected.csv; poses are named by
     their line in POSES.csv. If no pose has an answer, only correction.json is written, which says
@@ -90,7 +94,7 @@ def command(
     Exit status: 0 all poses reached, or some and the others replaced by the nearest, 2 bad input,
     3 a pose without an answer, one at which the platform does not come to rest, or none reached.
     """  # fmt: skip
-    from seecr import correct, kept_chance
+    from seecr import correct, kept_chance, lower_equilibria
     from seecr.cli.arguments import model_at, notes_of, robot_at
     from seecr.files import json_text, with_toml, write_texts
     from seecr.folders import check_ours, staged
@@ -120,14 +124,16 @@ def command(
             if own is not None:
                 tell("chances", 0.8)
                 kept = kept_chance(machine, found.commands, own, **within)
+            told = replace(found.solution, line=found.commands.line)
+            tell("lower equilibria", 0.9)
+            lower = lower_equilibria(told)
             tell("corrected", 1.0)
         status = 0 if found.stays.all() and found.reached.any() else 3
-        told = replace(found.solution, line=found.commands.line)
         notes = [*notes_of(own, told, wanted.commands), *wanted.notes, *tracker]
         if turns and found.reached.any():
             notes.append(turned_words(found))
         told_of_it = {"made": made, "exit_status": status, "notes": notes}
-        text = json_text({**told_of_it, **found.as_json(kept)})
+        text = json_text({**told_of_it, **found.as_json(kept), "lower": lower})
         files = {"correction.json": text + "\n"}
         if found.found.any():  # a list without commands is none that anything reads
             texts = [corrected_csv(found, wanted), corrected_toml(wanted)]
@@ -137,10 +143,10 @@ def command(
         write_texts({folder / name: text for name, text in files.items()})
     then = mapping(machine, robot, cable, own)  # where there is something to hold
     if found.found.any():
-        given = given_with(cable, model)
+        given = (*given_with(cable, model), *(("--follow",) if len(lower.rows) else ()))
         then = following("seecr", "sweep", robot, out / "corrected.csv", *given)
     chances = chance_lines(found, kept, aim == "minimum", highest is not None)
-    said = [*found.lines(), *rope_lines(found, cable), *chances]
+    said = [*found.lines(), *rope_lines(found, cable), *chances, *lower.lines()]
     lines = [*untold(notes), *said, f"Results in {out}/", then]
     click.echo(text if as_json else "\n".join(lines))
     return status

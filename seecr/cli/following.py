@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from seecr import Commands, Model, Robot, Solution
+    from seecr import Commands, LowerEquilibria, Model, Robot, Solution
 
 STDIN = "/dev/stdin"
 # In a context's ``meta``: what ``--passive`` and ``--effect`` named, for the command that follows.
@@ -138,14 +138,25 @@ def after_pose(
 
 
 def after_sweep(
-    solution: Solution, commands: Commands, robot: Path, poses: Path | None, cable: str | None,
-    model: Model | None,
+    lower: LowerEquilibria, commands: Commands, robot: Path, poses: Path | None,
+    cable: str | None, model: Model | None,
 ) -> str:  # fmt: skip
-    """Correcting the poses of a file; what measuring told lengths would show; the workspace."""
+    """The row with the deepest lower equilibrium by itself, or which one the way there leads to.
+
+    Without one correcting the poses of a file; what measuring told lengths would show; the
+    workspace.
+    """
+    options = given_with(cable, None if model is None else model.path)
+    if len(lower.rows):
+        if commands.lengths is None and commands.loads is None and commands.temperature is None:
+            pose = commands.pose[lower.rows[lower.deepest]]
+            numbers = (f"{value + 0.0:.10g}" for value in pose)
+            return following("seecr", "pose", robot, *numbers, *options)
+        if poses is not None and lower.beside.jumps is None:
+            return following("seecr", "sweep", robot, poses, *options, "--follow")
     if poses is None:
-        return mapping(solution.robot, robot, cable, model)
+        return mapping(lower.beside.robot, robot, cable, model)
     if commands.lengths is None:
-        options = given_with(cable, None if model is None else model.path)
         return following("seecr", "correct", robot, poses, *options)
     return following("crosscheck", "plan", robot, poses)
 

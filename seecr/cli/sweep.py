@@ -71,6 +71,10 @@ def command(
     On two pairs of parallel cables in a plane, the paper's point V or H is given, too; of a bar on
     two cables its tilt beside those at which it is in balance, the paper's manifold.
 
+    Another stable equilibrium of the same command that is lower, and turned by less than a right
+    angle from the one reported, is told: a short search, which may miss some, by turning the
+    platform by 70 degrees. It is left out where effects with history decide where it rests.
+
     Writes sweep.json, sweep.csv, a figure and sweep.rrd. Also writes sweep.toml if lengths are told
     lengths or runs begin at their first row, so that every command reads sweep.csv as these
     commands.
@@ -79,7 +83,7 @@ def command(
     Exit status: 0 all at rest, 2 bad input, 3 a pose without an equilibrium, or where the platform
     is free to move.
     """
-    from seecr import midline_points, spread_of
+    from seecr import lower_equilibria, midline_points, spread_of
     from seecr.cli.arguments import commands_of, model_at, notes_of, robot_at
     from seecr.files import json_pieces, with_toml, write_text
     from seecr.folders import check_ours, staged
@@ -103,6 +107,8 @@ def command(
             if own is not None:
                 tell(0, "errors")
                 spread = spread_of(machine, commands, own)
+            tell(0, "lower equilibria")
+            lower = lower_equilibria(solution)
             tell(len(commands), "solved")
         rows = SweepRows(solution, commands.lengths, more, spread, wanted, commands.loads)
         commanded = commands.lengths is None or rows.aimed
@@ -120,7 +126,8 @@ def command(
             "robot": machine.name, "cables": machine.cable_names,
             "model": None if own is None else own.names, "notes": notes,
             **({} if search is None else {"search": search}), "zones": spans,
-            "midline_point": None if met is None else met.name, "rows": rows.records(),
+            "midline_point": None if met is None else met.name, "lower": lower,
+            "rows": rows.records(),
         }  # fmt: skip
         write_text(folder / "sweep.json", json_pieces(document))
         write_text(folder / "sweep.csv", rows.csv_lines())
@@ -137,9 +144,9 @@ def command(
             write_sweep_recording(solution, folder / "sweep.rrd", commanded)
     lines = [
         *untold(notes), *sweep_lines(solution, commanded, spread), *span_lines(spans or ()),
-        *jump_lines(solution), *(() if met is None else met.lines()),
+        *jump_lines(solution), *lower.lines(), *(() if met is None else met.lines()),
         *(() if bar is None else bar.lines()), *(() if search is None else [search.words]),
-        f"Results in {out}/", after_sweep(solution, commands, robot, poses, cable, own),
+        f"Results in {out}/", after_sweep(lower, commands, robot, poses, cable, own),
     ]  # fmt: skip
     if not as_json:
         click.echo("\n".join(lines))

@@ -121,7 +121,7 @@ _FINE, _ZOOMS = 8, 3
 # Steps to the saddle at most, and the longest, over the length.
 _STEPS, _LONGEST = 200, (0.1, 0.01)
 # Energies alike but for rounding [of load times length, and of the energy].
-_ROUNDING = 1e-9
+ROUNDING = 1e-9
 # First step down from a saddle [of the length].
 _ASIDE = 1e-3
 # Poses nearer than this [of the length] are one equilibrium.
@@ -348,7 +348,7 @@ def _joins(one: Solution, tables: Tables, saddle: Array, path: _Path) -> bool:
     lower than the saddle.
     """
     height, energies = float(_energies(one, saddle)[0]), path.energies
-    rounding = _ROUNDING * (float(tables.scale[0]) * one.robot.length + abs(height))
+    rounding = ROUNDING * (float(tables.scale[0]) * one.robot.length + abs(height))
     if max(energies[0], energies[-1]) > height + rounding or energies.max() < height - rounding:
         return False
     higher = np.flatnonzero(energies > height + rounding)
