@@ -8,6 +8,10 @@ import numpy as np
 
 from seecr.compiled.jit import jit, jit_allocating, jit_inner, jit_lanes
 
+# A pivot below this part of its diagonal entry is rounding, of which an entry that is a sum over
+# cables has some tens of 1e-16: of either sign, so that a step may lead uphill.
+_ROUNDED = 1e-14
+
 
 @jit
 def cholesky(a, shift, out):
@@ -15,9 +19,10 @@ def cholesky(a, shift, out):
     n = a.shape[0]
     for j in range(n):
         total = a[j, j] + shift
+        least = _ROUNDED * total
         for k in range(j):
             total -= out[j, k] * out[j, k]
-        if not total > 0.0:
+        if not total > max(least, 0.0):
             return False
         out[j, j] = math.sqrt(total)
         inverse = 1.0 / out[j, j]

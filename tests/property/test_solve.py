@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from random_robots import KINDS, random_poses, random_robot, with_rest_lengths
 from scipy.spatial.transform import Rotation
@@ -73,6 +73,8 @@ def with_turn(place: np.ndarray, turn: Rotation) -> np.ndarray:
 @given(
     seed=SEEDS, turn=st.tuples(*[st.floats(-3, 3)] * 3), shift=st.tuples(*[st.floats(-9, 9)] * 3)
 )
+# one cable is taut by rounding, and the stiffness positive by rounding: steps led uphill
+@example(seed=10000, turn=(1.125, 1.0625, 0.0), shift=(0.0, 0.0, 9.0))
 def test_rigid_motion(seed, turn, shift):
     """The laboratory may be moved and turned, gravity and forces with it."""
     robot, poses, push = drawn(seed)
