@@ -81,9 +81,8 @@ def command(
     tracker is known to read the platform in the base frame, calibrate with --exclude
     tracker_frame,tracker_target.
 
-    Another stable equilibrium with the same lengths that is lower, and turned by less than a right
-    angle from the pose reached, is told: a short search, which may miss some, as seecr sweep makes
-    it. seecr sweep --follow says which of them the way from the reference pose leads to.
+    If another equilibrium with the same lengths is lower than the pose reached, the program says
+    so, as seecr sweep does. seecr sweep --follow says which of them the way there leads to.
 
     Writes corrected.csv and corrected.toml, which every command reads as commands, and
     correction.json. Poses without any answer are left out of corrected.csv; poses are named by

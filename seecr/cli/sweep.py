@@ -71,9 +71,9 @@ def command(
     On two pairs of parallel cables in a plane, the paper's point V or H is given, too; of a bar on
     two cables its tilt beside those at which it is in balance, the paper's manifold.
 
-    Another stable equilibrium of the same command that is lower, and turned by less than a right
-    angle from the one reported, is told: a short search, which may miss some, by turning the
-    platform by 70 degrees. It is left out where effects with history decide where it rests.
+    If another equilibrium of a command is lower than the one reported, and turned against it by
+    less than a right angle, the program says so. It solves each command again from poses turned by
+    70 degrees: a short search, which may miss some. With effects that have a history there is none.
 
     Writes sweep.json, sweep.csv, a figure and sweep.rrd. Also writes sweep.toml if lengths are told
     lengths or runs begin at their first row, so that every command reads sweep.csv as these

@@ -2,7 +2,9 @@
 
 With straight elastic cables the energy is convex in the platform's position: a length is, and so
 is the square of what it exceeds the cable's own by. So each orientation has one best position, and
-another equilibrium is turned against the first. Starts are turned, too.
+another equilibrium is turned against the first. Starts are turned, too. Descents from so far away
+take long where cables sag or run over pulleys. So the search is for straight ones, and what it
+finds is solved as it is.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics import batch
 from seecr.statics.solution import Solution, certify, check_solution
 from seecr.statics.starts import start_of
-from seecr.statics.tables import Tables, portions, take
+from seecr.statics.tables import Tables, portions, straightened, take
 from seecr.units import joules, millimetres
 
 # How far starts are turned [rad]: of all orientations within a right angle, half are nearer. The
@@ -122,18 +124,27 @@ def lower_equilibria(solution: Solution) -> LowerEquilibria:
     robot, tables, own = solution.robot, solution.tables, solution.energy
     sought = solution.converged & np.isfinite(own) & np.isfinite(solution.pose).all(axis=1)
     most = own - ROUNDING * (tables.scale * robot.length + np.abs(own))
-    start, below = solution.pose.copy(), most.copy()
+    start, below = np.full_like(solution.pose, np.nan), most.copy()
     for rows in portions(np.flatnonzero(sought)):
         some, poses = take(tables, rows), solution.pose[rows]
+        straight = straightened(some)
+        if straight is not some:  # whose energies are others
+            below[rows] = np.inf
         for axis in np.flatnonzero(robot.hinges):
             for turn in (_TURN, -_TURN):
-                end = _rest_from(robot, some, _turned(robot, poses, int(axis), turn))
-                turned = np.linalg.norm(pose_difference(end.pose, poses)[:, 3:], axis=1)
-                better = end.converged & (end.energy < below[rows]) & (turned < TWISTED)
-                below[rows[better]], start[rows[better]] = end.energy[better], end.pose[better]
-    rows = np.flatnonzero(below < most)
+                end = _rest_from(robot, straight, _turned(robot, poses, int(axis), turn))
+                lower = _are_lower(end, poses, below[rows])
+                below[rows[lower]], start[rows[lower]] = end.energy[lower], end.pose[lower]
+    rows = np.flatnonzero(np.isfinite(start[:, 0]))
     found = _rest_from(robot, take(tables, rows), start[rows])
-    return LowerEquilibria(solution, int(sought.sum()), rows, found)
+    lower = _are_lower(found, solution.pose[rows], most[rows])
+    return LowerEquilibria(solution, int(sought.sum()), rows[lower], found.rows(lower))
+
+
+def _are_lower(found: Solution, poses: Array, below: Array) -> NDArray[np.bool_]:
+    """(n,) which equilibria have less energy, and are within a right angle of poses (n, 7)."""
+    turned = np.linalg.norm(pose_difference(found.pose, poses)[:, 3:], axis=1)
+    return np.asarray(found.converged & (found.energy < below) & (turned < TWISTED))
 
 
 def _turned(robot: Robot, poses: Array, axis: int, angle: float) -> Array:

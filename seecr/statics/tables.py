@@ -29,6 +29,7 @@ from seecr.compiled.columns import (
     RADIUS,
     REST,
     UP,
+    WEIGHT,
 )
 from seecr.description.joints import values_of_pose
 from seecr.description.robot import Robot
@@ -181,6 +182,17 @@ def shared_cables(tables: Tables) -> Array:
     """Cables (n or 1, m, N_COLUMNS): one row where rows differ in lengths and gaps alone."""
     own = vars(tables)
     return np.asarray(own["cables"] if "cables" in own else own["cable"])
+
+
+def straightened(tables: Tables) -> Tables:
+    """The same tables with cables that neither weigh anything nor run over pulleys."""
+    cables, bent = shared_cables(tables), [WEIGHT, RADIUS]
+    if not cables[..., bent].any():
+        return tables
+    out, cables = take(tables, slice(None)), cables.copy()
+    cables[..., bent] = 0.0
+    vars(out)["cables" if "cables" in vars(out) else "cable"] = cables
+    return out
 
 
 def rest_lengths_of(tables: Tables) -> Array:

@@ -12,7 +12,17 @@ from called import BARE, as_json, drawn_bare, following, ran
 from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 
-from seecr import InputError, Robot, Term, equilibria, load_robot, lower_equilibria, solve
+from seecr import (
+    InputError,
+    Robot,
+    Term,
+    equilibria,
+    load_model,
+    load_robot,
+    lower_equilibria,
+    model_path,
+    solve,
+)
 from seecr.description.joints import pose_of_values
 from seecr.pose import Array, pose_difference, quat_from_rotvec, quat_multiply, transform_points
 
@@ -68,6 +78,27 @@ def test_most_of_what_hundreds_of_starts_find_is_found_and_is_lower() -> None:
         there += int(known.sum())
         missed += int(np.sum(known[np.setdiff1d(np.arange(300), found.rows)]))
     assert there >= 35 and missed <= 0.1 * there
+
+
+def test_sagging_cables_are_searched_as_straight_ones_and_solved_as_they_are() -> None:
+    robot, random = load_robot("cogiro_large"), np.random.default_rng(11)
+    model = load_model(model_path("cogiro_large").with_name("sag.toml"), robot)
+    own = solve(robot, turned_commands(robot, 300, random), effects=model)
+    found = lower_equilibria(own)
+    rows = found.rows
+    there = solve(robot, own.command[rows], effects=model, start=found.found.pose)
+    np.testing.assert_allclose(there.pose, found.found.pose, atol=1e-8)
+    assert np.all(there.converged) and np.all(there.energy < own.energy[rows] - 1e-3)
+    assert np.all(turns(there.pose, own.pose[rows]) < np.pi / 2)
+    known = np.zeros(300, dtype=bool)
+    for _ in range(12):
+        start = own.pose.copy()
+        turn = quat_from_rotvec(1.3 * random.normal(size=(300, 3)))
+        start[:, 3:] = quat_multiply(turn, start[:, 3:])
+        end = solve(robot, own.command, effects=model, start=start)
+        lower = end.converged & own.converged & (end.energy < own.energy - 1e-3)
+        known |= lower & (turns(end.pose, own.pose) < np.pi / 2)
+    assert known.sum() >= 7 and np.sum(known[rows]) >= known.sum() - 1
 
 
 def test_the_known_one_moved_and_turned_with_its_robot() -> None:
