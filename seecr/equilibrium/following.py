@@ -266,8 +266,8 @@ def _flow(robot: Robot, tables: Tables, pose: Array, damping: float) -> tuple[Ar
     implicit: short where the energy is steep, Newton steps in the end.
     """
     weight, over = np.where(robot.hinges, damping, 1.0), False
+    at = evaluated(robot, tables, pose)
     for _ in range(_STEPS):
-        at = evaluated(robot, tables, pose)
         if not np.isfinite(at.gradient).all():
             break
         # scaled so that the damping is the identity
@@ -279,17 +279,23 @@ def _flow(robot: Robot, tables: Tables, pose: Array, damping: float) -> tuple[Ar
                 break
             # balanced on a ridge: any disturbance makes the platform leave it
             pose, wraps = _stepped(robot, pose, _TOUCH * robot.length * (root * vectors[:, 0]))
-            over = over or wraps
+            at, over = evaluated(robot, tables, pose), over or wraps
             continue
         # the inverse of the time step: soft and unstable directions must not outrun the stiff ones
         pace = max(2.0 * max(-float(values[0]), 0.0), 1e-9 * float(values[-1]), _LEAST_PACE)
         while True:
-            step = -root * (vectors @ (slope / (values + pace)))
+            parts = slope / (values + pace)
+            step = -root * (vectors @ parts)
             if np.linalg.norm(step) <= _FLOW * robot.length:
-                break
-            pace *= 2.0
-        pose, wraps = _stepped(robot, pose, step)
-        over = over or wraps
+                there, wraps = _stepped(robot, pose, step)
+                then = evaluated(robot, tables, there)
+                # It goes down by the work along the step. Where a cable goes slack, a Newton step
+                # may lead up, and the next one back, for ever.
+                if not (at.gradient[0] + then.gradient[0]) @ step > 0.0:
+                    break
+            # with what the step met as stiffness, it becomes half as long or less
+            pace = max(2.0 * pace, float(np.linalg.norm(slope) / np.linalg.norm(parts)))
+        pose, at, over = there, then, over or wraps
     return pose, over
 
 

@@ -17,10 +17,13 @@ from crosscheck.settle.settler import Settler
 from seecr import Commands, InputError, Robot, Term, load_robot, model_path, solve
 from seecr.cli import main
 from seecr.description.mjcf import model_names
+from seecr.effects.setup import plain_setup
+from seecr.equilibrium.following import _flow
 from seecr.equilibrium.strange import strained, strained_rows, strange
 from seecr.pose import Array, pose_difference, quat_from_rotvec
 from seecr.show.batch_words import jump_lines
 from seecr.show.files import SweepRows
+from seecr.statics.tables import assemble
 
 
 def parallel(softer: float = 1.0) -> Robot:
@@ -41,6 +44,18 @@ def turning_over(first: float, last: float, n: int) -> Commands:
     turn[:, 0] = np.radians(np.linspace(first, last, n))
     poses[:, 3:] = quat_from_rotvec(turn)
     return Commands(poses, stands=np.ones(n, dtype=bool))
+
+
+def test_a_flow_comes_to_rest_where_a_cable_goes_slack_on_the_way() -> None:
+    """A Newton step that leads up there, and the next one back, alternated for ever."""
+    robot = load_robot("demobot_cogiro")
+    command = Commands(np.array([[0.5, 0.5, 0.3, *robot.reference_pose[3:]]]))
+    tables = assemble(plain_setup(robot, command))
+    beside_a_saddle = tilted(0.48997, 0.4229, 0.30211, 0.67045, 0.72269, -0.11626, -0.12125)
+    there, _over = _flow(robot, tables, beside_a_saddle[None], 1.0)
+    rest = solve(robot, command.pose, start=there)
+    assert np.abs(there[0, :3] - rest.pose[0, :3]).max() < 1e-6
+    assert rest.converged[0] and np.linalg.eigvalsh(rest.stiffness[0])[0] > 0.0
 
 
 @pytest.mark.slow
