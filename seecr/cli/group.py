@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import sys
 import traceback
@@ -94,6 +95,8 @@ class LazyGroup(click.Group):
             return self._run(*args, **extra)
         if not args and extra.get("args") is None:  # as a program, not by Python
             gc.set_threshold(100_000, 50, 100)  # collecting took an eighth of the time
+            # MuJoCo would look for a window and graphics, which takes a Python of its own
+            os.environ.setdefault("MUJOCO_GL", "disable")
             signal.signal(signal.SIGTERM, _end)
         given = args[0] if args else extra.pop("args", None)
         words = sys.argv[1:] if given is None else list(given)
