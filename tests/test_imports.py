@@ -124,6 +124,7 @@ USERS = {
     "seecr crosscheck": "",
     "seecr mujoco": "seecr.description: mjcf",
     "seecr numba": "seecr.compiled: jit",
+    "seecr llvmlite": "seecr.compiled: jit",
     "crosscheck numba": "",
     "seecr importlib.import_module": "seecr: cli.group lazy",
     "crosscheck importlib.import_module": "",
@@ -203,7 +204,8 @@ def test_what_is_compiled_takes_arrays_alone() -> None:
     # what tells a user that compiling takes long is beside what is compiled
     files = [path for path in modules("seecr/compiled") if path.stem != "compile_notice"]
     taken = {t for path in files for t in imports(path)}
-    assert {t.split(".")[0] for t in taken} == {"__future__", "math", "numba", "numpy", "seecr"}
+    others = {"__future__", "llvmlite", "math", "numba", "numpy"}
+    assert {t.split(".")[0] for t in taken} == {*others, "seecr"}
     assert {place(t) for t in taken if t.startswith("seecr")} == {"seecr.compiled"}
 
 

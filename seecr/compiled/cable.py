@@ -28,6 +28,8 @@ from seecr.compiled.columns import (
     GAP,
     HYSTERESIS_NOW,
     LIFT,
+    N_COLUMNS,
+    N_STATE,
     RADIUS,
     REST,
     SLACK,
@@ -36,7 +38,15 @@ from seecr.compiled.columns import (
     WEIGHT,
     WINCH_TENSION,
 )
-from seecr.compiled.jit import jit, jit_inner, jit_merged, jit_pasted
+from seecr.compiled.jit import (
+    COMPILES,
+    by_address,
+    carray,
+    jit,
+    jit_inner,
+    jit_merged,
+    jit_pasted,
+)
 
 # Most Newton steps for the lift of an exit point, of which two or three suffice where a cable stays
 # taut; errors [of the rest length] at which they end, and of a lift that was found.
@@ -45,9 +55,12 @@ _LIFTINGS, _LIFTED, _LIFTED_ENOUGH = 50, 1e-15, 1e-12
 # Most Newton steps for a catenary, from a start that may be a bad one, and from the last.
 _FEW, _MANY = 20, 200
 
+# Rows of scratch for a cable and all that is done with it.
+N_WORK = 34
 
-@jit
-def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
+
+@jit_inner
+def _pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
     """Force of a cable on its anchor point, its stiffness, and the gradient of its tension.
 
     Args:
@@ -59,8 +72,9 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
         guess: (3,) start of the catenary, overwritten with its solution.
         work: (N_WORK, 6) scratch.
         force: (3,) [N].
-        stiffness: (3, 3) [N/m], minus the derivative of the force by ``move``; with weight over a
-            pulley its symmetric part, see :func:`seecr.compiled.catenary.catenary_energy`.
+        stiffness: (3, 6) of which the first three columns are filled [N/m]: minus the derivative
+            of the force by ``move``; with weight over a pulley its symmetric part, see
+            :func:`seecr.compiled.catenary.catenary_energy`.
         gradient: (3,) [N/m], derivative of the reported tension by ``move``. state: (N_STATE,).
 
     Returns:
@@ -239,3 +253,30 @@ def _catenary_pull(row, start, move, up, guess, work, force, stiffness, gradient
     state[STRAIN], _slope, state[HYSTERESIS_NOW] = strain_of_tension(row, tension)
     state[SLACK] = 1.0 if stretch < 0.0 else 0.0
     return True
+
+
+# A cable's law is large, and to compile it into each function that needs cables, and into all that
+# call these, took 20 s of a first diagnosis.
+
+
+def _pull_there(row, start, move, up, guess, work, force, stiffness, gradient, state):
+    return _pull(
+        carray(row, N_COLUMNS), carray(start, 3), carray(move, 3), carray(up, 3), carray(guess, 3),
+        carray(work, (N_WORK, 6)), carray(force, 3), carray(stiffness, (3, 6)),
+        carray(gradient, 3), carray(state, N_STATE),
+    )  # fmt: skip
+
+
+@jit
+def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
+    """What :func:`_pull` does, for arrays without gaps of at least the shapes given there."""
+    return _called(
+        row.ctypes, start.ctypes, move.ctypes, up.ctypes, guess.ctypes, work.ctypes, force.ctypes,
+        stiffness.ctypes, gradient.ctypes, state.ctypes,
+    )  # fmt: skip
+
+
+if COMPILES:
+    _called = by_address("seecr_cable_pull", _pull_there)
+else:
+    cable_pull = _pull

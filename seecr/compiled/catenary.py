@@ -30,7 +30,7 @@ from seecr.compiled.columns import (
     WEIGHT,
     WINCH_SIDE,
 )
-from seecr.compiled.jit import jit, jit_inner
+from seecr.compiled.jit import jit, jit_inner, jit_merged
 
 
 @jit
@@ -140,7 +140,7 @@ def catenary_energy(row, unknown, fall, raised):
     return stored + 0.5 * soft * pulled / (1.0 + tension / ea)
 
 
-@jit_inner
+@jit_merged
 def _other_stretch(row, tension):
     """Unstretched length [m] equivalent to all stretch but the catenary's own T/EA, and its slope.
 
@@ -159,7 +159,7 @@ def _other_stretch(row, tension):
     return stretch / grown, (rate - stretch / (grown * ea)) / grown
 
 
-@jit_inner
+@jit_merged
 def _catenary_equations(row, unknown, across, rise, error, jacobian):
     """Errors of the ends of a catenary over its pulley, with derivatives.
 
@@ -226,7 +226,7 @@ def _size(error, length):
     return max(abs(error[0]), abs(error[1]), abs(error[2])) / length
 
 
-@jit_inner
+@jit_merged
 def solve_catenary(row, across, rise, most, unknown, error, jacobian, work):
     """Find the pull of a catenary with the given span in so many steps; True if to rounding.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from seecr.compiled.algebra import copy_vector
+from seecr.compiled.algebra import copy_rows, copy_vector
 from seecr.compiled.cable_law import strain_of_tension
 from seecr.compiled.columns import (
     CONVERGED,
@@ -282,7 +282,9 @@ def change_on_the_way(
     ahead = (np.empty_like(plus[0]), np.zeros((m, N_KEPT)), np.zeros(m), np.zeros(d))
     behind = (np.empty_like(plus[0]), np.zeros((m, N_KEPT)), np.zeros(m), np.zeros(d))
     past_ahead, past_behind = np.zeros((m, N_KEPT)), np.zeros((m, N_KEPT))
-    space, half, more = make_change_space(screws.shape[1]), np.zeros(d), np.zeros(d)
+    space = make_change_space(screws.shape[1])
+    # displacements of the sides ahead and behind, and what is added to them
+    half, back, more, less = np.zeros(d), np.zeros(d), np.zeros(d), np.zeros(d)
     lost = False
     for k in range(n):
         still = not fresh[k] and not lost and _stands_still(poses, plus_load, k)
@@ -293,16 +295,19 @@ def change_on_the_way(
             continue
         for a in range(d):
             half[a] = 0.5 * step[k - 1, a] if still else 0.0
-        past_ahead[:], past_behind[:] = ahead[1], behind[1]
+            back[a] = -half[a]
+        copy_rows(ahead[1], past_ahead)
+        copy_rows(behind[1], past_behind)
         for again in range(_CORRECTIONS):
             if again:
-                ahead[1][:], behind[1][:] = past_ahead, past_behind
+                copy_rows(past_ahead, ahead[1])
+                copy_rows(past_behind, behind[1])
             _pull_side(
                 plus[k], plus_load[k], half, poses[k], screws[k], deviation[k], values[k], length,
                 guess[k], elapsed[k], fresh[k], ahead, space,
             )  # fmt: skip
             _pull_side(
-                minus[k], minus_load[k], -half, poses[k], screws[k], deviation[k], values[k],
+                minus[k], minus_load[k], back, poses[k], screws[k], deviation[k], values[k],
                 length, guess[k], elapsed[k], fresh[k], behind, space,
             )  # fmt: skip
             for a in range(d):
@@ -310,13 +315,14 @@ def change_on_the_way(
                 for b in range(d):
                     more[a] -= 0.5 * inverse[k, a, b] * (ahead[3][b] - behind[3][b])
                 half[a] += more[a]
+                back[a], less[a] = -half[a], -more[a]
                 step[k, a] = 2.0 * half[a]
             bent = _keep_side(
                 plus[k], plus_load[k], half, more, slopes[k], poses[k], screws[k], deviation[k],
                 values[k], length, guess[k], fresh[k], ahead, space,
             )  # fmt: skip
             other = _keep_side(
-                minus[k], minus_load[k], -half, -more, slopes[k], poses[k], screws[k], deviation[k],
+                minus[k], minus_load[k], back, less, slopes[k], poses[k], screws[k], deviation[k],
                 values[k], length, guess[k], fresh[k], behind, space,
             )  # fmt: skip
             if not (bent or other):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from numba import njit
+from llvmlite.binding import add_symbol
+from numba import carray as carray
+from numba import cfunc, config, njit, types
 from numba.core import event
 
 from seecr.compiled.compile_notice import watch
@@ -61,3 +63,22 @@ jit_allocating = njit(**_COMMON, _nrt=True)  # type: ignore[call-overload]
 """The same for functions that create arrays. It has to be explicit: otherwise the caller's setting
 would apply.
 """
+
+COMPILES = not config.DISABLE_JIT
+"""Whether anything is compiled; else all of it is run by Python."""
+
+
+def by_address(name, function):
+    """What compiled functions call a function by that is compiled once, by itself.
+
+    Numba compiles all that a function calls anew in it, and in all that call that. This one they
+    call by its address, which the linker knows by ``name``: so they know neither what it does nor
+    what shapes it expects.
+
+    Args:
+        name: for the linker, so that functions from numba's cache find it too.
+        function: of addresses of numbers, which ``carray`` makes arrays of; it returns a bool.
+    """
+    kind = types.boolean(*[types.CPointer(types.float64)] * function.__code__.co_argcount)
+    add_symbol(name, cfunc(kind, cache=True)(function).address)
+    return types.ExternalFunction(name, kind)

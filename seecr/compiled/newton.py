@@ -16,6 +16,7 @@ from seecr.compiled.algebra import (
     solve_factored,
     turned,
 )
+from seecr.compiled.cable import N_WORK
 from seecr.compiled.columns import (
     CABLE_LAW,
     CONVERGED,
@@ -40,7 +41,7 @@ from seecr.compiled.columns import (
 )
 from seecr.compiled.jit import jit, jit_allocating, jit_inner, jit_pasted
 from seecr.compiled.joint_kinematics import N_CURRENT, place_joints
-from seecr.compiled.platform import N_READY, N_WORK, add_skew, evaluate, has_moment, prepare
+from seecr.compiled.platform import N_READY, add_skew, evaluate, has_moment, prepare
 
 # The steps of a descent: Newton's, those away from saddles, and tests of a stationary point.
 

@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from seecr.compiled.algebra import rotated_less
-from seecr.compiled.cable import cable_pull
+from seecr.compiled.cable import N_WORK, cable_pull
 from seecr.compiled.cable_law import is_linear
 from seecr.compiled.columns import (
     ANCHOR,
@@ -60,8 +60,6 @@ from seecr.compiled.joint_kinematics import (
 # else 0.
 ARM, START, BEFORE, YIELD, RATE = 0, 3, 6, 7, 8
 N_READY = 9
-# Rows of scratch that evaluate needs, plus one for each cable.
-N_WORK = 34
 # Sine of the angle between axes that are parallel but for rounding.
 _PARALLEL = 1e-9
 

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from seecr.compiled.algebra import copy_vector, rotated_less, solve_3x3
-from seecr.compiled.cable import cable_pull
+from seecr.compiled.cable import N_WORK, cable_pull
 from seecr.compiled.cable_law import (
     along,
     dahl,
@@ -58,7 +58,6 @@ from seecr.compiled.joint_kinematics import (
     onto_joints_gradient,
     place_joints,
 )
-from seecr.compiled.platform import N_WORK
 
 # Effect of a change of the tables at fixed poses, evaluated only for the cables that changed.
 #
@@ -72,7 +71,7 @@ def make_change_space(joints):
     """Scratch arrays, made once per batch."""
     return (
         np.empty(7), np.zeros((joints, N_CURRENT)), np.empty((joints, 6)), np.empty(3), np.empty(3),
-        np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(N_STATE),
+        np.empty(3), np.empty(3), np.empty((3, 6)), np.empty(3), np.empty(N_STATE),
         np.empty((N_WORK, 6)), np.empty(6), np.empty(7), np.zeros(6),
     )  # fmt: skip
 

@@ -60,8 +60,10 @@ def portions(rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
     return [rows[k : k + PORTION] for k in range(0, len(rows), PORTION)]
 
 
-# So many rows are worth the lanes of seecr.compiled.lanes, and tables made for these.
-_MANY = 64
+# So many rows are worth the lanes of seecr.compiled.lanes, and tables made for these. Lanes take as
+# long to compile as a million descents one by one. A map, or the search for equilibria, which asks
+# for as many as these at a time, soon has as many; a first diagnosis of a hundred rows never.
+_MANY = 256
 _singly: set[str] = set()
 
 

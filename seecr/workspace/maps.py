@@ -48,7 +48,7 @@ MOST_STORED = 10_000_000_000
 _PART = 78 * BLOCK
 # Tasks of an executor that a grid is divided into, so that many workers end at about one time; a
 # task of fewer poses is not worth sending, and of more its results fill memory.
-_TASKS, _SMALLEST, _LARGEST = 64, 128, 200_000
+_TASKS, _SMALLEST, _LARGEST = 64, 256, 200_000
 # Values of the default grid along an axis with an extent; fewer for robots with too few cables.
 _VALUES, _FEW = 33, 13
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from seecr.compiled import columns
-from seecr.compiled.cable import cable_pull
+from seecr.compiled.cable import N_WORK, cable_pull
 from seecr.compiled.cable_law import geometric_length
 from seecr.compiled.columns import (
     EA,
@@ -19,7 +19,6 @@ from seecr.compiled.columns import (
     REST,
     TENSION,
 )
-from seecr.compiled.platform import N_WORK
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -55,11 +54,11 @@ def pull(row: np.ndarray, anchor: Any, move: Any = (0.0, 0.0, 0.0)) -> Pull:
     row, start = row.copy(), np.array(anchor, float)
     row[GAP] = geometric_length(row, start, UP) - row[REST]
     force, slope, guess = np.zeros(3), np.zeros(3), np.zeros(3)
-    stiffness, state, work = np.zeros((3, 3)), np.zeros(N_STATE), np.zeros((N_WORK, 6))
+    stiffness, state, work = np.zeros((3, 6)), np.zeros(N_STATE), np.zeros((N_WORK, 6))
     ok = cable_pull(
         row, start, np.array(move, float), UP, guess, work, force, stiffness, slope, state
     )
-    return Pull(force, stiffness, slope, state, guess, ok)
+    return Pull(force, stiffness[:, :3], slope, state, guess, ok)
 
 
 def in_direction(degrees_below: float, length: float, azimuth: float = 0.7) -> np.ndarray:

@@ -115,13 +115,13 @@ def test_what_lanes_leave_is_solved_by_itself() -> None:
 
 def test_few_poses_do_not_descend_in_lanes() -> None:
     robot = shipped("demobot_cogiro")
-    assert not isinstance(seecr.solve(robot, poses_of(robot, 20)).evaluation, Brief)
+    assert not isinstance(seecr.solve(robot, poses_of(robot, 100)).evaluation, Brief)
 
 
 @pytest.mark.parametrize("column", OUT_OF_SCOPE)
 def test_a_column_that_lanes_do_not_know_keeps_them_out(column: int) -> None:
     robot = shipped("demobot_cogiro")
-    tables = assemble(plain_setup(robot, seecr.Commands(poses_of(robot, 100))))
+    tables = assemble(plain_setup(robot, seecr.Commands(poses_of(robot, 300))))
     assert are_for_lanes(tables)
     tables.cables[7, 3, column] = 1e-9
     assert not are_for_lanes(tables)
@@ -129,8 +129,8 @@ def test_a_column_that_lanes_do_not_know_keeps_them_out(column: int) -> None:
 
 def test_a_moment_keeps_lanes_out() -> None:
     robot = shipped("demobot_cogiro")
-    tables = assemble(plain_setup(robot, seecr.Commands(poses_of(robot, 100))))
-    tables.load[99, EXTERNAL_MOMENT + 2] = 1e-9
+    tables = assemble(plain_setup(robot, seecr.Commands(poses_of(robot, 300))))
+    tables.load[299, EXTERNAL_MOMENT + 2] = 1e-9
     assert not are_for_lanes(tables)
 
 
@@ -185,7 +185,7 @@ def test_rows_of_what_lanes_found_are_those_rows() -> None:
 
 def test_a_copy_with_other_rows_in_it_is_whole() -> None:
     robot = shipped("demobot_parallel")
-    found, other = (seecr.solve(robot, poses_of(robot, 200, seed)).evaluation for seed in (0, 1))
+    found, other = (seecr.solve(robot, poses_of(robot, 300, seed)).evaluation for seed in (0, 1))
     rows, changed = np.array([3, 150]), found.copy()
     changed.put(rows, other.only(rows))
     for of in ("tension", "deviation", "states", "hessian", "residual"):
@@ -208,7 +208,7 @@ class Listener(event.Listener):
 event.register("numba:compile", Listener())
 for name in ("demobot_cogiro", "planar_vertical"):
     robot = seecr.load_robot(name)
-    found = seecr.solve(robot, np.tile(robot.reference_pose, (200, 1)))
+    found = seecr.solve(robot, np.tile(robot.reference_pose, (300, 1)))
     found.smallest_eigenvalue
     assert found.evaluation.alone.mean() < 0.5
 print(len(compiled))
@@ -260,7 +260,7 @@ def test_a_million_rows_fit_into_2_gb(kind: str) -> None:
         tracemalloc.stop()
         return most
 
-    seecr.solve(robot, poses_near_home(robot, 100), **more)
+    seecr.solve(robot, poses_near_home(robot, 300), **more)
     assert (peak(3 * PORTION) - peak(2 * PORTION)) / PORTION < BYTES
 
 
@@ -270,7 +270,7 @@ def test_portions_rest_as_few_rows_do(kind: str) -> None:
     name, more = KINDS[kind]
     robot = seecr.load_robot(name)
     poses = poses_near_home(robot, PORTION + 100)
-    rows = np.r_[0:100, PORTION - 50 : PORTION + 100]
+    rows = np.r_[0:200, PORTION - 50 : PORTION + 100]  # enough for lanes
     many, few = seecr.solve(robot, poses, **more), seecr.solve(robot, poses[rows], **more)
     assert len(many.evaluation.outcome) > PORTION and few.converged.all()
     for of in ("status", "deviation", "tensions", "slack", "energy", "iterations", "residual"):
