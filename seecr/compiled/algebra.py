@@ -280,13 +280,13 @@ _AS_LARGE = 1.0 - 1e-6
 
 
 @jit_lanes
-def _rotate(a, vectors, turn, p, q):
+def _rotate(a, turn, active, p, q):
     """Rotate coordinates p < q of every lane that is active, so that its entry p, q gets zero.
 
-    ``a`` (d, d, lanes) are upper triangles, ``turn`` (3, lanes) cosine, sine, and 1 where active.
+    ``a`` (d, d, lanes) are upper triangles; ``turn`` (2, lanes) is filled with cosine and sine.
     """
     for i in range(_LANES):
-        beside, apart = turn[2, i] * a[p, q, i], a[q, q, i] - a[p, p, i]
+        beside, apart = active[i] * a[p, q, i], a[q, q, i] - a[p, p, i]
         size = abs(apart) + math.sqrt(apart * apart + 4.0 * beside * beside) + _NOTHING
         tangent = (2.0 * beside if apart >= 0.0 else -2.0 * beside) / size
         cosine = 1.0 / math.sqrt(1.0 + tangent * tangent)
@@ -300,13 +300,18 @@ def _rotate(a, vectors, turn, p, q):
             for i in range(_LANES):
                 c, w, x, y = turn[0, i], turn[1, i], a[r, s, i], a[u, v, i]
                 a[r, s, i], a[u, v, i] = c * x - w * y, w * x + c * y
-        for i in range(_LANES):
-            c, w, x, y = turn[0, i], turn[1, i], vectors[k, p, i], vectors[k, q, i]
-            vectors[k, p, i], vectors[k, q, i] = c * x - w * y, w * x + c * y
+
+
+@jit_lanes
+def _turn_back(vectors, turn, p, q):
+    """Vectors (d, lanes) as they were before coordinates p < q were rotated."""
+    for i in range(_LANES):
+        c, w, x, y = turn[0, i], turn[1, i], vectors[p, i], vectors[q, i]
+        vectors[p, i], vectors[q, i] = c * x + w * y, c * y - w * x
 
 
 @jit_inner
-def _begin(matrix, a, vectors, i):
+def _begin(matrix, a, i):
     """Put a matrix, scaled, into lane i; returns its largest entry, nan if one is not finite."""
     d, top = matrix.shape[0], 0.0
     for r in range(d):
@@ -317,20 +322,19 @@ def _begin(matrix, a, vectors, i):
     for r in range(d):
         for c in range(r + 1):
             a[c, r, i] = matrix[r, c] / top if known else 0.0
-            vectors[c, r, i] = vectors[r, c, i] = 1.0 if r == c else 0.0
     return top if top < np.inf else np.nan
 
 
 @jit_inner
-def _are_active(a, turn):
-    """Fill turn[2] with 1 where a lane is not diagonal yet; returns whether any is."""
+def _are_active(a, active):
+    """Fill active (lanes,) with 1 where a lane is not diagonal yet; returns whether any is."""
     some = False
     for i in range(_LANES):
         most = 0.0
         for q in range(a.shape[0]):
             for p in range(q):
                 most = max(most, abs(a[p, q, i]))
-        turn[2, i] = 1.0 if most > _ROUNDING else 0.0
+        active[i] = 1.0 if most > _ROUNDING else 0.0
         some = some or most > _ROUNDING
     return some
 
@@ -358,24 +362,34 @@ def softest_batch(matrices, values, directions):
     eigenvectors.
     """
     n, d = matrices.shape[:2]
-    a, vectors, turn = (np.empty((d, d, _LANES)), np.empty((d, d, _LANES)), np.empty((3, _LANES)))
-    tops = np.empty(_LANES)
+    a, vectors = np.empty((d, d, _LANES)), np.empty((d, _LANES))
+    turns, active, tops = np.empty((_SWEEPS, d, d, 2, _LANES)), np.empty(_LANES), np.empty(_LANES)
     for first in range(0, n, _LANES):
         for i in range(_LANES):
-            tops[i] = _begin(matrices[min(first + i, n - 1)], a, vectors, i)
-        for _ in range(_SWEEPS):
-            if not _are_active(a, turn):
-                break
+            tops[i] = _begin(matrices[min(first + i, n - 1)], a, i)
+        sweeps = 0
+        while sweeps < _SWEEPS and _are_active(a, active):
             for p in range(d - 1):
                 for q in range(p + 1, d):
-                    _rotate(a, vectors, turn, p, q)
-        for i in range(min(_LANES, n - first)):
-            best, at = 0, first + i
+                    _rotate(a, turns[sweeps, p, q], active, p, q)
+            sweeps += 1
+        for i in range(_LANES):
+            best = 0
             for k in range(d):
                 best = k if a[k, k, i] < a[best, best, i] else best
-            values[at] = a[best, best, i] * tops[i]
+                vectors[k, i] = 0.0
+            vectors[best, i] = 1.0
+            if first + i < n:
+                values[first + i] = a[best, best, i] * tops[i]
+        # only one vector is asked for: turning that back takes less than turning all along
+        while sweeps > 0:
+            sweeps -= 1
+            for p in range(d - 2, -1, -1):
+                for q in range(d - 1, p, -1):
+                    _turn_back(vectors, turns[sweeps, p, q], p, q)
+        for at in range(first, min(first + _LANES, n)):
             for k in range(d):
-                directions[at, k] = vectors[k, best, i] + 0.0 * tops[i]
+                directions[at, k] = vectors[k, at - first] + 0.0 * tops[at - first]
             _first_positive(directions[at], 1.0 / norm(directions[at]))
 
 
