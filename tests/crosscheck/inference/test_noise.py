@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_data import COGIRO, measured
+from noise_covariance import covariance
 from scipy import integrate
 
 from crosscheck.fit.problem import Problem
@@ -25,7 +26,6 @@ from crosscheck.inference.noise import (
 from crosscheck.inference.priors import FAR, OUTLIERS
 from crosscheck.measurements.data import Sigma
 from seecr.description.mjcf import load_robot
-from seecr.pose import Array
 
 ROBOT = load_robot(COGIRO)
 NOISE = Noise(np.array([1.7, 1.0, 1.0]), np.array([0.8, 0.0, 0.0]))
@@ -37,20 +37,6 @@ def chain(rows: int, channels: int = 3, runs: int = 2) -> Chain:
     before = np.arange(rows * channels) - channels
     fresh = row % (rows // runs) == 0
     return Chain(np.zeros(len(row), int), row, np.where(fresh, -1, before), np.ones(len(row)))
-
-
-def covariance(c: Chain, noise: Noise, weight: Array) -> Array:
-    """Of the noise, reading by reading: what whitening is the inverse root of."""
-    n = len(c.row)
-    root = np.zeros((n, n))
-    for k in range(n):
-        root[k, k] = 1.0
-        if c.before[k] >= 0:
-            phi = noise.rho[c.kind[k]] ** c.gap[k]
-            root[k] = phi * root[c.before[k]]
-            root[k, k] = np.sqrt(1 - phi**2)
-    root = root * (noise.scale[c.kind] / np.sqrt(weight))[:, None]
-    return np.asarray(root @ root.T)
 
 
 def test_whitening_is_an_inverse_root_of_the_noise() -> None:

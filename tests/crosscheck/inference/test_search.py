@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import chain, combinations
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from crosscheck.inference.catalogue import Catalogue, is_field, name_of, part_of
 from crosscheck.inference.evidence import Linear, MemberColumns
 from crosscheck.inference.fit import Data, fit
 from crosscheck.inference.hypothesis import scored
+from crosscheck.inference.noise import Noise
 from crosscheck.inference.posterior import Posterior, odds_of_place
 from crosscheck.inference.priors import LEFTOVER, SURE, WITHIN
 from crosscheck.inference.scores import Scores
@@ -115,6 +117,62 @@ def test_a_fit_that_wants_other_prior_widths_is_made_again_with_them(
         for w in (0.03, 0.1, 0.3, 1.0)
     ]
     assert found.score > max(each) - 3.0
+
+
+def test_a_search_begins_with_the_most_promising_effects_one_by_one() -> None:
+    """Beside nothing, and beside a tracker that stands elsewhere, found by registration."""
+    search = begun(readings())
+    none = search.begin()
+    assert search.cache.keys() >= {frozenset(), *(frozenset([k]) for k in promising(search))}
+    assert max(map(len, search.cache)) == 1, "others that rows far off ask for are single, too"
+    assert search.best.score > none.score + WITHIN
+    hidden = [
+        term(robot(), "tracker_frame", shift_x_m=0.002),
+        term(robot(), "stiffness", factor=0.8),
+    ]
+    moved = begun(measured(robot(), hidden, points=4, sigma=SIGMA), ("tracker_frame", "stiffness"))
+    moved.begin()
+    assert moved.cache.keys() == {
+        frozenset(), frozenset(["tracker_frame"]), frozenset(["tracker_frame", "stiffness"]),
+    }  # fmt: skip
+
+
+def promising(search: Search) -> list[str]:
+    """Four at most."""
+    promises = search.none_about.promises
+    return [k for k in sorted(promises, key=lambda k: -promises[k])[:4] if promises[k] >= 0.0]
+
+
+def test_all_effects_together_predict_better_than_those_that_are_named() -> None:
+    search = found()
+    together = search.calibrated
+    assert together.key == frozenset(SOME) and search.everything.key == frozenset(SOME)
+    assert together.score >= search.everything.score
+    assert together.fit.cost < search.best.fit.cost
+
+
+def hypothesis(key: frozenset[str], score: float, possible: bool = True, loud: bool = False) -> Any:
+    noise = Noise(np.array([9.0 if loud else 1.0, 1.0, 1.0]), np.array([0.95, 0.0, 0.0]))
+    field = next(filter(is_field, key), None)
+    fit = SimpleNamespace(noise=noise)
+    return SimpleNamespace(key=key, score=score, possible=possible, field=field, fit=fit)
+
+
+def test_the_best_is_what_a_robot_can_have_and_it_is_open_where_it_leaves_more_than_noise() -> None:
+    search = begun(readings())
+    none, stiff, other = frozenset[str](), frozenset(["stiffness"]), frozenset(["pulley_radius"])
+    search.cache = {none: hypothesis(none, 0.0), stiff: hypothesis(stiff, 5.0), other: None}
+    assert search.best.key == stiff and not search.is_open
+    search.cache[other] = hypothesis(other, 9.0, possible=False)
+    assert search.best.key == stiff and set(search.fitted) == {none, stiff}
+    search.cache[stiff] = hypothesis(stiff, 5.0, loud=True)
+    assert search.is_open
+    for key, is_open in (
+        (stiff | {"~0"}, True), (frozenset("abcde"), False), (frozenset("abcdef"), True),
+    ):  # fmt: skip
+        search.cache[key] = hypothesis(key, 20.0)
+        assert search.best.key == key and search.is_open is is_open
+        del search.cache[key]
 
 
 def test_the_fields_are_members_like_any_other() -> None:
