@@ -47,6 +47,8 @@ FLAT, SHAPES = 300.0, 30.0
 
 # Rounds of estimating noise and weights, the change at which these have settled, steps of a round.
 _ROUNDS, _SETTLED, _STEPS = 4, 0.05, 6
+# Each time a fit is cooled its noise falls by this factor.
+_COOLER = 3.0
 # A step is the last if it gains less than both this part of the objective and this much.
 _PART, _GAIN = 1e-3, 1e-2
 # Trials of a step, each damped ten times more; the longest step in expected sizes (or widths).
@@ -339,6 +341,23 @@ def _from(begun: Fit, rounds: int) -> Fit:
         if float(np.max(change)) < _SETTLED and k:
             break
     return found
+
+
+def cooled(data: Data, start: State) -> State:
+    """A model from a valid state, fitted under white noise that falls to what is stated.
+
+    For a fit of all effects that is far off: noise that explains what is left of a poor fit would
+    end there. All effects together leave no more than what is stated (graduated non-convexity:
+    Blake and Zisserman, Visual Reconstruction, 1987).
+    """
+    width, state, jacobian = data.width(start.terms, {}), start, data.derivatives(start)
+    noise, weight = _hot(data.chain, start.white), np.ones(len(start.white))
+    while True:
+        metric = Metric(data.chain, noise, weight, None)
+        state, jacobian, _settled = _settle(data, state, width, metric, jacobian)
+        if np.all(noise.scale == 1.0):
+            return state
+        noise = replace(noise, scale=np.maximum(noise.scale / _COOLER, 1.0))
 
 
 def without_rows(fit: Fit, absent: NDArray[np.bool_]) -> State:

@@ -25,7 +25,7 @@ from crosscheck.fit.registration import registered, registered_each
 from crosscheck.fit.state import State
 from crosscheck.inference.about import About, inside
 from crosscheck.inference.catalogue import Catalogue, Key, bare, is_field, name_of, part_of
-from crosscheck.inference.fit import TRACKER, Data, Fit, fit, unfitted
+from crosscheck.inference.fit import TRACKER, Data, Fit, cooled, fit, unfitted
 from crosscheck.inference.hypothesis import Hypothesis, scored, wider
 from crosscheck.inference.noise import Noise, NoisePrior
 from crosscheck.inference.priors import EQUAL, FEW, MAY_BE_UNKNOWN, WITHIN
@@ -291,7 +291,10 @@ class Search:
 
     @cached_property
     def everything(self) -> Hypothesis:
-        """All effects that act from the start, fitted together with expected sizes as priors."""
+        """All effects that act from the start, fitted together with expected sizes as priors.
+
+        They begin where nothing is known, and where they end under noise that is cooled.
+        """
         members = self.every.members.values()
         names = [m.key for m in members if not m.waits and not part_of(m.key)]
         key = self.stood | frozenset(names)
@@ -300,7 +303,8 @@ class Search:
         if frame is not None and TRACKER not in self.every.stood:
             turned = self._state(key, {TRACKER: frame})
             state = turned if turned.valid and turned.chi2 < state.chi2 else state
-        return self._together(key, state)
+        starts = (state, cooled(self.data, state)) if state.valid else (state,)
+        return max((self._together(key, one) for one in starts), key=lambda h: h.score)
 
     def _together(self, key: Key, state: State, noise: Noise | None = None) -> Hypothesis:
         """A hypothesis fitted with expected sizes as priors."""

@@ -345,3 +345,22 @@ def test_only_a_field_that_explains_half_of_what_the_best_does_may_stand_for_a_m
     other = np.sqrt(2.0 * part * best + np.log1p(1e4))
     y = x @ np.array([15.0, 20.0, 0.0, other])
     assert a_is_beyond(Linear.of(x, y, groups), 3.0) is is_beyond
+
+
+@pytest.mark.parametrize("seed", [7, 9])
+def test_all_effects_that_are_far_off_are_fitted_as_well_as_from_the_truth(seed: int) -> None:
+    # of twice their expected sizes: cables go slack elsewhere, and noise could explain what is left
+    cogiro, hidden = load_robot(COGIRO), list[Term]()
+    draw = np.random.default_rng(seed)
+    for name in ("exit_point_error", "anchor_point_error", "cable_length_offset", "drum_gain",
+                 "cable_stiffness"):  # fmt: skip
+        layout = layout_of(name, cogiro)
+        values = layout.null + 2.0 * layout.scale * draw.standard_normal(len(layout))
+        hidden.append(Term(layout, np.clip(values, layout.lower, layout.upper)))
+    names = tuple(one.name for one in hidden)
+    search = begun(measured(cogiro, hidden, points=3), names, cogiro)
+    near = scored(
+        search.every, frozenset(names), fit(search.data, search.data.state(Terms(hidden))),
+        dict.fromkeys(names, 1.0),
+    )  # fmt: skip
+    assert search.everything.score > near.score - 1.0
