@@ -26,7 +26,7 @@ from seecr.effects import Term, Terms, layout_of
 ROBOT = load_robot(COGIRO)
 # Of one parameter each, so that an exchange may cost EQUAL.
 A, B, C, D = "pulley_radius", "stiffness", "platform_mass", "length_scale"
-SCALES = ("tension_scale", "tracker_scale")
+SCALES, FRICTION = ("tension_scale", "tracker_scale"), "exit_friction"
 FRAME, EXITS = "frame_compliance", "exit_point_error"  # of 2 and of 24
 NONE: Key = frozenset()
 SLOW = Noise(np.array([3.5, 1.0, 1.0]), np.array([0.96, 0.0, 0.0]))
@@ -48,7 +48,7 @@ def search_of(
     rivals: float = 100.0,
 ) -> Any:  # fmt: skip
     """What a posterior asks of a search, with these scores; all else is far worse by ``rivals``."""
-    names = (A, B, C, D, FRAME, EXITS, *SCALES)
+    names = (A, B, C, D, FRAME, EXITS, FRICTION, *SCALES)
     members = {n: SimpleNamespace(layout=layout_of(n, ROBOT), key=n) for n in names}
     worse = {k: s - rivals for k, s in scores.items()}
 
@@ -59,7 +59,7 @@ def search_of(
         )  # fmt: skip
         fit = SimpleNamespace(noise=(noise or {}).get(key, STATED_NOISE), terms=terms)
         field = next(filter(is_field, key), None)
-        return SimpleNamespace(key=key, score=score, fit=fit, field=field)
+        return SimpleNamespace(key=key, score=score, fit=fit, field=field, widths={})
 
     every = SimpleNamespace(members=members, keys_of=lambda terms: {t.name: t.name for t in terms})
     found = {key: fitted(key, score) for key, score in scores.items()}
@@ -130,6 +130,11 @@ def test_noise_that_is_loud_and_slow_is_unknown_in_its_sets() -> None:
     assert found.beside is not None
     assert found.beside.member[B] == pytest.approx(chance({NONE: 0.0, some(B): 0.5}, B))
     assert found.beside.member[A] == 0.0
+    mixed = {NONE: 0.0, some(B): 0.5, some(A, "~0"): 0.6}
+    also = of(mixed, noise={NONE: SLOW, some(B): SLOW}).beside
+    by = {NONE: p, some(B): p * np.exp(0.5), some(A): np.exp(0.6)}
+    assert also is not None
+    assert also.member[A] == pytest.approx(by[some(A)] / sum(by.values()))
 
 
 def test_sets_that_were_not_fitted_count_by_the_linear_model_about_the_best() -> None:
@@ -167,14 +172,15 @@ def test_effects_that_can_be_exchanged_at_little_cost_are_one_class(
     ("best", "other", "part", "alike"),
     [
         (D, FRAME, 1.02, True), (D, FRAME, 1.98, True), (D, FRAME, 2.02, False),
-        (D, EXITS, 1.02, False), (FRAME, D, 0.98, True), (FRAME, D, 1.02, False),
+        (D, EXITS, 1.02, False), (D, FRICTION, 1.02, False), (FRICTION, FRAME, 1.98, True),
+        (FRAME, D, 0.98, True), (FRAME, D, 1.02, False),
     ],
 )  # fmt: skip
 def test_a_small_effect_with_one_parameter_more_may_cost_as_much_again(
     best: str, other: str, part: float, alike: bool
 ) -> None:
-    """Neither a large effect may, nor one with fewer."""
-    assert [len(layout_of(n, ROBOT)) for n in (D, FRAME, EXITS)] == [1, 2, 24]
+    """Neither a large effect may, nor one with fewer, nor what only extends another."""
+    assert [len(layout_of(n, ROBOT)) for n in (D, FRAME, EXITS, FRICTION)] == [1, 2, 24, 2]
     assert set(classes(against(best, other, part * EQUAL))) == {
         some(best, other) if alike else some(best)
     }
@@ -182,7 +188,7 @@ def test_a_small_effect_with_one_parameter_more_may_cost_as_much_again(
 
 def test_pairs_that_are_the_one_further_difference_of_two_sets_are_alike() -> None:
     """A goes for C by itself; of A + B and C + D the rest is B for D."""
-    scores = {NONE: -80.0, some(A, B): 0.0, some(C, B): -1.0, some(C, D): -2.0, some(A, D): -50.0}
+    scores = {NONE: -80.0, some(A, B): 0.0, some(C, B): -1.0, some(C, D): -2.0}
     assert set(classes(scores)) == {some(A, C), some(B, D)}
     # nothing is known of either exchange alone
     pairs = {NONE: -80.0, some(A, B): 0.0, some(C, D): -2.0}
@@ -197,6 +203,24 @@ def test_sets_of_other_numbers_are_no_exchange() -> None:
     assert set(classes(scores)) == {some(A)}
 
 
+def test_another_form_of_what_stands_is_no_exchange() -> None:
+    scores = {some(D): -60.0, some(A, D): 0.0, some(A, f"{D}@file"): -0.5}
+    assert set(classes(scores, stood=some(D))) == {some(A)}
+
+
+def test_what_is_alike_with_another_needed_member_stands_for_none_else() -> None:
+    """B does what D does, and a little of what A does: A's class does not take D."""
+    scores = {NONE: -60.0, some(A, D): 0.0, some(A, B): -1.0, some(B, D): -1.04 * EQUAL}
+    assert set(classes(scores)) == {some(A), some(B, D)}
+
+
+def test_members_of_the_best_set_are_named_first_and_the_others_by_probability() -> None:
+    assert (B, A) in [c for c, _p in of(against(B, A, 0.5)).known.classes]
+    scores = {NONE: np.log(0.001), some(A): np.log(0.96), some(B): np.log(0.009)}
+    scores |= {some(D): np.log(0.012), some(C): np.log(0.018)}
+    assert of(scores).known.classes[0][0] == (A, C, D)
+
+
 def test_of_a_class_with_two_needed_members_the_second_has_its_own_probability() -> None:
     scores = {NONE: -90.0, some(A, B): 0.0, some(A, C): -0.5, some(B, C): -0.6, some(A): -4.0,
               some(B): -5.0, some(C): -20.0}  # fmt: skip
@@ -204,6 +228,8 @@ def test_of_a_class_with_two_needed_members_the_second_has_its_own_probability()
     assert set(map(frozenset, (c for c, _p in found.classes))) >= {some(A, B, C)}
     # without A the best set explains less than without B: A is the most needed
     assert found.further == pytest.approx({B: chance(scores, A, B, C, least=2)})
+    unmet = {k: s for k, s in scores.items() if k != some(B)}
+    assert list(of(unmet).known.further) == [B], "nobody knows how little is left without A"
     assert found.of(B) == found.further[B] and found.of(A) == pytest.approx(chance(scores, A, B, C))
 
 

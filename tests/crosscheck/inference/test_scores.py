@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -107,9 +108,9 @@ def test_a_climb_ends_where_no_move_is_better(seed: int) -> None:
     ]  # fmt: skip
 
 
-def orthogonal(power: list[float]) -> Scores:
+def orthogonal(power: list[float], names: Sequence[str] = ()) -> Scores:
     """Members at right angles, each with so much power, in units of the noise."""
-    names = [f"e{k:02d}" for k in range(len(power))]
+    names = [*names, *(f"e{k:02d}" for k in range(len(power)))][: len(power)]
     x = np.linalg.qr(np.random.default_rng(0).normal(size=(60, len(power))))[0]
     groups = {n: MemberColumns(np.array([k]), np.array([30.0])) for k, n in enumerate(names)}
     every = SimpleNamespace(log_prior=lambda key: -0.0 * len(key), stood_keys=frozenset())
@@ -133,3 +134,13 @@ def test_large_sets_are_thinned_while_a_member_is_worth_little(weak: float, kept
     # so are sets that are not large as they are
     few = orthogonal(power[-1:] * LARGE)
     assert len(few.climb(frozenset(few.about.linear.groups), moves=0)) == LARGE
+
+
+def test_what_stands_and_a_field_stay_in_a_set_that_is_thinned() -> None:
+    """They do not count as its members, and are worth nothing here."""
+    cost = 0.5 * np.log1p(30.0**2)
+    power = [0.1, 0.1] + [(30.0 + k + cost) * (1.0 + 30.0**-2) for k in range(LARGE)]
+    scores = orthogonal(power, names=["stands", "~0"])
+    scores.stood = frozenset(["stands"])
+    every = frozenset(scores.about.linear.groups)
+    assert scores.climb(every, moves=0) == every
