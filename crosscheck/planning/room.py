@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import optimize
 from scipy.spatial import ConvexHull
 
 from crosscheck.planning.planned import NEAR_SLACK, Planned
@@ -120,6 +119,8 @@ class Room:
         Args:
             axes: (3, 3) as columns, along which all these are.
         """
+        from scipy import optimize  # takes a while to import
+
         level = np.append(np.zeros(3), self.robot.reference_pose[3:])
         ends = np.isfinite(self.most)
         upper = (self.most - self._out(level[None])[0])[ends]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from scipy import optimize, special
+from scipy import special
 
 from crosscheck.fit.algebra import basis, beside, left_over
 from crosscheck.fit.reasons import Reason, Why
@@ -71,6 +71,8 @@ class Signal:
 @lru_cache(maxsize=256)
 def needed(directions: int, tried: int) -> float:
     """Squared signal that a test finds: the noncentrality for POWER at the level LEVEL/tried."""
+    from scipy import optimize  # takes a while to import
+
     limit = special.chdtri(directions, LEVEL / tried)
     return float(
         optimize.brentq(lambda nc: 1.0 - special.chndtr(limit, directions, nc) - POWER, 1e-6, 1e4)

@@ -277,6 +277,6 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
 
 
 if COMPILES:
-    _called = by_address("seecr_cable_pull", _pull_there)
+    _called = by_address("seecr_cable_pull", _pull_there)  # type: ignore[no-untyped-call]
 else:
     cable_pull = _pull

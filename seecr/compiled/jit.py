@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from llvmlite.binding import add_symbol
-from numba import carray as carray
+from numba import carray as carray  # type: ignore[attr-defined]
 from numba import cfunc, config, njit, types
 from numba.core import event
 
@@ -64,7 +64,7 @@ jit_allocating = njit(**_COMMON, _nrt=True)  # type: ignore[call-overload]
 would apply.
 """
 
-COMPILES = not config.DISABLE_JIT
+COMPILES = not config.DISABLE_JIT  # type: ignore[attr-defined]
 """Whether anything is compiled; else all of it is run by Python."""
 
 
