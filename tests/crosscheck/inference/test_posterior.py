@@ -45,12 +45,11 @@ def problem() -> Problem:
 def search_of(
     scores: Mapping[Key, float], noise: Mapping[Key, Noise] | None = None,
     near: Mapping[Key, float] | None = None, stood: Key = NONE, sizes: float = 1.0,
-    rivals: float = 100.0,
+    rivals: float = 100.0, needed: float = 100.0,
 ) -> Any:  # fmt: skip
     """What a posterior asks of a search, with these scores; all else is far worse by ``rivals``."""
     names = (A, B, C, D, FRAME, EXITS, FRICTION, *SCALES)
     members = {n: SimpleNamespace(layout=layout_of(n, ROBOT), key=n) for n in names}
-    worse = {k: s - rivals for k, s in scores.items()}
 
     def fitted(key: Key, score: float) -> Any:
         terms = Terms(
@@ -67,7 +66,7 @@ def search_of(
     return SimpleNamespace(
         data=SimpleNamespace(problem=problem()), every=every, stood=stood, fitted=found, best=best,
         cache=found, near=near or {}, last=SimpleNamespace(centre=best, score=lambda _key: 50.0),
-        challenge=lambda _some: rivals, needed=lambda _some: rivals, worse=worse,
+        challenge=lambda _some: rivals, needed=lambda _some: needed,
     )  # fmt: skip
 
 
@@ -335,7 +334,23 @@ def test_of_many_effects_those_without_a_rival_are_named() -> None:
                 scores[some(A) | b | c | d] = float(len(c | d | b)) * 0.01
     assert word(scores).verdict is MANY
     assert word(scores).sure == (A,)
-    assert word(scores, rivals=11.0).sure == ()
+    assert word(scores, rivals=11.0).sure == () and word(scores, needed=11.0).sure == ()
+
+
+@pytest.mark.parametrize(("unknown", "asked"), [(0.2, True), (0.3, False)])
+def test_rivals_of_what_would_be_named_are_fitted_first(unknown: float, asked: bool) -> None:
+    """One that was not met does as well: then both are named as one."""
+    known = np.log(1.0 - unknown)
+    search = search_of({NONE: -40.0, some(A): known, some(A, "~0"): np.log(unknown)})
+    rival = search_of({NONE: -40.0, some(B): known - 1.0}).fitted[some(B)]
+
+    def challenge(alike: tuple[str, ...]) -> float:
+        assert A in alike
+        search.cache[some(B)] = rival  # the same mapping as what is fitted
+        return 1.0
+
+    search.challenge = challenge
+    assert set(judged(search).classes.alike(A)) == ({A, B} if asked else {A})
 
 
 def test_beside_something_unknown_is_named_what_every_field_leaves(

@@ -147,6 +147,16 @@ def test_all_effects_together_predict_better_than_those_that_are_named() -> None
     assert together.fit.cost < search.best.fit.cost
 
 
+def test_a_rival_that_is_far_worse_is_not_fitted() -> None:
+    """Its loss is that of the linear model; one that is near would have been fitted."""
+    search, some = found(), frozenset(["pulley_radius"])
+    fits = len(search.cache)
+    loss, scores = search.challenge(some), search.last
+    rival = scores.climb(search.best.key - some, without=some)
+    assert loss == pytest.approx(scores.score(search.best.key) - scores.score(rival))
+    assert loss > WITHIN and len(search.cache) == fits
+
+
 def hypothesis(key: frozenset[str], score: float, possible: bool = True, loud: bool = False) -> Any:
     noise = Noise(np.array([9.0 if loud else 1.0, 1.0, 1.0]), np.array([0.95, 0.0, 0.0]))
     field = next(filter(is_field, key), None)
