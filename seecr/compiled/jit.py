@@ -2,18 +2,56 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager, suppress
+
 from llvmlite.binding import add_symbol
 from numba import carray as carray  # type: ignore[attr-defined]
-from numba import cfunc, config, njit, types
+from numba import config, njit, types
 from numba.core import event
+from numba.core.caching import FunctionCache
+from numba.core.ccallback import CFunc
 
 from seecr.compiled.compile_notice import watch
 
-_COMMON = {"cache": True, "nogil": True, "error_model": "numpy"}
+COMPILES = not config.DISABLE_JIT  # type: ignore[attr-defined]
+"""Whether anything is compiled; else all of it is run by Python."""
+
+_COMMON = {"nogil": True, "error_model": "numpy"}
 # Numba counts references to arrays, atomically, at every call and slice. That took three quarters
 # of the time, as calls here are short. Functions that create no arrays, and whose callers hold the
 # arrays, need not count.
 _UNCOUNTED = {**_COMMON, "_nrt": False}
+
+
+class _Cache(FunctionCache):
+    """What was compiled, on disk. On a full disk, or from a damaged file, it is compiled anew."""
+
+    @contextmanager
+    def _guard_against_spurious_io_errors(self):  # type: ignore[no-untyped-def]
+        try:
+            yield
+        except OSError:
+            pass
+        except Exception:  # a damaged pickle raises nearly everything
+            with suppress(OSError):
+                self.flush()
+
+
+def _cached(compiled):  # type: ignore[no-untyped-def]
+    """A function of Numba's with a cache, if there is a folder that can be written."""
+    with suppress(RuntimeError):  # no folder
+        compiled._cache = _Cache(compiled.__wrapped__)
+    return compiled
+
+
+def _compiles(**options):  # type: ignore[no-untyped-def]
+    """A decorator of functions that are compiled with these options when they are first called."""
+    decorator = njit(**options)  # type: ignore[call-overload]
+
+    def decorate(function):  # type: ignore[no-untyped-def]
+        return _cached(decorator(function)) if COMPILES else function
+
+    return decorate
 
 
 class _Listener(event.Listener):
@@ -28,44 +66,39 @@ class _Listener(event.Listener):
 
 event.register("numba:compile", _Listener())  # type: ignore[no-untyped-call]
 
-jit = njit(**_UNCOUNTED)  # type: ignore[call-overload]
+jit = _compiles(**_UNCOUNTED)
 """Decorator of compiled functions. A division by zero gives inf or nan, as NumPy's does. They
 cannot create arrays: compiling one that does fails. Callers must pass writable arrays, since Numba
 compiles everything once more for read-only ones.
 """
 
-jit_inner = njit(  # type: ignore[call-overload]
-    **_UNCOUNTED, no_cpython_wrapper=True, no_cfunc_wrapper=True
-)
+jit_inner = _compiles(**_UNCOUNTED, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 """The same for functions that only compiled functions call: wrappers for calls from Python took a
 fifth of the compile time.
 """
 
-jit_lanes = njit(  # type: ignore[call-overload]
+jit_lanes = _compiles(
     **_UNCOUNTED, no_cpython_wrapper=True, no_cfunc_wrapper=True, fastmath={"contract"}
 )
 """The same for loops over lanes, see seecr.compiled.lanes: products and sums may be fused."""
 
-jit_merged = njit(  # type: ignore[call-overload]
+jit_merged = _compiles(
     **_UNCOUNTED, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True
 )
 """The same for functions that are merged into their callers: to pass a dozen arrays took as long as
 what is computed with them. Each call adds to the compile time.
 """
 
-jit_pasted = njit(**_UNCOUNTED, inline="always")  # type: ignore[call-overload]
+jit_pasted = _compiles(**_UNCOUNTED, inline="always")
 """The same for functions with one caller or two: each becomes part of these, before they are
 compiled, with their settings: it may create arrays where they may. By itself it would be optimised
 with all that it calls, and once more in its caller.
 """
 
-jit_allocating = njit(**_COMMON, _nrt=True)  # type: ignore[call-overload]
+jit_allocating = _compiles(**_COMMON, _nrt=True)
 """The same for functions that create arrays. It has to be explicit: otherwise the caller's setting
 would apply.
 """
-
-COMPILES = not config.DISABLE_JIT  # type: ignore[attr-defined]
-"""Whether anything is compiled; else all of it is run by Python."""
 
 
 def by_address(name, function):
@@ -80,5 +113,7 @@ def by_address(name, function):
         function: of addresses of numbers, which ``carray`` makes arrays of; it returns a bool.
     """
     kind = types.boolean(*[types.CPointer(types.float64)] * function.__code__.co_argcount)
-    add_symbol(name, cfunc(kind, cache=True)(function).address)
+    callback = _cached(CFunc(function, (kind.args, kind.return_type), {}, {}))
+    callback.compile()
+    add_symbol(name, callback.address)
     return types.ExternalFunction(name, kind)
