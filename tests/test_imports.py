@@ -204,7 +204,8 @@ def test_what_is_compiled_takes_arrays_alone() -> None:
     # what tells a user that compiling takes long is beside what is compiled
     files = [path for path in modules("seecr/compiled") if path.stem != "compile_notice"]
     taken = {t for path in files for t in imports(path)}
-    others = {"__future__", "contextlib", "llvmlite", "math", "numba", "numpy"}
+    others = {"__future__", "collections", "contextlib", "typing"}
+    others |= {"llvmlite", "math", "numba", "numpy"}
     assert {t.split(".")[0] for t in taken} == {*others, "seecr"}
     assert {place(t) for t in taken if t.startswith("seecr")} == {"seecr.compiled"}
 

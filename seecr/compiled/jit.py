@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from typing import Any
 
 from llvmlite.binding import add_symbol
 from numba import carray as carray  # type: ignore[attr-defined]
@@ -27,28 +29,28 @@ class _Cache(FunctionCache):
     """What was compiled, on disk. On a full disk, or from a damaged file, it is compiled anew."""
 
     @contextmanager
-    def _guard_against_spurious_io_errors(self):  # type: ignore[no-untyped-def]
+    def _guard_against_spurious_io_errors(self) -> Iterator[None]:
         try:
             yield
         except OSError:
             pass
         except Exception:  # a damaged pickle raises nearly everything
             with suppress(OSError):
-                self.flush()
+                self.flush()  # type: ignore[no-untyped-call]
 
 
-def _cached(compiled):  # type: ignore[no-untyped-def]
+def _cached(compiled: Any) -> Any:
     """A function of Numba's with a cache, if there is a folder that can be written."""
     with suppress(RuntimeError):  # no folder
-        compiled._cache = _Cache(compiled.__wrapped__)
+        compiled._cache = _Cache(compiled.__wrapped__)  # type: ignore[no-untyped-call]
     return compiled
 
 
-def _compiles(**options):  # type: ignore[no-untyped-def]
+def _compiles(**options: Any) -> Any:
     """A decorator of functions that are compiled with these options when they are first called."""
-    decorator = njit(**options)  # type: ignore[call-overload]
+    decorator = njit(**options)
 
-    def decorate(function):  # type: ignore[no-untyped-def]
+    def decorate(function: Any) -> Any:
         return _cached(decorator(function)) if COMPILES else function
 
     return decorate
