@@ -47,7 +47,7 @@ FLAT, SHAPES = 300.0, 30.0
 
 # Rounds of estimating noise and weights, the change at which these have settled, steps of a round.
 _ROUNDS, _SETTLED, _STEPS = 4, 0.05, 6
-# Each time a fit is cooled its noise falls by this factor.
+# The factor by which noise falls at a time where a fit is cooled; it sets the effort.
 _COOLER = 3.0
 # A step is the last if it gains less than both this part of the objective and this much.
 _PART, _GAIN = 1e-3, 1e-2
@@ -346,9 +346,9 @@ def _from(begun: Fit, rounds: int) -> Fit:
 def cooled(data: Data, start: State) -> State:
     """A model from a valid state, fitted under white noise that falls to what is stated.
 
-    For a fit of all effects that is far off: noise that explains what is left of a poor fit would
-    end there. All effects together leave no more than what is stated (graduated non-convexity:
-    Blake and Zisserman, Visual Reconstruction, 1987).
+    It is for all effects together, which leave no more than what is stated. Where a fit is far off,
+    noise that is estimated beside it explains what is left, and the fit ends too early (graduated
+    non-convexity: Blake and Zisserman, Visual Reconstruction, 1987).
     """
     width, state, jacobian = data.width(start.terms, {}), start, data.derivatives(start)
     noise, weight = _hot(data.chain, start.white), np.ones(len(start.white))

@@ -293,7 +293,8 @@ class Search:
     def everything(self) -> Hypothesis:
         """All effects that act from the start, fitted together with expected sizes as priors.
 
-        They begin where nothing is known, and where they end under noise that is cooled.
+        They are fitted from where nothing is known, and again from where a fit under noise that is
+        cooled ends. The better of both counts.
         """
         members = self.every.members.values()
         names = [m.key for m in members if not m.waits and not part_of(m.key)]

@@ -61,8 +61,8 @@ def portions(rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
 
 
 # So many rows are worth the lanes of seecr.compiled.lanes, and tables made for these. Lanes take as
-# long to compile as a million descents one by one. A map, or the search for equilibria, which asks
-# for as many as these at a time, soon has as many; a first diagnosis of a hundred rows never.
+# long to compile as a million descents one by one. A map and a search for equilibria soon solve
+# that many, in batches of this size and more; a first diagnosis of a hundred rows does not.
 _MANY = 256
 _singly: set[str] = set()
 
