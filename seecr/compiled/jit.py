@@ -12,6 +12,7 @@ from numba import config, njit, types
 from numba.core import event
 from numba.core.caching import FunctionCache
 from numba.core.ccallback import CFunc
+from numba.core.runtime.nrt import rtsys
 
 from seecr.compiled.compile_notice import watch
 
@@ -37,6 +38,16 @@ class _Cache(FunctionCache):
         except Exception:  # a damaged pickle raises nearly everything
             with suppress(OSError):
                 self.flush()  # type: ignore[no-untyped-call]
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """What was compiled for a signature, else None.
+
+        Numba would load all its rules of how to compile first, and SciPy's linear algebra for them:
+        0.4 s of each start. Who compiles loads them; what is compiled needs only who owns arrays.
+        """
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
 
 
 def _cached(compiled: Any) -> Any:

@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 import errno
+import os
 import runpy
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from numba.core import caching
+from sources import ROOT
 
 SOURCE = """
-from seecr.compiled.jit import by_address, carray, jit
+import numpy as np
+from seecr.compiled.jit import by_address, carray, jit, jit_allocating
 
 @jit
 def twice(number):
     return 2.0 * number
+
+@jit_allocating
+def thrice(number):
+    found = np.empty(3)
+    found[:] = number
+    return found
 
 def _first_of(numbers):
     return carray(numbers, 1)[0] > 0.0
@@ -57,6 +68,22 @@ def test_what_was_compiled_is_kept_and_damaged_files_are_replaced(tmp_path: Path
             file.write_bytes(damage)
         assert compiled(tmp_path)(2.0) == 4.0
         assert all(file.read_bytes() != damage for file in kept)
+
+
+def test_what_was_compiled_is_loaded_without_what_compiles(tmp_path: Path) -> None:
+    code = (
+        "import sys; from doubled import thrice, twice; told = thrice(2.0);"
+        "print(told.sum(), twice(told[0]), 'numba.np.arraymath' in sys.modules)"
+    )
+    compiled(tmp_path)  # writes the module
+    runs = [
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True,
+            env=os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
+        )
+        for _ in range(2)
+    ]  # fmt: skip
+    assert [run.stdout for run in runs] == ["6.0 4.0 True\n", "6.0 4.0 False\n"]
 
 
 def test_without_a_folder_nothing_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
