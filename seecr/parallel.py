@@ -144,6 +144,7 @@ def as_done(
 
     Yields:
         each result as it comes, with the number of its item. An executor's results are not kept.
+        All that are there when it ends, or when a task fails, come before the error.
 
     Raises:
         ExecutorError: the executor ended before its work.
@@ -159,6 +160,9 @@ def as_done(
         for future in as_completed(futures):
             yield futures.pop(future), future.result()
     except Exception as error:
+        for future, i in futures.items():
+            if future.done() and not future.cancelled() and future.exception() is None:
+                yield i, future.result()
         if not _is_end(error):
             raise
         raise ExecutorError(

@@ -20,7 +20,7 @@ from seecr.commands import Commands
 from seecr.description.mjcf import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve
-from seecr.errors import InputError
+from seecr.errors import ExecutorError, InputError
 from seecr.parallel import BLOCK, as_done, threads
 from seecr.pose import NORM_TOLERANCE, Array
 from seecr.prediction.experiment import Experiment, effects_of
@@ -177,7 +177,8 @@ def workspace_map(
     Raises:
         InputError: an axis without values, an orientation that the joints do not allow, effects
             with a history, or probabilities asked for without a covariance.
-        ExecutorError: the executor ended before its work.
+        ExecutorError: the executor ended before its work; nothing is kept, see
+            :func:`seecr.store_map`.
 
     Example:
         ``seecr.workspace_map(robot, [0.3, 0.4], [0.2, 0.3], [0.15]).margin``
@@ -188,11 +189,16 @@ def workspace_map(
     size = _PART if executor is None else min(max(-(-n // _TASKS), _SMALLEST), _LARGEST)
     parts = in_pieces(slice(0, n), -(-size // BLOCK) * BLOCK)
     workers = threads() if executor is None and len(parts) > 1 else executor
-    with closing(as_done(job.part, parts, workers)) as results:
-        for i, columns in results:
-            for name, values in columns.items():
-                found[name][parts[i]] = values
-            progress(parts[i].stop - parts[i].start)
+    try:
+        with closing(as_done(job.part, parts, workers)) as results:
+            for i, columns in results:
+                for name, values in columns.items():
+                    found[name][parts[i]] = values
+                progress(parts[i].stop - parts[i].start)
+    except ExecutorError as error:
+        raise ExecutorError(
+            f"{error}; of this map nothing is kept: --parts (seecr.store_map) keeps what is done"
+        ) from None
     return job.workspace(found)
 
 

@@ -8,9 +8,16 @@ import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import (
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+)
 from multiprocessing import active_children
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -244,6 +251,69 @@ def test_a_process_that_is_killed_is_an_error_and_ends_all() -> None:
     with ended, parallel.processes(2) as executor:
         parallel.run_tasks(signal.raise_signal, [signal.SIGTERM] * 2, executor)
     assert active_children() == [] and time.monotonic() - began < 50.0
+
+
+class Dying(Executor):
+    """It does three tasks, and ends as it is given the next: at once, or by its futures."""
+
+    def __init__(self, error: Exception, at_once: bool) -> None:
+        self.error, self.at_once, self.given = error, at_once, 0
+
+    def submit(self, function: Any, /, *args: Any, **_named: Any) -> Future[Any]:
+        self.given += 1
+        future = Future[Any]()
+        if self.given <= 3:
+            future.set_result(function(*args))
+        elif self.at_once:
+            raise self.error
+        elif isinstance(self.error, CancelledError):
+            future.cancel()
+            future.set_running_or_notify_cancel()
+        else:
+            future.set_exception(self.error)
+        return future
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+@pytest.mark.parametrize(
+    "error, raised",
+    [
+        (BrokenExecutor("gone"), "ExecutorError"),
+        (CancelledError("gone"), "ExecutorError"),
+        (ConnectionError("gone"), "ExecutorError"),
+        (MemoryError("gone"), "MemoryError"),  # of a task: what others found is kept all the same
+    ],
+)
+def test_what_is_done_when_an_executor_ends_comes_before_the_error(
+    error: Exception, raised: str, at_once: bool
+) -> None:
+    told: list[int] = []
+    with pytest.raises((seecr.ExecutorError, MemoryError)) as caught:
+        parallel.run_tasks(DOUBLE, range(40), Dying(error, at_once), None, told.append)
+    assert type(caught.value).__name__ == raised and sorted(told) == [0, 2, 4]
+
+
+@pytest.mark.slow
+def test_what_processes_did_before_they_are_killed_is_there() -> None:
+    """They are killed while tasks are still handed out, and nothing has been fetched yet."""
+    told: list[int] = []
+
+    class Tasks(list[int]):
+        def __getitem__(self, i: Any) -> Any:
+            if i == 4:
+                done = [executor.submit(DOUBLE, 0).result() for _ in range(2)]
+                assert done == [0, 0]  # they are done in turn, so that the four before are, too
+                for one in active_children():
+                    one.kill()
+                    one.join()
+                while not executor._broken:  # type: ignore[attr-defined]
+                    time.sleep(0.01)
+            return super().__getitem__(i)
+
+    ended = pytest.raises(seecr.ExecutorError, match=r"ended before its work \(BrokenProcessPool\)")
+    with ended, parallel.processes(2) as executor:
+        parallel.run_tasks(DOUBLE, Tasks(range(9)), executor, None, told.append)
+    assert sorted(told) == [0, 2, 4, 6]
 
 
 @pytest.mark.slow
