@@ -71,21 +71,44 @@ def _round(
     at = by.evaluated(many, images.reshape(b * k, -1), commanded)
     gradient = at.gradient.reshape(b, k, -1)[:, 1:-1]
     hessian = at.hessian.reshape(b, k, d, d)[:, 1:-1]
-    along = _steps_between(by, images[:, 2:], images[:, :-2])
-    along /= np.linalg.norm(along, axis=2, keepdims=True)
+    steps = _steps_between(by, images[:, 1:], images[:, :-1])
+    gap = np.linalg.norm(steps, axis=2).mean(axis=1)[:, None, None]
+    along = _tangents(steps, at.energy.reshape(b, k))
     across = np.eye(d) - along[..., :, None] * along[..., None, :]
     slope = np.einsum("bnij,bnj->bni", across, gradient)
     settled = np.linalg.norm(slope, axis=2).max(axis=1) < _ACROSS * many.scale[0]
     values, vectors = np.linalg.eigh(across @ hessian @ across)
-    parts_of = np.einsum("bnij,bni->bnj", vectors, slope) / np.maximum(np.abs(values), softest)
+    # The slope s along the path carries the deviation n of an image on to those below: across it
+    # the force is value n + s dn/dl, and with gaps h between images a step by the value alone lets
+    # deviations grow by s / (value h) where the path is steep and its sides are soft. Differences
+    # to the higher neighbour add s / h to the value; then the sum is what an image itself feels
+    # most, and steps by it settle.
+    carried = np.abs(np.sum(along * gradient, axis=2, keepdims=True)) / gap
+    parts_of = np.einsum("bnij,bni->bnj", vectors, slope)
+    parts_of /= np.maximum(np.abs(values) + carried, softest)
     step = -np.einsum("bnij,bnj->bni", vectors, parts_of)
-    gaps = np.linalg.norm(_steps_between(by, images[:, 1:], images[:, :-1]), axis=2)
     size = np.linalg.norm(step, axis=2, keepdims=True)
-    most = longest * gaps.mean(axis=1)[:, None, None]
-    step *= np.minimum(1.0, most / np.maximum(size, 1e-300))
+    step *= np.minimum(1.0, longest * gap / np.maximum(size, 1e-300))
     out = images.copy()
     out[:, 1:-1] = _moved(by, images[:, 1:-1], step)
     return np.where(settled[:, None, None], images, _evenly(by, out)), settled
+
+
+def _tangents(steps: Array, energies: Array) -> Array:
+    """Unit vectors (b, k - 2, d) along paths, of their steps (b, k - 1, d) and energies (b, k).
+
+    They point from or to the higher neighbour, and on tops and in valleys in between, by the
+    differences of energy (Henkelman and Jonsson, J. Chem. Phys. 113, 9978, 2000).
+    """
+    rise = np.nan_to_num(np.diff(energies, axis=1))
+    last, next_ = rise[:, :-1], rise[:, 1:]
+    top = (last > 0.0) & (next_ < 0.0)
+    # where all is level, both count alike
+    behind = np.where(top, -next_, np.maximum(-last, 0.0)) + 1e-300
+    ahead = np.where(top, last, np.maximum(next_, 0.0)) + 1e-300
+    part = (ahead / (ahead + behind))[..., None]
+    along = part * steps[:, 1:] + (1.0 - part) * steps[:, :-1]
+    return along / np.linalg.norm(along, axis=2, keepdims=True)
 
 
 def _evenly(by: Coordinates, images: Array) -> Array:

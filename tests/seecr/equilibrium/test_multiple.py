@@ -12,6 +12,7 @@ import seecr
 from seecr import InputError, Robot, Status, Term, equilibria, load_robot, solve
 from seecr.description.joints import pose_of_values
 from seecr.equilibrium.following import evaluated, moved
+from seecr.equilibrium.saddles import strings
 from seecr.equilibrium.search import elsewhere, starts_about
 from seecr.pose import Array, pose_difference, quat_from_rotvec, quat_multiply, transform_points
 from seecr.show.pose_words import other_lines, softest_words
@@ -344,6 +345,16 @@ def test_barriers_of_random_commands_are_as_high_as_both_ends(name: str) -> None
             assert way.energy >= top.energy[0] - own.energy[0] >= -1e-6 * abs(energy)
             assert not way.exact or top.residual[0] < 1e-9
     assert seen > 0
+
+
+@pytest.mark.parametrize("name", ["demobot_cogiro", "ipanema"])
+def test_a_path_settles_where_it_is_steep_and_its_sides_are_soft(name: str) -> None:
+    robot = seecr.load_robot(name)
+    place = robot.exit_points.min(axis=0) + 0.45 * np.ptp(robot.exit_points, axis=0)
+    pose = np.concatenate([place, robot.reference_pose[3:]])[None]
+    own, every = seecr.solve(robot, pose), seecr.equilibria(robot, pose)
+    _, settled = strings(own, every.rows(elsewhere(own, every)), 0.5)
+    assert len(settled) > 0 and settled.all()
 
 
 @pytest.mark.slow
