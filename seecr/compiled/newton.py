@@ -220,13 +220,16 @@ def solve_one(
     point that is not a minimum the descent continues along the softest direction.
 
     Residuals are measured against the load ``scale`` [N]; ``radius`` is the first trust region, and
-    deviations beyond ``reach`` count as falling [m]; ``limit`` is most evaluations, ``enough`` the
-    residual/scale at which to stop. Returns outcome, evaluations and residual/scale.
+    deviations that are larger than the start's by more than ``reach`` count as falling [m];
+    ``limit`` is most evaluations, ``enough`` the residual/scale at which to stop. Returns outcome,
+    evaluations and residual/scale.
     """
     (step, factor, trial, trial_values, trial_gradient, trial_hessian, trial_states, trial_slopes,
      trial_guess, current, work, ready) = space  # fmt: skip
     n = gradient.shape[0]
     largest = 20.0 * radius
+    # cables pull a platform back from wherever it starts
+    reach += math.sqrt(start[0] ** 2 + start[1] ** 2 + start[2] ** 2)
     prepare(cables, load, pose, ready)
     copy_vector(start, trial)
     copy_vector(start_values, trial_values)

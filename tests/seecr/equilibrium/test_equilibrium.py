@@ -272,6 +272,28 @@ def test_a_platform_whose_cables_cannot_hold_it_falls() -> None:
     assert np.isinf(answer.residual[0])
 
 
+@pytest.mark.parametrize("lengths", [5.0, 30.0])
+@pytest.mark.parametrize("name", ["demobot_cogiro", "planar_vertical"])
+def test_a_start_far_away_is_no_fall(name: str, lengths: float) -> None:
+    """It ended at once as "the platform fell", although its cables pull it back."""
+    robot = seecr.load_robot(name)
+    starts = np.tile(robot.reference_pose, (64, 1))  # enough for lanes of sixteen
+    turns = np.linspace(0.0, 2 * np.pi, 64, endpoint=False)
+    longest = robot.reference_lengths.max()
+    starts[:, [0, 2]] += lengths * longest * np.array([np.cos(turns), np.sin(turns)]).T
+    here = seecr.solve(robot, robot.reference_pose)
+    found = seecr.solve(robot, np.tile(robot.reference_pose, (64, 1)), start=starts)
+    assert np.all(found.converged)
+    moved = np.linalg.norm(found.deviation[:, :3] - here.deviation[:, :3], axis=1)
+    assert moved.max() < longest and np.mean(moved < 1e-8) > 0.5  # some are twisted: other rests
+
+
+def test_a_platform_that_cannot_be_held_falls_from_far_away_too() -> None:
+    robot, start = hung(joints=slide(), ea=np.array([5e-3])), np.array(HERE)
+    start[2] -= 50.0
+    assert seecr.solve(robot, HERE, start=start).status[0] is seecr.Status.FALLING
+
+
 def test_no_equilibrium_under_a_moment_that_no_cable_resists() -> None:
     """A constant moment about the vertical turns a pendulum for ever."""
     answer = seecr.solve(hung(centre_of_mass=[0.0, 0, -0.2]), HERE, wrench=[0, 0, 0, 0, 0, 0.5])
