@@ -44,7 +44,6 @@ from seecr.compiled.jit import (
     carray,
     jit,
     jit_inner,
-    jit_merged,
     jit_pasted,
 )
 
@@ -59,7 +58,7 @@ _FEW, _MANY = 20, 200
 N_WORK = 34
 
 
-@jit_inner
+@jit_pasted
 def _pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
     """Force of a cable on its anchor point, its stiffness, and the gradient of its tension.
 
@@ -204,7 +203,7 @@ def _pulley_pull(row, start, move, up, work, force, stiffness, gradient, state):
     return True
 
 
-@jit_inner
+@jit_pasted
 def _catenary(row, across, rise, guess, error, jacobian, work):
     """A catenary from its guess, else a first one, else brackets; patiently only in the end."""
     for attempt in range(4):  # one call: each would be compiled into all that needs cables
@@ -218,7 +217,7 @@ def _catenary(row, across, rise, guess, error, jacobian, work):
     return False
 
 
-@jit_merged
+@jit_pasted
 def _catenary_pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
     e, f, k2, g2 = work[0], work[1], work[2], work[3]
     across, rise = _plane(row, start, move, up, e)

@@ -226,7 +226,7 @@ def _size(error, length):
     return max(abs(error[0]), abs(error[1]), abs(error[2])) / length
 
 
-@jit_merged
+@jit_inner
 def solve_catenary(row, across, rise, most, unknown, error, jacobian, work):
     """Find the pull of a catenary with the given span in so many steps; True if to rounding.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from seecr.compiled.algebra import copy_rows, copy_vector
+from seecr.compiled.cable import N_WORK
 from seecr.compiled.cable_law import strain_of_tension
 from seecr.compiled.columns import (
     CONVERGED,
@@ -17,6 +18,8 @@ from seecr.compiled.columns import (
     HYSTERESIS,
     HYSTERESIS_BEFORE,
     HYSTERESIS_NOW,
+    N_COLUMNS,
+    N_STATE,
     REST,
     SINGULAR,
     STALLED,
@@ -28,8 +31,10 @@ from seecr.compiled.columns import (
     WINCH_SIDE,
     WINCH_TENSION,
 )
-from seecr.compiled.jit import jit_allocating, jit_inner
-from seecr.compiled.newton import advance, make_space, solve_in_stages
+from seecr.compiled.jit import jit, jit_allocating, jit_inner
+from seecr.compiled.joint_kinematics import N_CURRENT
+from seecr.compiled.newton import advance, solve_in_stages
+from seecr.compiled.platform import N_READY
 from seecr.compiled.rates import (
     add_load,
     add_pull,
@@ -131,56 +136,76 @@ def begin(row, kept):
 _CORRECTIONS, _BENT, _ROUNDING = 3, 1e-5, 1e-10
 
 
-@jit_allocating
-def walk_in_order(
-    cables, load, poses, screws, length, scale, radius, reach, limit, fresh, onward, enough,
-    elapsed, outcome, count, residual, gradient, hessian, states, slopes, deviation, values, guess,
+def solve_rows(
+    cables, load, poses, screws, starts, start_values, length, scale, radius, reach, limit, staged,
+    in_order, fresh, onward, enough, elapsed, outcome, count, residual, gradient, hessian, states,
+    slopes, deviation, values, guess,
 ):  # fmt: skip
-    """Solve waypoints in order, each from the one before; all outputs are filled.
+    """Solve poses, each from its own start, or waypoints in order; all outputs are filled.
 
-    A waypoint that is not solved ends its run, since the path to later rows is then unknown: these
-    count as stalled. Arguments are those of solve_batch, and (N,) each: ``fresh`` waypoints start a
-    run, ``onward`` ones go on from the one before as that went on from its own, ``elapsed`` [s]
-    since the one before, ``enough`` residual/scale at which to stop.
+    Independent poses are all ``fresh``. A waypoint that is not starts from the one before; its
+    start is filled. If that is not solved, its run ends, since the path to later rows is then
+    unknown: these count as stalled. (N,) each: ``fresh`` waypoints start a run, ``onward`` ones go
+    on from the one before as that went on from its own, ``elapsed`` [s] since the one before,
+    ``enough`` residual/scale at which to stop. ``in_order``: whether cables have a history.
     """
-    n, m = cables.shape[0], cables.shape[1]
-    softened = np.empty_like(cables[0])
-    start, first = np.zeros(7), np.zeros(gradient.shape[1])
-    kept, amplitude, friction = np.zeros((m, N_KEPT)), np.empty(m), np.empty(m)
-    space = make_space(m, gradient.shape[1], screws.shape[1])
+    m, n, joints = cables.shape[1], gradient.shape[1], screws.shape[1]
+    descent = (
+        np.zeros(n), np.zeros((n, n)), np.zeros(7), np.zeros(n), np.zeros(n), np.zeros((n, n)),
+        np.zeros((m, N_STATE)), np.zeros((m, n)), np.zeros((m, 3)), np.zeros((joints, N_CURRENT)),
+        np.zeros((N_WORK + m, 6)), np.zeros((m + 1, N_READY)), np.zeros((m, N_COLUMNS)),
+    )  # fmt: skip
+    stages = np.zeros((m, N_COLUMNS)), np.zeros(7), np.zeros(n)
+    _solve_rows(
+        cables, load, poses, screws, starts, start_values, length, scale, radius, reach, limit,
+        staged, in_order, fresh, onward, enough, elapsed, outcome, count, residual, gradient,
+        hessian, states, slopes, deviation, values, guess, descent, stages, np.zeros((m, N_KEPT)),
+        np.zeros((m, 2)),
+    )  # fmt: skip
+
+
+# One function for poses and waypoints: the descent is large, and would be compiled into each. For
+# the same reason NumPy makes its scratch arrays.
+
+
+@jit
+def _solve_rows(
+    cables, load, poses, screws, starts, start_values, length, scale, radius, reach, limit, staged,
+    in_order, fresh, onward, enough, elapsed, outcome, count, residual, gradient, hessian, states,
+    slopes, deviation, values, guess, descent, stages, kept, here,
+):  # fmt: skip
     lost = False
-    for k in range(n):
+    for k in range(poses.shape[0]):
         if lost and not fresh[k]:
             outcome[k] = STALLED
             continue
-        if fresh[k]:
-            start[:] = 0.0
-            start[3] = 1.0
-            first[:] = 0.0
-        else:
+        if not fresh[k]:
             # the start deviates from its command as much as the last equilibrium did; on a straight
             # way by as much more as that did than the one before it
-            copy_vector(deviation[k - 1], start)
-            copy_vector(values[k - 1], first)
+            copy_vector(deviation[k - 1], starts[k])
+            copy_vector(values[k - 1], start_values[k])
             if onward[k]:
-                _go_on(deviation[k - 2], start)
-                _go_on(values[k - 2], first)
-                _normalise(start)
-        for i in range(m):
-            row = cables[k, i]
-            amplitude[i], friction[i] = row[HYSTERESIS], row[FRICTION]
-            take_past(row, kept[i], elapsed[k], fresh[k])
+                _go_on(deviation[k - 2], starts[k])
+                _go_on(values[k - 2], start_values[k])
+                _normalise(starts[k])
+        if in_order:
+            for i in range(cables.shape[1]):
+                row = cables[k, i]
+                here[i, 0], here[i, 1] = row[HYSTERESIS], row[FRICTION]
+                take_past(row, kept[i], elapsed[k], fresh[k])
         outcome[k], count[k], residual[k] = solve_in_stages(
-            cables[k], load[k], poses[k], screws[k], start, first, length, scale[k], radius,
-            reach[k], limit, guess[k], gradient[k], hessian[k], states[k], slopes[k],
-            deviation[k], values[k], softened, fresh[k], enough[k], space,
+            cables[k], load[k], poses[k], screws[k], starts[k], start_values[k], length, scale[k],
+            radius, reach[k], limit, guess[k], gradient[k], hessian[k], states[k], slopes[k],
+            deviation[k], values[k], staged and fresh[k], enough[k], descent, stages,
         )  # fmt: skip
+        if not in_order:
+            continue
         lost = outcome[k] != CONVERGED and outcome[k] != SINGULAR
-        for i in range(m):
+        for i in range(cables.shape[1]):
             row = cables[k, i]
             keep_past(row, states[k, i], fresh[k], kept[i])
             if fresh[k]:
-                row[HYSTERESIS], row[FRICTION] = amplitude[i], friction[i]
+                row[HYSTERESIS], row[FRICTION] = here[i, 0], here[i, 1]
                 begin(row, kept[i])
 
 

@@ -19,7 +19,8 @@ from seecr.compiled.compile_notice import watch
 COMPILES = not config.DISABLE_JIT  # type: ignore[attr-defined]
 """Whether anything is compiled; else all of it is run by Python."""
 
-_COMMON = {"nogil": True, "error_model": "numpy"}
+# A wrapper for calls from C is asked for where one is needed (by_address).
+_COMMON = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 # Numba counts references to arrays, atomically, at every call and slice. That took three quarters
 # of the time, as calls here are short. Functions that create no arrays, and whose callers hold the
 # arrays, need not count.
@@ -85,19 +86,15 @@ cannot create arrays: compiling one that does fails. Callers must pass writable 
 compiles everything once more for read-only ones.
 """
 
-jit_inner = _compiles(**_UNCOUNTED, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+jit_inner = _compiles(**_UNCOUNTED, no_cpython_wrapper=True)
 """The same for functions that only compiled functions call: wrappers for calls from Python took a
 fifth of the compile time.
 """
 
-jit_lanes = _compiles(
-    **_UNCOUNTED, no_cpython_wrapper=True, no_cfunc_wrapper=True, fastmath={"contract"}
-)
+jit_lanes = _compiles(**_UNCOUNTED, no_cpython_wrapper=True, fastmath={"contract"})
 """The same for loops over lanes, see seecr.compiled.lanes: products and sums may be fused."""
 
-jit_merged = _compiles(
-    **_UNCOUNTED, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True
-)
+jit_merged = _compiles(**_UNCOUNTED, no_cpython_wrapper=True, forceinline=True)
 """The same for functions that are merged into their callers: to pass a dozen arrays took as long as
 what is computed with them. Each call adds to the compile time.
 """
@@ -112,6 +109,9 @@ jit_allocating = _compiles(**_COMMON, _nrt=True)
 """The same for functions that create arrays. It has to be explicit: otherwise the caller's setting
 would apply.
 """
+
+jit_allocating_inner = _compiles(**_COMMON, _nrt=True, no_cpython_wrapper=True)
+"""The same for those that only compiled functions call."""
 
 
 def by_address(name, function):

@@ -16,7 +16,6 @@ from seecr.compiled.algebra import (
     solve_factored,
     turned,
 )
-from seecr.compiled.cable import N_WORK
 from seecr.compiled.columns import (
     CABLE_LAW,
     CONVERGED,
@@ -26,7 +25,6 @@ from seecr.compiled.columns import (
     GAP,
     IDLE,
     ITERATIONS,
-    N_STATE,
     PUSHES,
     RADIUS,
     REST,
@@ -39,9 +37,9 @@ from seecr.compiled.columns import (
     TOLERANCE,
     UNSTABLE,
 )
-from seecr.compiled.jit import jit, jit_allocating, jit_inner, jit_pasted
-from seecr.compiled.joint_kinematics import N_CURRENT, place_joints
-from seecr.compiled.platform import N_READY, add_skew, evaluate, has_moment, prepare
+from seecr.compiled.jit import jit, jit_allocating_inner, jit_inner, jit_pasted
+from seecr.compiled.joint_kinematics import place_joints
+from seecr.compiled.platform import add_skew, evaluate, has_moment, prepare
 
 # The steps of a descent: Newton's, those away from saddles, and tests of a stationary point.
 
@@ -102,7 +100,7 @@ def newton_step(gradient, hessian, shift, radius, load, current, length, factor,
     return shift
 
 
-@jit_allocating
+@jit_allocating_inner
 def mirrored_step(gradient, hessian, radius, step):
     """Newton step with the absolute value of each eigenvalue: it leads away from saddles.
 
@@ -127,7 +125,7 @@ def mirrored_step(gradient, hessian, radius, step):
             step[k] *= radius / span
 
 
-@jit_allocating
+@jit_allocating_inner
 def escape(hessian, top, radius, step):
     """Step along the softest direction; UNSTABLE if it is downhill, SINGULAR if it is flat."""
     eigenvalues, vectors = np.linalg.eigh(hessian)
@@ -143,7 +141,7 @@ def is_idle(cables, states, i, scale):
     return taut and states[i, TENSION] < IDLE * scale
 
 
-@jit_allocating
+@jit_pasted
 def holds_without_idle(cables, load, pose, deviation, length, guess, states, scale, space):
     """Whether the equilibrium is stable without the cables whose tension is mere rounding.
 
@@ -154,22 +152,23 @@ def holds_without_idle(cables, load, pose, deviation, length, guess, states, sca
         idle = idle or is_idle(cables, states, i, scale)
     if not idle:
         return True
-    (_step, factor, _trial, _values, gradient, hessian, other_states, slopes, _guess, current,
-     work, ready) = space  # fmt: skip
-    rest = cables.copy()
+    (_step, factor, _trial, _values, gradient, hessian, other_states, slopes, other_guess, current,
+     work, ready, rest) = space  # fmt: skip
+    copy_rows(cables, rest)
+    copy_rows(guess, other_guess)
     for i in range(cables.shape[0]):
         if is_idle(cables, states, i, scale):
             rest[i, GAP] = -rest[i, REST]
             rest[i, RADIUS] = 0.0
     prepare(rest, load, pose, ready)
     evaluate(
-        rest, ready, load, deviation, current, length, guess.copy(), gradient, hessian,
+        rest, ready, load, deviation, current, length, other_guess, gradient, hessian,
         other_states, slopes, work,
     )  # fmt: skip
     return cholesky(hessian, -SINGULAR_PART * largest_diagonal(hessian), factor)
 
 
-@jit_inner
+@jit_pasted
 def turns_about_moment(load, current, length, step):
     """Turns about the axis of the external moment that a step makes."""
     mx, my, mz = load[EXTERNAL_MOMENT], load[EXTERNAL_MOMENT + 1], load[EXTERNAL_MOMENT + 2]
@@ -196,17 +195,7 @@ MOST_TURNS = 3.0
 STIFF, STAGE = 2000.0, 10.0
 
 
-@jit_allocating
-def make_space(m, n, joints):
-    """Scratch arrays of a descent, made once per batch."""
-    return (
-        np.zeros(n), np.zeros((n, n)), np.zeros(7), np.zeros(n), np.zeros(n), np.zeros((n, n)),
-        np.zeros((m, N_STATE)), np.zeros((m, n)), np.zeros((m, 3)), np.zeros((joints, N_CURRENT)),
-        np.zeros((N_WORK + m, 6)), np.zeros((m + 1, N_READY)),
-    )  # fmt: skip
-
-
-@jit_inner
+@jit_pasted
 def solve_one(
     cables, load, pose, screws, start, start_values, length, scale, radius, reach, limit,
     guess, gradient, hessian, states, slopes, deviation, values, enough, space,
@@ -225,7 +214,7 @@ def solve_one(
     evaluations and residual/scale.
     """
     (step, factor, trial, trial_values, trial_gradient, trial_hessian, trial_states, trial_slopes,
-     trial_guess, current, work, ready) = space  # fmt: skip
+     trial_guess, current, work, ready, _rest) = space  # fmt: skip
     n = gradient.shape[0]
     largest = 20.0 * radius
     # cables pull a platform back from wherever it starts
@@ -321,7 +310,7 @@ def solve_one(
 @jit_pasted
 def solve_in_stages(
     cables, load, pose, screws, start, start_values, length, scale, radius, reach, limit,
-    guess, gradient, hessian, states, slopes, deviation, values, softened, staged, fine, space,
+    guess, gradient, hessian, states, slopes, deviation, values, staged, fine, space, stages,
 ):  # fmt: skip
     """Like solve_one with ``fine`` enough, if ``staged`` from soft to stiff.
 
@@ -332,6 +321,7 @@ def solve_in_stages(
     top = 0.0
     for i in range(cables.shape[0]):
         top = max(top, cables[i, EA])
+    softened, before, values_before = stages
     factor, total, enough, last = 1.0, 0, 1e-3, False
     while staged and top * factor > STIFF * scale:
         factor /= STAGE
@@ -351,21 +341,7 @@ def solve_in_stages(
         total += count
         if last:
             return outcome, total, residual
-        start, start_values = deviation.copy(), values.copy()
+        copy_vector(deviation, before)
+        copy_vector(values, values_before)
+        start, start_values = before, values_before
         factor *= STAGE
-
-
-@jit_allocating
-def solve_batch(
-    cables, load, poses, screws, starts, start_values, length, scale, radius, reach, limit,
-    outcome, count, residual, gradient, hessian, states, slopes, deviation, values, guess, staged,
-):  # fmt: skip
-    """Independent poses, each from its own start; all outputs are filled."""
-    softened = np.empty_like(cables[0])
-    space = make_space(cables.shape[1], gradient.shape[1], screws.shape[1])
-    for i in range(poses.shape[0]):
-        outcome[i], count[i], residual[i] = solve_in_stages(
-            cables[i], load[i], poses[i], screws[i], starts[i], start_values[i], length, scale[i],
-            radius, reach[i], limit, guess[i], gradient[i], hessian[i], states[i], slopes[i],
-            deviation[i], values[i], softened, staged, FINE, space,
-        )  # fmt: skip

@@ -19,7 +19,7 @@ from seecr.compiled.algebra import (
     rotated_less,
     solve_factored,
 )
-from seecr.compiled.jit import jit_allocating, jit_inner
+from seecr.compiled.jit import jit, jit_allocating, jit_inner, jit_pasted
 
 # A matrix is singular if a pivot of its factor is below this part of the largest.
 _SINGULAR = 1e-11
@@ -92,7 +92,7 @@ def null_space(matrix, load, work, particular, null):
     return True
 
 
-@jit_inner
+@jit_pasted
 def _rows(particular, null, low, high, top, a, b):
     """Fill the functions a nu + b whose minimum is maximised: artificial, lower, upper ones."""
     m, r = null.shape
@@ -107,21 +107,21 @@ def _rows(particular, null, low, high, top, a, b):
         b[r + 1 + i], b[r + 1 + m + i] = particular[i] - low[i], high[i] - particular[i]
 
 
-@jit_allocating
-def _largest_least(a, b, scale, basis, answer):
+@jit_pasted
+def _largest_least(a, b, scale, basis, answer, system, right, weights, change):
     """max over nu of min_i (a_i nu + b_i) by the dual simplex; nan if it does not end.
 
     Infinite if artificial functions, the first r + 1, limit it. ``basis`` (r + 1,) and ``answer``
     (r + 1,) are filled: the functions that limit it, and nu and the minimum, which the artificial
-    functions keep finite.
+    functions keep finite. The others are scratch: (r + 1, r + 1), and (r + 1,) each.
     """
     k = basis.shape[0]
     r = k - 1
     for row in range(k):
         basis[row] = row
-    system, right = np.empty((k, k)), np.empty(k)
     # weights of the basis: they sum the coefficients of nu to zero and those of the margin to one
-    weights, change = np.full(k, 1.0 / k), np.empty(k)
+    for row in range(k):
+        weights[row] = 1.0 / k
     for _ in range(_PIVOTS):
         for row in range(k):
             for c in range(r):
@@ -179,28 +179,33 @@ def _largest_least(a, b, scale, basis, answer):
 _BLOCK = 64
 
 
-@jit_allocating
-def _space(d, m):
-    """Scratch arrays for any number of poses."""
-    rows = m - d + 1 + 2 * m
-    return (
-        np.empty((m, d + 1)), np.empty(m), np.empty((m, m - d)),
-        np.empty((rows, max(m - d, 1))), np.empty(rows), np.empty(m - d + 1),
-        np.empty(m - d + 1, np.int64), np.empty((d, d)), np.empty((d, d)), np.empty(d),
-        np.empty(d), np.empty(d),
+def _space(d, m, n_loads):
+    """Scratch arrays for any number of poses, made by NumPy: so nothing compiled creates any.
+
+    Those of _margin, of _again, the limits (k, m) that a neighbour reached, and those of poses.
+    """
+    r = m - d + 1
+    rows, more = r + 2 * m, max(m - d, 1)
+    simplex = (
+        np.empty((m, d + 1)), np.empty(m), np.empty((m, m - d)), np.empty((rows, more)),
+        np.empty(rows), np.empty(r), np.empty(r, np.int64), np.empty((r, r)), np.empty(r),
+        np.empty(r), np.empty(r),
     )  # fmt: skip
+    system = np.empty((d, d)), np.empty((d, d)), np.empty(d), np.empty(d), np.empty(d)
+    place = np.empty((d, m)), np.empty((n_loads, d)), np.empty(3), np.empty(3)
+    return simplex, system, np.zeros((n_loads, m), np.int64), place
 
 
-@jit_inner
+@jit_pasted
 def _margin(matrix, load, low, high, scale, side, space):
     """The margin [N] of one load; nan if the matrix is singular. Fills ``side`` (m,) see _again."""
-    work, particular, null, a, b, answer, basis = space[:7]
+    work, particular, null, a, b, answer, basis, system, right, weights, change = space[0]
     d, m = matrix.shape
     side[:] = 0
     if not null_space(matrix, load, work, particular, null):
         return np.nan
     _rows(particular, null, low, high, _TOP * scale, a, b)
-    found = _largest_least(a, b, scale, basis, answer)
+    found = _largest_least(a, b, scale, basis, answer, system, right, weights, change)
     for row in range(basis.shape[0]):
         number = basis[row] - (m - d + 1)
         if number >= 0:
@@ -214,7 +219,7 @@ def _again(matrix, load, low, high, scale, side, space):
 
     ``side`` (m,) is 1 for cables at their lower limit, -1 at their upper one, 0 for the others.
     """
-    system, transposed, right, found, dual = space[7:]
+    system, transposed, right, found, dual = space[1]
     d, m = matrix.shape
     free = 0
     for i in range(m):
@@ -261,13 +266,13 @@ def _again(matrix, load, low, high, scale, side, space):
     return margin
 
 
-@jit_inner
-def _least_margin(matrix, loads, low, high, scale, sides, space):
+@jit_pasted
+def _least_margin(matrix, loads, low, high, scale, space):
     """The smallest margin [N] over loads (k, d); nan if the matrix is singular.
 
-    ``sides`` (k, m) say which limits a neighbour reached, or are zero; they are changed.
+    ``space[2]`` (k, m) says which limits a neighbour reached, or is zero; it is changed.
     """
-    least = np.inf
+    least, sides = np.inf, space[2]
     for k in range(len(loads)):
         found = _again(matrix, loads[k], low, high, scale, sides[k], space)
         if np.isnan(found):
@@ -280,29 +285,36 @@ def _least_margin(matrix, loads, low, high, scale, sides, space):
     return least
 
 
-@jit_allocating
 def margins_of(matrices, loads, low, high, scale, out):
     """Margins (n,) of matrices (n, d, m) and loads (n, k, d): the smallest over k loads.
 
     Limits (n, m) and scales (n,) are of each, or have one row for all.
     """
-    space = _space(*matrices.shape[1:])
-    sides = np.zeros((loads.shape[1], matrices.shape[2]), np.int64)
+    space = _space(*matrices.shape[1:], loads.shape[1])
+    _margins_of(matrices, loads, low, high, scale, out, space)
+
+
+@jit
+def _margins_of(matrices, loads, low, high, scale, out, space):
     for r in range(len(matrices)):
         if r % _BLOCK == 0:
-            sides[:] = 0
+            space[2][:] = 0
         row, of = r % len(low), r % len(scale)
-        out[r] = _least_margin(matrices[r], loads[r], low[row], high[row], scale[of], sides, space)
+        out[r] = _least_margin(matrices[r], loads[r], low[row], high[row], scale[of], space)
 
 
-@jit_allocating
 def innermost_of(matrices, loads, low, high, scale, out, tensions):
     """Margins of one load (n, d) and limits (n, m) each, and tensions (n, m) farthest inside.
 
     Tensions are nan if the margin is not finite.
     """
-    space, side = _space(*matrices.shape[1:]), np.zeros(matrices.shape[2], np.int64)
-    particular, null, answer = space[1], space[2], space[5]
+    space = _space(*matrices.shape[1:], 1)
+    _innermost_of(matrices, loads, low, high, scale, out, tensions, space)
+
+
+@jit
+def _innermost_of(matrices, loads, low, high, scale, out, tensions, space):
+    particular, null, answer, side = space[0][1], space[0][2], space[0][5], space[2][0]
     for r in range(len(matrices)):
         out[r] = _margin(matrices[r], loads[r], low[r], high[r], scale[r], side, space)
         for i in range(matrices.shape[2]):
@@ -311,16 +323,23 @@ def innermost_of(matrices, loads, low, high, scale, out, tensions):
                 tensions[r, i] += null[i, k] * answer[k]
 
 
-@jit_allocating
 def margins_at(poses, exits, anchors, centre, weight, wrenches, low, high, length, scale, out):
     """Margins (n,) of a free platform at poses (n, 7); wrenches (k, 6) add to its weight."""
+    space = _space(6, len(exits), len(wrenches))
+    _margins_at(
+        poses, exits, anchors, centre, weight, wrenches, low, high, length, scale, out, space
+    )
+
+
+@jit
+def _margins_at(
+    poses, exits, anchors, centre, weight, wrenches, low, high, length, scale, out, space
+):
     m = len(exits)
-    matrix, load = np.empty((6, m)), np.empty((len(wrenches), 6))
-    arm, unit, space = np.empty(3), np.empty(3), _space(6, m)
-    sides = np.zeros((len(wrenches), m), np.int64)
+    matrix, load, arm, unit = space[3]
     for r in range(len(poses)):
         if r % _BLOCK == 0:
-            sides[:] = 0
+            space[2][:] = 0
         w, x, y, z = poses[r, 3], poses[r, 4], poses[r, 5], poses[r, 6]
         for i in range(m):
             size = 0.0
@@ -347,7 +366,7 @@ def margins_at(poses, exits, anchors, centre, weight, wrenches, low, high, lengt
                 moment = arm[e] * weight[f] - arm[f] * weight[e]
                 load[k, c] = -wrenches[k, c] - weight[c]
                 load[k, 3 + c] = -(wrenches[k, 3 + c] + moment) / length
-        out[r] = _least_margin(matrix, load, low, high, scale, sides, space)
+        out[r] = _least_margin(matrix, load, low, high, scale, space)
 
 
 # Tensions that balance a load and exceed their limits by as little as possible, summed.

@@ -34,9 +34,9 @@ from seecr.compiled.columns import (
     TENSION,
     TOLERANCE,
 )
-from seecr.compiled.history import change_on_the_way, walk_in_order
+from seecr.compiled.history import change_on_the_way, solve_rows
 from seecr.compiled.joint_kinematics import N_CURRENT, place_batch
-from seecr.compiled.newton import FINE, STIFF, solve_batch
+from seecr.compiled.newton import FINE, STIFF
 from seecr.compiled.platform import add_skew, evaluate_batch
 from seecr.compiled.rates import change_at_rest, change_of_each_cable
 from seecr.parallel import run_parts
@@ -266,11 +266,13 @@ def _descend_alone(
         out.guess[:] = guess
     out.energy[:] = np.nan
 
+    fresh = np.ones(n, dtype=bool)
     by_row(
-        solve_batch, tables.cables, tables.load, tables.poses, tables.screws, starts, first,
-        tables.length, tables.scale, 0.5 * tables.length, tables.reach, limit, out.outcome,
-        out.count, out.residual, out.gradient, out.hessian, out.states, out.slopes, out.deviation,
-        out.values, out.guess, staged, threads=threads,
+        solve_rows, tables.cables, tables.load, tables.poses, tables.screws, starts, first,
+        tables.length, tables.scale, 0.5 * tables.length, tables.reach, limit, staged, False,
+        fresh, ~fresh, np.full(n, FINE), np.zeros(n), out.outcome, out.count, out.residual,
+        out.gradient, out.hessian, out.states, out.slopes, out.deviation, out.values, out.guess,
+        threads=threads,
     )  # fmt: skip
     _refuse_no_length(tables, out)
     return out
@@ -332,18 +334,19 @@ def walk(
     out.energy[:] = np.nan
     enough = np.full(len(tables), TOLERANCE)  # on the way; to rows as many digits as possible
     enough[path.rows] = FINE
+    starts, first = out.deviation.copy(), np.zeros((len(tables), tables.n_dof))
 
     def run(part: slice) -> None:
         if given_up.is_set():
             out.outcome[part] = STALLED
             return
-        walk_in_order(
+        solve_rows(
             tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
-            tables.length, tables.scale[part], 0.5 * tables.length, tables.reach[part], limit,
-            path.fresh[part], path.onward[part], enough[part], path.elapsed[part],
-            out.outcome[part], out.count[part], out.residual[part], out.gradient[part],
-            out.hessian[part], out.states[part], out.slopes[part], out.deviation[part],
-            out.values[part], out.guess[part],
+            starts[part], first[part], tables.length, tables.scale[part], 0.5 * tables.length,
+            tables.reach[part], limit, True, True, path.fresh[part], path.onward[part],
+            enough[part], path.elapsed[part], out.outcome[part], out.count[part],
+            out.residual[part], out.gradient[part], out.hessian[part], out.states[part],
+            out.slopes[part], out.deviation[part], out.values[part], out.guess[part],
         )  # fmt: skip
         if np.any(vital[part] & ~_are_at_rest(out.outcome[part])):
             given_up.set()

@@ -9,7 +9,7 @@ from effect_cases import experiment_of
 from seecr import Commands, Experiment
 from seecr.compiled.cable_law import lengths_at
 from seecr.compiled.columns import COMPLIANCE, CONVERGED, EA, OF_THE_PAST, REST, SLACK, TENSION
-from seecr.compiled.newton import solve_batch
+from seecr.compiled.history import _solve_rows
 from seecr.parallel import undivided
 from seecr.statics import batch
 from seecr.statics.tables import Tables, assemble, take
@@ -82,9 +82,9 @@ def test_poses_that_may_not_be_written_to_have_nothing_compiled_again() -> None:
     poses.flags.writeable = False
     setup = Experiment(experiment.robot, Commands(poses)).setup([])
     solved("demobot_cogiro")
-    known = len(lengths_at.signatures), len(solve_batch.signatures)
+    known = len(lengths_at.signatures), len(_solve_rows.signatures)
     batch.descend(assemble(setup))
-    assert (len(lengths_at.signatures), len(solve_batch.signatures)) == known
+    assert (len(lengths_at.signatures), len(_solve_rows.signatures)) == known
 
 
 def test_slack_is_longer_than_its_way_or_pulls_no_more_than_rounding() -> None:
