@@ -340,7 +340,7 @@ def _are_active(a, active):
 
 
 @jit_inner
-def _first_positive(vector, scale):
+def first_positive(vector, scale):
     """Multiply a vector by scale, and turn it so that its largest component is positive."""
     largest, first = 0.0, 0
     for k in range(vector.shape[0]):
@@ -390,7 +390,44 @@ def softest_batch(matrices, values, directions):
         for at in range(first, min(first + _LANES, n)):
             for k in range(d):
                 directions[at, k] = vectors[k, at - first] + 0.0 * tops[at - first]
-            _first_positive(directions[at], 1.0 / norm(directions[at]))
+            first_positive(directions[at], 1.0 / norm(directions[at]))
+
+
+@jit
+def diagonalise(a, vectors):
+    """Turn a symmetric matrix, of which the lower triangle is read, into its eigenvalues.
+
+    They are on its diagonal then, in no order, and their vectors are columns. Jacobi's rotations
+    again: NumPy's ``eigh``, compiled, would load SciPy when it is first called, which takes 0.2 s.
+    """
+    d, top, some = a.shape[0], 0.0, True
+    for r in range(d):
+        for c in range(d):
+            vectors[r, c] = 1.0 if r == c else 0.0
+            a[min(r, c), max(r, c)] = a[max(r, c), min(r, c)]
+            top = max(top, abs(a[r, c]))
+    for _ in range(_SWEEPS):
+        if not some:
+            break
+        some = False
+        for p in range(d - 1):
+            for q in range(p + 1, d):
+                beside, apart = a[p, q], a[q, q] - a[p, p]
+                if abs(beside) <= _ROUNDING * top:
+                    continue
+                some = True
+                size = abs(apart) + math.hypot(apart, 2.0 * beside)
+                tangent = (2.0 * beside if apart >= 0.0 else -2.0 * beside) / size
+                cosine = 1.0 / math.sqrt(1.0 + tangent * tangent)
+                sine = tangent * cosine
+                for k in range(d):
+                    x, y = a[k, p], a[k, q]
+                    a[k, p], a[k, q] = cosine * x - sine * y, sine * x + cosine * y
+                    x, y = vectors[k, p], vectors[k, q]
+                    vectors[k, p], vectors[k, q] = cosine * x - sine * y, sine * x + cosine * y
+                for k in range(d):
+                    x, y = a[p, k], a[q, k]
+                    a[p, k], a[q, k] = cosine * x - sine * y, sine * x + cosine * y
 
 
 @jit_inner
@@ -454,4 +491,4 @@ def softest_motions(matrices, columns, values, motions):
             motions[k, j] = 0.0
             for i in range(d):
                 motions[k, j] += steps[k, i] * columns[k, i, j]
-        _first_positive(motions[k], 1.0)
+        first_positive(motions[k], 1.0)

@@ -10,7 +10,9 @@ from seecr.compiled.algebra import (
     cholesky,
     copy_rows,
     copy_vector,
+    diagonalise,
     eliminate,
+    first_positive,
     largest_diagonal,
     norm,
     solve_factored,
@@ -107,16 +109,16 @@ def mirrored_step(gradient, hessian, radius, step):
     If the gradient has no component along an unstable direction, the shift for that direction would
     only shorten the step in all others.
     """
-    eigenvalues, vectors = np.linalg.eigh(hessian)
-    n = step.shape[0]
-    floor = 1e-9 * max(abs(eigenvalues[0]), abs(eigenvalues[n - 1])) + 1e-300
+    a, vectors, n, floor = hessian.copy(), np.empty_like(hessian), step.shape[0], 1e-300
+    diagonalise(a, vectors)
     for k in range(n):
         step[k] = 0.0
+        floor = max(floor, 1e-9 * abs(a[k, k]))
     for j in range(n):
         part = 0.0
         for k in range(n):
             part += vectors[k, j] * gradient[k]
-        part /= max(abs(eigenvalues[j]), floor)
+        part /= max(abs(a[j, j]), floor)
         for k in range(n):
             step[k] -= part * vectors[k, j]
     span = norm(step)
@@ -128,10 +130,14 @@ def mirrored_step(gradient, hessian, radius, step):
 @jit_allocating_inner
 def escape(hessian, top, radius, step):
     """Step along the softest direction; UNSTABLE if it is downhill, SINGULAR if it is flat."""
-    eigenvalues, vectors = np.linalg.eigh(hessian)
+    a, vectors, softest = hessian.copy(), np.empty_like(hessian), 0
+    diagonalise(a, vectors)
     for k in range(step.shape[0]):
-        step[k] = 0.1 * radius * vectors[k, 0]
-    return UNSTABLE if eigenvalues[0] < -SINGULAR_PART * top else SINGULAR
+        softest = k if a[k, k] < a[softest, softest] else softest
+    for k in range(step.shape[0]):
+        step[k] = vectors[k, softest]
+    first_positive(step, 0.1 * radius)  # of two sides the same one on every machine
+    return UNSTABLE if a[softest, softest] < -SINGULAR_PART * top else SINGULAR
 
 
 @jit_inner

@@ -108,7 +108,7 @@ def _tangents(steps: Array, energies: Array) -> Array:
     ahead = np.where(top, last, np.maximum(next_, 0.0)) + 1e-300
     part = (ahead / (ahead + behind))[..., None]
     along = part * steps[:, 1:] + (1.0 - part) * steps[:, :-1]
-    return along / np.linalg.norm(along, axis=2, keepdims=True)
+    return np.asarray(along / np.linalg.norm(along, axis=2, keepdims=True))
 
 
 def _evenly(by: Coordinates, images: Array) -> Array:

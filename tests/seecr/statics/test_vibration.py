@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 import seecr
 from crosscheck.settle.newton import stiffness
 from crosscheck.settle.physics import Physics
-from seecr.compiled.algebra import softest_batch, softest_motions
+from seecr.compiled.algebra import diagonalise, softest_batch, softest_motions
 from seecr.effects.setup import plain_setup
 from seecr.pose import Array, quat_from_rotvec
 from seecr.show.pose_words import direction_words, stiffness_lines
@@ -199,6 +199,18 @@ def test_eigenvalues_are_lapacks_and_directions_have_them(d: int) -> None:
         assert np.all(np.abs(left).max(axis=1) <= _RESIDUAL * top)
         largest = np.abs(directions).max(axis=1)
         assert np.all(directions.max(axis=1) >= (1.0 - 2e-6) * largest)
+
+
+@pytest.mark.parametrize("d", [1, 3, 6])
+def test_all_eigenvalues_and_vectors_make_the_matrix_again(d: int) -> None:
+    for matrix in (one for some in families(d) for one in some[::50]):
+        diagonal, vectors = np.tril(matrix) + np.triu(np.full((d, d), np.nan), 1), np.empty((d, d))
+        diagonalise(diagonal, vectors)
+        values, top = np.diag(diagonal), np.abs(matrix).max()
+        expected = np.linalg.eigvalsh(matrix)
+        assert np.all(np.abs(np.sort(values) - expected) <= _VALUE * top)
+        np.testing.assert_allclose(vectors.T @ vectors, np.eye(d), atol=1e-14)
+        assert np.all(np.abs(matrix @ vectors - vectors * values) <= _RESIDUAL * top)
 
 
 def test_only_the_lower_triangle_is_read() -> None:
