@@ -31,15 +31,15 @@ from seecr.compiled.columns import (
     WINCH_SIDE,
     WINCH_TENSION,
 )
-from seecr.compiled.jit import jit, jit_allocating, jit_inner
+from seecr.compiled.jit import jit, jit_inner
 from seecr.compiled.joint_kinematics import N_CURRENT
 from seecr.compiled.newton import advance, solve_in_stages
 from seecr.compiled.platform import N_READY
 from seecr.compiled.rates import (
     add_load,
     add_pull,
+    change_space,
     differ,
-    make_change_space,
     place_platform,
     put_gradient,
 )
@@ -286,10 +286,22 @@ def _stands_still(poses, load, k):
     return k > 0 and not (differ(poses[k], poses[k - 1]) or differ(load[k], load[k - 1]))
 
 
-@jit_allocating
+def space_of_way(screws, m, d):
+    """Scratch arrays of change_on_the_way: of the sides ahead and behind, their displacements and
+    what is added to these, and for the wrench.
+    """
+    sides = [
+        (np.empty((m, N_COLUMNS)), np.zeros((m, N_KEPT)), np.zeros(m), np.zeros(d))
+        for _ in range(2)
+    ]  # fmt: skip
+    past = np.zeros((m, N_KEPT)), np.zeros((m, N_KEPT))
+    return *sides, past, tuple(np.zeros((4, d))), change_space(screws)
+
+
+@jit
 def change_on_the_way(
     plus, minus, plus_load, minus_load, poses, screws, deviation, values, slopes, length, guess,
-    inverse, fresh, elapsed, solved, step, tension,
+    inverse, fresh, elapsed, solved, step, tension, space_of_all,
 ):  # fmt: skip
     """Difference of a path's equilibria between slightly different tables; nothing is solved.
 
@@ -304,12 +316,7 @@ def change_on_the_way(
     minus minus. Rows that are not solved end their run and get zero changes.
     """
     n, m, d = plus.shape[0], plus.shape[1], step.shape[1]
-    ahead = (np.empty_like(plus[0]), np.zeros((m, N_KEPT)), np.zeros(m), np.zeros(d))
-    behind = (np.empty_like(plus[0]), np.zeros((m, N_KEPT)), np.zeros(m), np.zeros(d))
-    past_ahead, past_behind = np.zeros((m, N_KEPT)), np.zeros((m, N_KEPT))
-    space = make_change_space(screws.shape[1])
-    # displacements of the sides ahead and behind, and what is added to them
-    half, back, more, less = np.zeros(d), np.zeros(d), np.zeros(d), np.zeros(d)
+    ahead, behind, (past_ahead, past_behind), (half, back, more, less), space = space_of_all
     lost = False
     for k in range(n):
         still = not fresh[k] and not lost and _stands_still(poses, plus_load, k)

@@ -147,7 +147,7 @@ def is_idle(cables, states, i, scale):
     return taut and states[i, TENSION] < IDLE * scale
 
 
-@jit_pasted
+@jit_inner
 def holds_without_idle(cables, load, pose, deviation, length, guess, states, scale, space):
     """Whether the equilibrium is stable without the cables whose tension is mere rounding.
 

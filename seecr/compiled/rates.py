@@ -66,13 +66,14 @@ from seecr.compiled.joint_kinematics import (
 # of seecr.compiled.cable.cable_pull. Nothing is solved, so no stiffness is assembled.
 
 
-@jit_allocating
-def make_change_space(joints):
-    """Scratch arrays, made once per batch."""
+def change_space(screws):
+    """Scratch arrays of a batch. NumPy makes them: what creates arrays takes longer to compile."""
+    joints = screws.shape[1]
     return (
         np.empty(7), np.zeros((joints, N_CURRENT)), np.empty((joints, 6)), np.empty(3), np.empty(3),
         np.empty(3), np.empty(3), np.empty((3, 6)), np.empty(3), np.empty(N_STATE),
         np.empty((N_WORK, 6)), np.empty(6), np.empty(7), np.zeros(6),
+        np.empty(6),
     )  # fmt: skip
 
 
@@ -155,17 +156,17 @@ def put_gradient(space, out):
         onto_joints_gradient(gradient, columns, out)
 
 
-@jit_allocating
+@jit
 def change_at_rest(
     plus, minus, plus_load, minus_load, poses, screws, deviation, values, length, guess,
-    gradient, tension,
+    gradient, tension, space,
 ):  # fmt: skip
     """Gradient (n, d) and tensions (n, m) of ``plus`` minus ``minus``; NaN where unsolved.
 
-    All outputs are filled.
+    All outputs are filled; for ``space`` see change_space.
     """
     n, m = plus.shape[:2]
-    space, per = make_change_space(screws.shape[1]), 1.0 / length
+    per = 1.0 / length
     for r in range(n):
         space[11][:] = 0.0
         place_platform(screws[r], values[r], length, poses[r], deviation[r], space)
@@ -183,16 +184,16 @@ def change_at_rest(
         put_gradient(space, gradient[r])
 
 
-@jit_allocating
+@jit
 def change_of_each_cable(
-    plus, minus, load, poses, screws, deviation, values, length, guess, gradient, tension
+    plus, minus, load, poses, screws, deviation, values, length, guess, gradient, tension, space
 ):
     """The same cable by cable: gradient (n, m, d), each cable's own tension (n, m).
 
     The load is taken to be the same in both.
     """
     n, m = plus.shape[:2]
-    space, per = make_change_space(screws.shape[1]), 1.0 / length
+    per = 1.0 / length
     for r in range(n):
         place_platform(screws[r], values[r], length, poses[r], deviation[r], space)
         up = load[r, UP:]
@@ -287,10 +288,10 @@ def change_by_rest(row, up, guess, space):
     return tension
 
 
-@jit_allocating
+@jit
 def pull_and_change(
     cables, load, poses, screws, deviation, values, length, guess, gradient, pulls, by_length,
-    tension,
+    tension, space,
 ):  # fmt: skip
     """Gradient (n, d) and tensions (n, m) [N], and their derivatives by each cable's rest length.
 
@@ -299,7 +300,7 @@ def pull_and_change(
     m, 3).
     """
     n, m = cables.shape[:2]
-    space, per, total = make_change_space(screws.shape[1]), 1.0 / length, np.empty(6)
+    per, total = 1.0 / length, space[14]
     place, start, move, one = space[0], space[3], space[4], space[11]
     force, stiffness, slope, state, work = space[6:11]
     for r in range(n):
@@ -404,11 +405,10 @@ def _rest_for(row, known, span, tension, follows):
     return stuck / strain
 
 
-@jit_allocating
-def rates_of_each_cable(cables, load, poses, screws, deviation, values, length, guess, out):
+@jit
+def rates_of_each_cable(cables, load, poses, screws, deviation, values, length, guess, out, space):
     """Fill ``out`` (n, m, N_RATES); NaN where a cable's equations could not be solved."""
     n, m = cables.shape[:2]
-    space = make_change_space(screws.shape[1])
     place, start, move, keep = space[0], space[3], space[4], space[5]
     force, stiffness, slope, state, work = space[6:11]
     for r in range(n):

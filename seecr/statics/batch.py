@@ -34,11 +34,11 @@ from seecr.compiled.columns import (
     TENSION,
     TOLERANCE,
 )
-from seecr.compiled.history import change_on_the_way, solve_rows
+from seecr.compiled.history import change_on_the_way, solve_rows, space_of_way
 from seecr.compiled.joint_kinematics import N_CURRENT, place_batch
 from seecr.compiled.newton import FINE, STIFF
 from seecr.compiled.platform import add_skew, evaluate_batch
-from seecr.compiled.rates import change_at_rest, change_of_each_cable
+from seecr.compiled.rates import change_at_rest, change_of_each_cable, change_space
 from seecr.parallel import run_parts
 from seecr.pose import SMALLEST, Array, deviated, products, quat_conjugate
 from seecr.statics.abreast import (
@@ -379,6 +379,7 @@ def change_of_walk(
             plus.poses[part], plus.screws[part], at.deviation[part], at.values[part],
             at.slopes[part], plus.length, at.guess[part], inverse[part], path.fresh[part],
             path.elapsed[part], solved[part], step[part], tension[part],
+            space_of_way(plus.screws, m, plus.n_dof),
         )  # fmt: skip
     return step, tension
 
@@ -390,6 +391,7 @@ def change(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Array]:
     by_row(
         change_at_rest, plus.cables, minus.cables, plus.load, minus.load, plus.poses, plus.screws,
         at.deviation, at.values, plus.length, at.guess, gradient, tension,
+        change_space(plus.screws),
     )  # fmt: skip
     return _solved(gradient, tension, gradient)
 
@@ -404,6 +406,7 @@ def change_by_cable(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array,
     by_row(
         change_of_each_cable, plus.cables, minus.cables, plus.load, plus.poses, plus.screws,
         at.deviation, at.values, plus.length, at.guess, gradient, tension,
+        change_space(plus.screws),
     )  # fmt: skip
     return _solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, m * plus.n_dof))
 
@@ -418,7 +421,7 @@ def rates_of_cables(tables: Tables, at: Evaluation) -> Array:
     out = np.empty((*tables.cables.shape[:2], N_RATES))
     by_row(
         rates_of_each_cable, tables.cables, tables.load, tables.poses, tables.screws, at.deviation,
-        at.values, tables.length, at.guess, out,
+        at.values, tables.length, at.guess, out, change_space(tables.screws),
     )  # fmt: skip
     out[np.isnan(out).any(axis=(1, 2))] = 0.0
     return out
@@ -437,6 +440,7 @@ def pull_and_change(tables: Tables, at: Evaluation) -> tuple[Evaluation, Array, 
     by_row(
         rates.pull_and_change, tables.cables, tables.load, tables.poses, tables.screws,
         out.deviation, out.values, tables.length, out.guess, out.gradient, pulls, gradient, tension,
+        change_space(tables.screws),
     )  # fmt: skip
     out.states[..., TENSION] = pulls
     lost = np.isnan(out.gradient).any(axis=1)

@@ -41,7 +41,8 @@ from seecr.pose import Array, quat_to_matrix
 def by_row(compiled: Callable[..., None], *given: Any, threads: int | None = None) -> None:
     """Call a compiled function with arrays (n, ...), in as many parts as there are threads.
 
-    The first is an array; what is none is the same for all rows.
+    The first is an array; what is none is the same for all rows, so no scratch for more than one
+    thread.
     """
 
     def run(part: slice) -> None:
