@@ -273,7 +273,12 @@ def _accept(S, per, largest, limit, free):
 
 @jit_lanes
 def _pivot(square, low):
-    """One over the root of a pivot, of 1 if that is not positive; and the lowest pivot so far."""
+    """One over the root of a pivot, of 1 if that is not positive; and the lowest pivot so far.
+
+    It needs no bound of rounding, as ``cholesky`` has: rests are certified with the stiffness less
+    SINGULAR_PART, a thousand times that bound; and a step uphill is not accepted, so that the
+    descent is left to solve_one. With the bound, 3e5 rows ended the same.
+    """
     low = square if square < low else low
     return 1.0 / math.sqrt(square if square > 0.0 else 1.0), low
 

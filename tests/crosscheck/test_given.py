@@ -9,7 +9,8 @@ from typing import Any, cast
 import made_diagnoses
 import numpy as np
 import pytest
-from made_data import case, refused, run
+from called import refused, run
+from made_data import case
 from made_diagnoses import readings, robot
 
 import crosscheck

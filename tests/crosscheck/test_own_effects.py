@@ -9,8 +9,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from called import printed
 from hoses import Heavier, Hose
-from made_data import measured, printed
+from made_data import measured
 
 import crosscheck
 import seecr

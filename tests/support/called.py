@@ -1,4 +1,7 @@
-"""The two programs, called as a shell calls them: ``ran("seecr pose camera 1 1 1")``."""
+"""The two programs, called as a shell calls them: ``ran("seecr pose camera 1 1 1")``.
+
+``run("compare", xml, data)`` is ``ran`` of crosscheck with words that need no quotes.
+"""
 
 from __future__ import annotations
 
@@ -41,6 +44,25 @@ def refused_in_a_line(words: str) -> str:
     assert result.stdout == "" and len(said) == 1, result.output
     assert said[0].startswith(f"{words.split()[0]}: ")
     return said[0]
+
+
+def run(*arguments: object, status: int | None = None) -> Result:
+    """The result of crosscheck."""
+    return ran(_words(arguments), status)
+
+
+def printed(*arguments: object, status: int = 0) -> str:
+    """What crosscheck prints."""
+    return run(*arguments, status=status).output
+
+
+def refused(*arguments: object) -> str:
+    """The one line of a refusal of crosscheck."""
+    return refused_in_a_line(_words(arguments))
+
+
+def _words(arguments: tuple[object, ...]) -> str:
+    return shlex.join(["crosscheck", *map(str, arguments)])
 
 
 def following(result: Result) -> str:

@@ -8,9 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from click.testing import CliRunner, Result
 
-from crosscheck.cli import main
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.write import write_measurements
 from crosscheck.twin.lab import trajectory
@@ -97,25 +95,3 @@ def case(
     data = folder / "measured.csv"
     write_measurements(data, measured(robot, terms, **options))  # type: ignore[arg-type]
     return xml, data
-
-
-def run(*arguments: object, status: int | None = None) -> Result:
-    """The command line; anything but an exit, or another status than a given one, is a failure."""
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    assert status in (None, result.exit_code), result.output
-    return result
-
-
-def printed(*arguments: object, status: int = 0) -> str:
-    """What the command line prints."""
-    return run(*arguments, status=status).output
-
-
-def refused(*arguments: object, status: int = 2) -> str:
-    """The one line of a refusal."""
-    result = run(*arguments, status=status)
-    assert result.stdout == ""
-    assert result.stderr.startswith("crosscheck: ")
-    assert result.stderr.count("\n") == 1
-    return result.stderr

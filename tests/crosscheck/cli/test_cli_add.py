@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_data import SIGMA, case, measured, refused, run, soft_cogiro, term
+from called import refused, run
+from made_data import SIGMA, case, measured, soft_cogiro, term
 
 from crosscheck.add import add_effect
 from crosscheck.errors import CrosscheckError

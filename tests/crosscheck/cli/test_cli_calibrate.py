@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_data import SIGMA, case, refused, run
+from called import refused, run
+from made_data import SIGMA, case
 from made_diagnoses import SLOW
 
 from seecr.description.mjcf import load_robot

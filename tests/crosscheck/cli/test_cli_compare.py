@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from called import refused, run
 from click.testing import Result
-from made_data import refused, run
 
 from seecr.folders import MANIFEST
 

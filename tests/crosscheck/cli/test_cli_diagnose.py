@@ -12,8 +12,9 @@ from pathlib import Path
 import made_diagnoses as made
 import numpy as np
 import pytest
+from called import refused, run
 from click.testing import Result
-from made_data import case, refused, run, term
+from made_data import case, term
 
 from crosscheck.diagnosis.diagnose import diagnose
 from crosscheck.fit.reasons import DiagnosisVerdict, Unfit

@@ -6,7 +6,8 @@ import json
 from pathlib import Path
 
 import pytest
-from made_data import COGIRO, run
+from called import run
+from made_data import COGIRO
 
 from seecr.description.mjcf import load_robot
 from seecr.effects import catalogue, layout_of

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from made_data import case, refused, run
+from called import refused, run
+from made_data import case
 
 from seecr.folders import staged
 

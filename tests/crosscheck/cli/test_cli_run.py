@@ -11,8 +11,8 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import called
 import click
-import made_data
 import pytest
 from called import ran
 
@@ -29,7 +29,7 @@ SMALL = ("--case", "planar-two-cable", "--no-recordings", "--jobs", "1")
 PLANAR = model_path("planar_vertical")
 EFFECT = "effect-demobot_parallel-platform_mass"
 
-run, refused = partial(made_data.run, "run"), partial(made_data.refused, "run")
+run, refused = partial(called.run, "run"), partial(called.refused, "run")
 
 
 @pytest.fixture
@@ -269,7 +269,7 @@ def test_help_is_quick_and_imports_nothing_heavy():
 def test_version_no_command_and_unknown_command():
     assert ran("crosscheck --version").output == f"crosscheck, version {full_version()}\n"
     assert ran("crosscheck", 0).output.startswith("Usage: ")
-    assert made_data.refused("rum").startswith("crosscheck: No such command 'rum'")
+    assert called.refused("rum").startswith("crosscheck: No such command 'rum'")
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import made_diagnoses as made
 import pytest
-from made_data import refused, run
+from called import refused, run
 
 import crosscheck
 import seecr

@@ -11,7 +11,7 @@ from typing import Any
 import made_diagnoses
 import numpy as np
 import pytest
-from made_data import printed
+from called import printed
 from scipy import stats
 
 import crosscheck

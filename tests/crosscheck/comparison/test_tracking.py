@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_data import SIGMA, case, measured, run, soft_cogiro, term
+from called import run
+from made_data import SIGMA, case, measured, soft_cogiro, term
 from measured_csv import PLANAR, mjcf
 from written_pages import text_of
 

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
-from made_data import run
+from called import run
 from true_models import true_terms
 
 from crosscheck import compare

@@ -8,7 +8,8 @@ from dataclasses import replace
 import made_recordings as made_of
 import numpy as np
 import pytest
-from made_data import refused, soft_cogiro, soft_xml
+from called import refused
+from made_data import soft_cogiro, soft_xml
 
 from crosscheck.importing import import_case
 from crosscheck.importing.choices import ImportChoices

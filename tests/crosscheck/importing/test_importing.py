@@ -9,8 +9,8 @@ from dataclasses import replace
 import made_recordings as made_of
 import numpy as np
 import pytest
-from called import ran, refused_in_a_line
-from made_data import run, soft_cogiro, soft_xml, term
+from called import ran, refused_in_a_line, run
+from made_data import soft_cogiro, soft_xml, term
 from scipy.spatial.transform import Rotation
 
 import crosscheck

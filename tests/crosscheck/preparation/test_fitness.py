@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_data import case, measured, refused, run, term
+from called import refused, run
+from made_data import case, measured, term
 from made_diagnoses import SIGMA, readings, robot
 
 from crosscheck.calibration import calibrate

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tomlkit
-from called import ran
-from made_data import COGIRO, measured, printed, soft_cogiro, term
+from called import printed, ran
+from made_data import COGIRO, measured, soft_cogiro, term
 
 import crosscheck
 import seecr

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from called import refused, run
 from effect_cases import random_term
-from made_data import measured, refused, run, soft_cogiro, soft_xml, term
+from made_data import measured, soft_cogiro, soft_xml, term
 from scipy.spatial.transform import Rotation
 
 import crosscheck

@@ -8,7 +8,8 @@ import re
 from pathlib import Path
 
 import pytest
-from made_data import case, run, term
+from called import run
+from made_data import case, term
 from written_pages import figures_of, text_of
 
 import crosscheck
