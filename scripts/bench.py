@@ -90,22 +90,25 @@ is not; measured once, with `seecr map demobot_cogiro --parts --grid` and ever f
 
 ## Starting
 
-Seconds of processor, user and system, measured once on two busy processors; "before" is commit
-73ca3ddc. The diagnosis is with nothing compiled yet, that is, with `NUMBA_CACHE_DIR` an empty
-folder; the others are the best of some runs. The data are those of
-`crosscheck twin demobot_cogiro --hide 7`, 144 rows.
+Seconds of processor, user and system: the best of three. The diagnosis is one run, with nothing
+compiled yet. The data are those of `crosscheck twin demobot_cogiro --hide 7`, 144 rows.
 
-| command | before | now |
-| --- | ---: | ---: |
-| `seecr pose demobot_cogiro 0.5 0.5 0.3 --out DIR` | 1.69 | 1.54 |
-| `crosscheck compare robot.xml measured.csv --out DIR` | 3.9 | 3.7 |
-| `crosscheck diagnose robot.xml measured.csv`, the first time | 84 | 55 |
+{starting}
 
-Of a first diagnosis 43 s are compilation, of 137 functions: LLVM takes six tenths of that, and what
-Numba does before, in Python, the rest. Of `pose`, 0.7 s are the loading of NumPy, SciPy's linear
-algebra, Numba and MuJoCo; of `compare` about 1 s is drawing, and 1.5 s are these with Matplotlib
-and Rerun.
+Two thirds of `pose` are the loading of NumPy, Numba, MuJoCo and of what is compiled. More than half
+of `compare` is the loading of these with SciPy, Matplotlib and Rerun, and a third is the drawing of
+its figures. Most of a first diagnosis is compilation: LLVM takes six tenths of that, and what Numba
+does before, in Python, the rest.
 """
+# Commands whose start is measured, by what the page calls them; DIR has what `twin` wrote.
+STARTS = {
+    "seecr --help": "seecr --help",
+    "seecr pose demobot_cogiro 0.5 0.5 0.3 --out OUT":
+        "seecr pose demobot_cogiro 0.5 0.5 0.3 --out DIR/pose",
+    "crosscheck compare robot.xml measured.csv --out OUT":
+        "crosscheck compare DIR/robot.xml DIR/measured.csv --out DIR/compared",
+}  # fmt: skip
+FIRST = "crosscheck diagnose robot.xml measured.csv"
 # What an older commit is asked: microseconds a pose, the best of three.
 OLDER = """
 import sys, time, numpy as np, seecr
@@ -265,6 +268,36 @@ def stored() -> tuple[int, float, float]:
     return int(poses), float(each), float(memory) / unit
 
 
+def starting() -> dict[str, float]:
+    """Seconds of processor of commands, with all that they load and write."""
+    with tempfile.TemporaryDirectory() as folder:
+        spent_by("crosscheck twin demobot_cogiro --hide 7 --out DIR", folder)
+        found = {
+            name: min(spent_by(words, folder) for _ in range(3)) for name, words in STARTS.items()
+        }
+        first = "crosscheck diagnose DIR/robot.xml DIR/measured.csv"
+        return found | {FIRST: spent_by(first, folder, NUMBA_CACHE_DIR=f"{folder}/nothing")}
+
+
+def spent_by(words: str, folder: str, **more: str) -> float:
+    """Seconds of processor, user and system, of one command, in an environment with more."""
+    import resource  # not on Windows
+
+    def spent() -> float:
+        children = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return children.ru_utime + children.ru_stime
+
+    # Python keeps what it compiled, as it does for users
+    environ = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"} | more
+    command = words.replace("DIR", folder).split()
+    before = spent()
+    subprocess.run(
+        [sys.executable, "-m", *command], check=True, env=environ, stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    return spent() - before
+
+
 def table(head: str, rows: list[list[str]]) -> str:
     """A table of Markdown."""
     names = head.split(", ")
@@ -286,6 +319,7 @@ def figures(before: str | None, short: bool) -> dict[str, Any]:
         "processors": processors(), "peers": peers, "poses": POSES, "before": before,
         **compared, "maps": [maps(name) for name in DEMOBOTS],
         "stored": {"poses": poses, "microseconds": each, "gigabytes": memory},
+        "starting": starting(),
     }  # fmt: skip
 
 
@@ -310,6 +344,9 @@ def page_of(found: dict[str, Any]) -> str:
         ratios=table(", ".join(["robot, seecr (µs)", *(f"{ways[w]} (µs)" for w in known)]), lines),
         large=found["stored"]["poses"], store=found["stored"]["microseconds"],
         memory=found["stored"]["gigabytes"],
+        starting=table("command, processor (s)", [
+            [f"`{command}`", f"{seconds:.2f}"] for command, seconds in found["starting"].items()
+        ]),
     )  # fmt: skip
 
 

@@ -1,6 +1,9 @@
-"""Other programs beside us in the bench: whose answers count as wrong, and who is not there."""
+"""The bench: whose answers are wrong of other programs, who is not there, what a start takes."""
 
 from __future__ import annotations
+
+from pathlib import Path
+from subprocess import CalledProcessError
 
 import bench
 import bench_peers
@@ -39,3 +42,13 @@ def test_where_a_peer_is_not_installed_it_is_said(monkeypatch: pytest.MonkeyPatc
     name, robot, heavy = next(bench_peers.cases())
     cells = bench_peers.row(name, robot, heavy, bench.poses_of(robot)[:80], 2)
     assert cells[4:] == ["2 of 2", "2 of 2", "not installed", "nan", "nan"]
+
+
+@pytest.mark.slow
+def test_seconds_of_a_command_are_those_of_the_processor(tmp_path: Path) -> None:
+    once = "timeit -n 1 -r 1"
+    busy = bench.spent_by(f"{once} sum(range(20_000_000))", str(tmp_path))
+    idle = bench.spent_by(f"{once} __import__('time').sleep(1.0)", str(tmp_path))
+    assert idle < busy and idle < 0.5
+    with pytest.raises(CalledProcessError):
+        bench.spent_by("seecr pose DIR/none.xml", str(tmp_path))
