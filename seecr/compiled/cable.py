@@ -254,8 +254,8 @@ def _catenary_pull(row, start, move, up, guess, work, force, stiffness, gradient
     return True
 
 
-# A cable's law is large, and to compile it into each function that needs cables, and into all that
-# call these, took 20 s of a first diagnosis.
+# A cable's law is large. To compile it into each function that needs cables, and into all that call
+# these, took 20 s of a first diagnosis.
 
 
 def _pull_there(row, start, move, up, guess, work, force, stiffness, gradient, state):

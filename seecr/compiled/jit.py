@@ -126,7 +126,9 @@ def by_address(name, function):
         function: of addresses of numbers, which ``carray`` makes arrays of; it returns a bool.
     """
     kind = types.boolean(*[types.CPointer(types.float64)] * function.__code__.co_argcount)
-    callback = _cached(CFunc(function, (kind.args, kind.return_type), {}, {}))
+    # what is pasted into it has its settings, too: a division by zero is none to raise there
+    options = {"error_model": _COMMON["error_model"]}
+    callback = _cached(CFunc(function, (kind.args, kind.return_type), {}, options))
     callback.compile()
     add_symbol(name, callback.address)
     return types.ExternalFunction(name, kind)
