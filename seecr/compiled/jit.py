@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 from llvmlite.binding import add_symbol
@@ -27,8 +29,19 @@ _COMMON = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _UNCOUNTED = {**_COMMON, "_nrt": False}
 
 
+_FILES = sorted(Path(__file__).parent.glob("*.py"))
+_SOURCES = sha256(b"".join(file.read_bytes() for file in _FILES)).hexdigest()
+
+
 class _Cache(FunctionCache):
-    """What was compiled, on disk. On a full disk, or from a damaged file, it is compiled anew."""
+    """What was compiled, on disk. On a full disk, or from a damaged file, it is compiled anew.
+
+    A function is compiled with all that it calls, but Numba compares its own file only: of a new
+    release it would run old parts where that file is the same. So all files count here.
+    """
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        return *super()._index_key(sig, codegen), _SOURCES  # type: ignore[no-untyped-call]
 
     @contextmanager
     def _guard_against_spurious_io_errors(self) -> Iterator[None]:

@@ -15,6 +15,8 @@ import pytest
 from numba.core import caching
 from sources import ROOT
 
+from seecr.compiled import jit
+
 SOURCE = """
 import numpy as np
 from seecr.compiled.jit import by_address, carray, jit, jit_allocating
@@ -68,6 +70,21 @@ def test_what_was_compiled_is_kept_and_damaged_files_are_replaced(tmp_path: Path
             file.write_bytes(damage)
         assert compiled(tmp_path)(2.0) == 4.0
         assert all(file.read_bytes() != damage for file in kept)
+
+
+def test_nothing_is_kept_for_other_sources_of_what_it_calls(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A release in which only a function that it calls is another one must compile it anew."""
+    assert compiled(tmp_path)(2.0) == 4.0
+    with monkeypatch.context() as released:
+        released.setattr(jit, "_SOURCES", "those of another release")
+        other: Any = compiled(tmp_path)
+        assert other(2.0) == 4.0
+        assert other.stats.cache_misses and not other.stats.cache_hits
+    again: Any = compiled(tmp_path)
+    assert again(2.0) == 4.0
+    assert again.stats.cache_hits
 
 
 def test_what_was_compiled_is_loaded_without_what_compiles(tmp_path: Path) -> None:
