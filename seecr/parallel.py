@@ -45,6 +45,9 @@ BLOCK = 64
 _CHUNK = 128
 # A scheduler that is there answers within a second; over a slow network it may take a few.
 _SECONDS = 10
+# Held by a process of an executor while it is not at a task: half a result that it sends would keep
+# the process that reads it waiting for ever.
+_between = threading.Lock()
 # Per thread: ``whole``, whether the other processors are busy, so that batches are not divided.
 _at = threading.local()
 
@@ -302,8 +305,15 @@ def _unpacked(parcel: _Parcel) -> Any:
 
 def _whole(sent: Any, item: Any) -> Any:
     """One task, in one thread."""
-    with undivided():
-        return (_unpacked(sent) if isinstance(sent, _Parcel) else sent)(item)
+    is_own = _between.locked()  # a process that _begin began
+    if is_own:
+        _between.release()
+    try:
+        with undivided():
+            return (_unpacked(sent) if isinstance(sent, _Parcel) else sent)(item)
+    finally:
+        if is_own:
+            _between.acquire()
 
 
 def _is_end(error: Exception) -> bool:
@@ -315,6 +325,7 @@ def _is_end(error: Exception) -> bool:
 
 def _begin(pipe: Connection) -> None:
     """Leave Ctrl-C to the process that began this one, and end with it, whatever ends it."""
+    _between.acquire()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(pipe,), daemon=True).start()
 
@@ -323,4 +334,10 @@ def _end_with(pipe: Connection) -> None:
     try:
         pipe.recv_bytes()
     except (EOFError, OSError):
+        from multiprocessing import parent_process
+
+        parent = parent_process()
+        # where it lives, it reads what is being sent, and ends this process if there is no task
+        while not _between.acquire(timeout=0.1) and parent is not None and parent.is_alive():
+            pass
         os._exit(1)

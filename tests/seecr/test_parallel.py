@@ -327,6 +327,42 @@ def test_an_interrupt_ends_tasks_that_are_at_work() -> None:
     assert active_children() == [] and time.monotonic() - began < 50.0
 
 
+HALF_SENT = """
+import threading, time
+from multiprocessing.connection import Connection
+from seecr.parallel import processes, run_tasks
+
+if __name__ == "__main__":
+    recv, reading = Connection._recv, threading.Event()
+
+    def slow(self, size, *more):
+        if size > 10**6:
+            reading.set()
+            time.sleep(0.5)
+        return recv(self, size, *more)
+
+    def fail(_result):
+        assert reading.wait(60.0)
+        raise OSError("the disk is full")
+
+    Connection._recv = slow
+    with processes(2) as executor:
+        run_tasks(b"x".__mul__, [0, 10**7], executor, None, fail)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="its pipes are read in another way")
+def test_an_error_while_a_result_is_half_sent_ends_all(tmp_path: Path) -> None:
+    """The worker that sent it ended at once, and for the rest of it the program waited for ever."""
+    script = tmp_path / "half_sent.py"
+    script.write_text(HALF_SENT)
+    done = subprocess.run(
+        [sys.executable, script], capture_output=True, text=True, timeout=60.0, check=False
+    )
+    assert done.returncode == 1 and "the disk is full" in done.stderr
+
+
 KILLED = """
 import os, signal, time
 from seecr.parallel import processes, run_tasks
