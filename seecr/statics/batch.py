@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import partial
 from itertools import pairwise
 from threading import Event
 from typing import Any, Self
@@ -391,7 +392,7 @@ def change(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Array]:
     by_row(
         change_at_rest, plus.cables, minus.cables, plus.load, minus.load, plus.poses, plus.screws,
         at.deviation, at.values, plus.length, at.guess, gradient, tension,
-        change_space(plus.screws),
+        scratch=partial(change_space, plus.screws),
     )  # fmt: skip
     return _solved(gradient, tension, gradient)
 
@@ -406,7 +407,7 @@ def change_by_cable(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array,
     by_row(
         change_of_each_cable, plus.cables, minus.cables, plus.load, plus.poses, plus.screws,
         at.deviation, at.values, plus.length, at.guess, gradient, tension,
-        change_space(plus.screws),
+        scratch=partial(change_space, plus.screws),
     )  # fmt: skip
     return _solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, m * plus.n_dof))
 
@@ -421,7 +422,7 @@ def rates_of_cables(tables: Tables, at: Evaluation) -> Array:
     out = np.empty((*tables.cables.shape[:2], N_RATES))
     by_row(
         rates_of_each_cable, tables.cables, tables.load, tables.poses, tables.screws, at.deviation,
-        at.values, tables.length, at.guess, out, change_space(tables.screws),
+        at.values, tables.length, at.guess, out, scratch=partial(change_space, tables.screws),
     )  # fmt: skip
     out[np.isnan(out).any(axis=(1, 2))] = 0.0
     return out
@@ -440,7 +441,7 @@ def pull_and_change(tables: Tables, at: Evaluation) -> tuple[Evaluation, Array, 
     by_row(
         rates.pull_and_change, tables.cables, tables.load, tables.poses, tables.screws,
         out.deviation, out.values, tables.length, out.guess, out.gradient, pulls, gradient, tension,
-        change_space(tables.screws),
+        scratch=partial(change_space, tables.screws),
     )  # fmt: skip
     out.states[..., TENSION] = pulls
     lost = np.isnan(out.gradient).any(axis=1)

@@ -38,15 +38,21 @@ from seecr.parallel import in_parts
 from seecr.pose import Array, quat_to_matrix
 
 
-def by_row(compiled: Callable[..., None], *given: Any, threads: int | None = None) -> None:
+def by_row(
+    compiled: Callable[..., None],
+    *given: Any,
+    threads: int | None = None,
+    scratch: Callable[[], Any] | None = None,
+) -> None:
     """Call a compiled function with arrays (n, ...), in as many parts as there are threads.
 
-    The first is an array; what is none is the same for all rows, so no scratch for more than one
-    thread.
+    The first is an array; what is none is the same for all rows. What ``scratch`` makes is the last
+    argument, each part's own: threads would write into it at once.
     """
 
     def run(part: slice) -> None:
-        compiled(*(each[part] if isinstance(each, np.ndarray) else each for each in given))
+        own = () if scratch is None else (scratch(),)
+        compiled(*(each[part] if isinstance(each, np.ndarray) else each for each in given), *own)
 
     in_parts(run, len(given[0]), threads)
 

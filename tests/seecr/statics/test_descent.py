@@ -25,6 +25,7 @@ from seecr.compiled.joint_kinematics import N_CURRENT, place_joints
 from seecr.compiled.platform import work_of_moment
 from seecr.description.joints import pose_of_values
 from seecr.effects.setup import plain_setup
+from seecr.parallel import undivided
 from seecr.pose import pose_difference, quat_from_rotvec, quat_multiply
 from seecr.statics import batch
 from seecr.statics.batch import Evaluation
@@ -231,3 +232,26 @@ def test_a_soft_robot_is_never_solved_in_stages():
     """It may come to another equilibrium by them."""
     found = batch.descend(tables_about_home(SOFT), limit=LIMIT // 3)
     assert np.any(found.outcome == ITERATIONS) and found.count.max() <= LIMIT // 3
+
+
+def test_threads_compute_what_one_does() -> None:
+    """Each has scratch of its own: when they had it in common, rows were wrong at random."""
+    robot = load_robot("demobot_parallel")
+    rng = np.random.default_rng(3)
+    poses = np.tile(robot.reference_pose, (600, 1))
+    poses[:, :3] += rng.uniform(-0.05, 0.05, (len(poses), 3))
+    setups = [plain_setup(robot, Commands(poses)) for _ in range(2)]
+    setups[0].cable_weight = np.full(robot.n_cables, 1e-3)  # catenaries use most of it
+    setups[1].cable_weight = np.full(robot.n_cables, 2e-3)
+    plus, minus = map(assemble, setups)
+    rest = batch.descend(plus)
+
+    def everything() -> list[np.ndarray]:
+        out = [*batch.change(plus, minus, rest), *batch.change_by_cable(plus, minus, rest)]
+        evaluated, *rates = batch.pull_and_change(plus, rest)
+        return [*out, batch.rates_of_cables(plus, rest), evaluated.gradient, *rates]
+
+    with undivided():
+        wanted = everything()
+    for _ in range(3):
+        assert all(map(np.array_equal, everything(), wanted))
