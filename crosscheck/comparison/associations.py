@@ -10,6 +10,7 @@ any structure, so that a small p hints at where to look and proves nothing.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -20,16 +21,17 @@ from crosscheck.comparison.quantities import (
     Abscissa,
     QuantityKind,
     Travel,
+    blocks,
     cable_errors,
     channels,
     in_time,
     independent_part,
     of_cables,
     of_rows,
-    travel,
 )
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.residual_noise import as_table
+from crosscheck.fit.state import State
 from seecr.counted import between
 from seecr.pose import Array
 from seecr.prediction.experiment import Prediction
@@ -90,18 +92,19 @@ class Association:
         return {key: value for key, value in vars(self).items() if key != "kind"}
 
 
-def associations(problem: Problem, white: Array, prediction: Prediction) -> list[Association]:
-    """Associations of the whitened residuals (N,) of a prediction, the strongest first."""
-    raw = problem.residuals(prediction.readings)
-    way = travel(problem, prediction)
+def associations(problem: Problem, state: State, white: Array, way: Travel) -> list[Association]:
+    """Associations of whitened residuals (N,) of a state, the strongest first."""
+    raw, prediction = state.raw, state.prediction
     table = as_table(problem, white)
     tried = [
         _row(quantity, "readings", table, raw, *channels(problem), 1.0)
         for quantity in of_rows(problem, prediction, way)
     ]
+    del table  # cables have longer ones
     tried += _in_cables(problem, raw, prediction, way)
     found = [row for row in tried if row is not None]
-    found += _swinging(problem, table, raw, max((row.share for row in found), default=0.0))
+    least = max((row.share for row in found), default=0.0)
+    found += _swinging(problem, as_table(problem, white), raw, least)
     found = [replace(row, p=min(1.0, row.p * len(found))) for row in found]
     return sorted(
         found,
@@ -114,10 +117,13 @@ def _in_cables(
 ) -> list[Association | None]:
     """Errors of cable length against each cable's own length, tension and motion."""
     errors, noise = cable_errors(problem, raw, prediction)
-    if not np.isfinite(errors).any() or not np.all(noise > 0) or not _vary(errors / noise).any():
+    if not np.isfinite(errors).any() or not np.all(noise > 0):
+        return []
+    table = np.divide(errors, noise, out=noise)
+    if not _spread(table, np.zeros(len(table), dtype=np.int32), 1)[2].any():
         return []  # of one pose all cables have errors; nothing says what these depend on
+    table = table.reshape(-1, 1)
     part = independent_part(problem, prediction)
-    table = (errors / noise).reshape(-1, 1)
     return [
         _row(q, "cable lengths", table, errors.reshape(-1, 1), ["cable length"], ["m"], part)
         for q in of_cables(problem, prediction, way)
@@ -190,52 +196,88 @@ def f_test(between: Array, won: Array, within: Array, lost: Array) -> Array:
     return np.where(good, special.fdtrc(np.maximum(won, 1), safe, f), 1.0)
 
 
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Readings of a table (n, c) by bins (k, c): how many, their sums, and all squares (c,)."""
+
+    count: Array
+    total: Array
+    squares: Array
+
+
+def _sums(table: Array, index: Any, bins: int, shift: Array) -> _Sums:
+    """Of readings less a shift (c,), where they are finite and in a bin (n,), not -1.
+
+    They are taken some thousands at a time: as whole tables they would need the most memory of a
+    comparison.
+    """
+    count, total = np.zeros((2, bins, table.shape[1]))
+    squares = np.zeros(table.shape[1])
+    for at in blocks(len(table)):
+        values = table[at] - shift
+        # bin -1 becomes the first one, which is left out
+        read, place = np.isfinite(values), index[at] + 1
+        for c, column in enumerate(np.where(read, values, 0.0).T):
+            total[:, c] += np.bincount(place, column, bins + 1)[1:]
+            count[:, c] += np.bincount(place, read[:, c], bins + 1)[1:]
+            squares[c] += np.sum(column[place > 0] ** 2)
+    return _Sums(count, total, squares)
+
+
 def _squares(table: Array, index: Any, bins: int, constant: bool) -> tuple[Array, Array, Array]:
     """Sums of squares between and within bins, and number of readings, for each column."""
-    finite = np.isfinite(table) & (index >= 0)[:, None]
-    values = np.where(finite, table, 0.0)
-    counts = finite.sum(axis=0).astype(float)
-    mean = np.zeros(table.shape[1]) if constant else values.sum(axis=0) / np.maximum(counts, 1)
-    varies = _vary(np.where(finite, table, np.nan)) | constant
-    values = np.where(finite & varies, values - mean, 0.0)
-    between = np.zeros(table.shape[1])
-    for b in range(bins):
-        rows = index == b
-        number = finite[rows].sum(axis=0)
-        between += values[rows].sum(axis=0) ** 2 / np.maximum(number, 1)
-    return between, np.maximum((values**2).sum(axis=0) - between, 0.0), counts
+    counts, mean, varies = _spread(table, index, bins)
+    sums = _sums(table, index, bins, np.zeros_like(mean) if constant else mean)
+    between = np.sum(sums.total**2 / np.maximum(sums.count, 1), axis=0)
+    within = np.maximum(sums.squares - between, 0.0)
+    counted = varies | constant
+    return np.where(counted, between, 0.0), np.where(counted, within, 0.0), counts
 
 
-def _vary(table: Array) -> NDArray[np.bool_]:
-    """(c,) whether columns (n, c) in units of the noise, NaN if not read, vary beyond rounding."""
-    read = np.isfinite(table)
-    counts = np.maximum(read.sum(axis=0), 1)
-    mean = np.where(read, table, 0.0).sum(axis=0) / counts
-    spread = np.sqrt((np.where(read, table - mean, 0.0) ** 2).sum(axis=0) / counts)
+def _spread(table: Array, index: Any, bins: int) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Number and mean of readings in bins, (c,) each, and whether they vary beyond rounding.
+
+    The table (n, c) is in units of the noise, NaN if not read.
+    """
+    first = _sums(table, index, bins, np.zeros(table.shape[1]))
+    counts = first.count.sum(axis=0)
+    mean = first.total.sum(axis=0) / np.maximum(counts, 1)
+    spread = np.sqrt(_sums(table, index, bins, mean).squares / np.maximum(counts, 1))
     rms = np.hypot(mean, spread)
-    return np.asarray(spread > np.maximum(_OF_THE_RMS * rms, _OF_THE_NOISE))
+    return counts, mean, spread > np.maximum(_OF_THE_RMS * rms, _OF_THE_NOISE)
 
 
-def _binned(quantity: Abscissa, some: NDArray[np.bool_]) -> tuple[NDArray[np.int64], list[str]]:
+def _binned(quantity: Abscissa, some: NDArray[np.bool_]) -> tuple[NDArray[np.int32], list[str]]:
     """Bin of each row, -1 for none, and the labels of the bins."""
     values = quantity.values
-    index = np.full(len(values), -1, dtype=np.int64)
-    if values.dtype.kind == "U" or quantity.groups:
+    index = np.full(len(values), -1, dtype=np.int32)
+    if quantity.groups:
+        there = np.bincount(values[some], minlength=len(quantity.groups)) > 0
+        index[some] = (np.cumsum(there) - 1)[values[some]]
+        return index, [name for name, any_ in zip(quantity.groups, there, strict=True) if any_]
+    if values.dtype.kind == "U":
         names, index[some] = np.unique(values[some], return_inverse=True)
-        return index, [quantity.groups[k] if quantity.groups else str(k) for k in names]
+        return index, [str(k) for k in names]
     some = some & np.isfinite(values)
-    rounded = np.round(values[some], 9)
-    levels, place = np.unique(rounded, return_inverse=True)
-    if len(levels) <= _BINS:
-        index[some] = place
-        return index, [labelled(v, v, quantity.unit) for v in levels]
-    count = int(min(_BINS, max(2, len(rounded) // _IN_A_BIN)))
-    edges = np.unique(np.quantile(rounded, np.linspace(0, 1, count + 1)[1:-1]))
-    place = np.searchsorted(edges, rounded, side="right")
-    used, place = np.unique(place, return_inverse=True)
-    index[some] = place
-    inside = [rounded[place == b] for b in range(len(used))]
-    return index, [labelled(float(b.min()), float(b.max()), quantity.unit) for b in inside]
+    rising = values[some]
+    np.round(rising, 9, out=rising)
+    rising.sort()
+    if len(rising) == 0:
+        return index, []
+    steps = rising[1:] != rising[:-1]
+    if np.count_nonzero(steps) < _BINS:
+        edges = rising[1:][steps]
+    else:
+        count = int(min(_BINS, max(2, len(rising) // _IN_A_BIN)))
+        edges = np.unique(np.quantile(rising, np.linspace(0, 1, count + 1)[1:-1]))
+    cuts = [0, *np.searchsorted(rising, edges).tolist(), len(rising)]
+    filled = np.diff(cuts) > 0
+    number = np.cumsum(filled) - 1
+    for at in blocks(len(values)):
+        place = np.searchsorted(edges, np.round(values[at], 9), side="right")
+        index[at] = np.where(some[at], number[place], -1)
+    ends = [(rising[low], rising[high - 1]) for low, high in pairwise(cuts) if high > low]
+    return index, [labelled(float(low), float(high), quantity.unit) for low, high in ends]
 
 
 def labelled(low: float, high: float, unit: str) -> str:

@@ -26,6 +26,7 @@ from crosscheck.inference.search import Search
 from seecr.counted import counted
 from seecr.effects import Terms
 from seecr.pose import Array
+from seecr.prediction.experiment import Prediction
 
 # Rows that are far off whatever effects would explain: outliers of a model that lacks some.
 #
@@ -39,7 +40,7 @@ from seecr.pose import Array
 _MOST_ROWS, _LEAST_FOR_OUTLIERS = 400, 60
 
 
-def rows_far_off(problem: Problem, terms: Terms) -> NDArray[np.bool_]:
+def rows_far_off(problem: Problem, terms: Terms, plain: Prediction) -> NDArray[np.bool_]:
     """(n,) outliers; none if too many are: they are structure then.
 
     Of more than 400 rows, and of too few readings, those that are far off the others as they are.
@@ -48,12 +49,12 @@ def rows_far_off(problem: Problem, terms: Terms) -> NDArray[np.bool_]:
     none = np.zeros(every, dtype=bool)
     if not problem.n_readings:
         return none
-    data = Data.of(problem, terms)
-    state = data.state(terms)
+    state = evaluate(problem, terms, problem.noise_under(terms.effects), predicted=plain)
     if not state.valid or not outlying_rows(problem, state, 1.0, every).any():
         return none
     if every > _MOST_ROWS or problem.n_readings < _LEAST_FOR_OUTLIERS:
         return outlying_rows(problem, state)
+    data = Data.of(problem, terms)
     whole = Search(data, Catalogue.of(data, terms)).everything.fit
     far = outlying_rows(problem, whole.state, 1.0, every) & outliers(
         data.chain, whole.weight, every

@@ -5,7 +5,7 @@ Measured ones are not among them: a reading with an error would be associated wi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Any
@@ -65,34 +65,36 @@ def _sums(place: Array, values: Array, size: int) -> Array:
 
 
 # Rows at a time, whose vectors of all cables take some megabytes.
-_BLOCK = 2_000
+_BLOCK = 8_000
 
 
-def cable_errors(problem: Problem, raw: Array, prediction: Prediction) -> tuple[Array, Array]:
-    """Errors of cable length and their noise, each (n, m) [m], from residuals (n, 6 + m).
+def blocks(count: int) -> Iterator[slice]:
+    """So many rows, some thousands at a time: what is computed of these needs little memory."""
+    for begin in range(0, max(count, 1), _BLOCK):
+        yield slice(begin, begin + _BLOCK)
+
+
+def cable_errors(
+    problem: Problem, raw: Array, prediction: Prediction, rows: Any = slice(None)
+) -> tuple[Array, Array]:
+    """Errors of cable length and their noise, each (k, m) [m], from residuals (k, 6 + m) of rows.
 
     Rows without a complete pose give NaN.
     """
-    sigma, ratio, raw = problem.sigma, problem.data.sigma_ratio, np.asarray(raw)
-
-    def at(some: slice) -> Array:
-        unit, arm = _cables(problem, prediction.pose[some])
-        turned = np.cross(raw[some, None, ORIENTATION], arm)
-        errors = -np.sum(unit * (raw[some, None, POSITION] + turned), axis=-1)
-        lever = np.linalg.norm(np.cross(arm, unit), axis=-1)
-        turn = (sigma.orientation_rad or 0.0) * ratio[some, 1:2] * lever
-        return np.stack([errors, np.hypot((sigma.position_m or 0.0) * ratio[some, :1], turn)])
-
-    errors, noise = in_blocks(at, len(raw), axis=1)
+    sigma, ratio = problem.sigma, problem.data.sigma_ratio[rows]
+    raw, pose = np.asarray(raw), prediction.pose[rows]
+    errors, noise = np.empty((2, len(raw), problem.robot.n_cables))
     # differences of Euler angles are not a rotation vector
-    known = problem.use[:, None] & (not problem.uses_angles)
-    return np.where(known, errors, np.nan), noise
-
-
-def in_blocks(of_rows: Callable[[slice], Array], count: int, axis: int = 0) -> Array:
-    """What is computed row by row, of some thousands of rows at a time: it needs less memory."""
-    starts = range(0, max(count, 1), _BLOCK)
-    return np.concatenate([of_rows(slice(k, k + _BLOCK)) for k in starts], axis=axis)
+    known = problem.use[rows] & (not problem.uses_angles)
+    for at in blocks(len(raw)):
+        unit, arm = _cables(problem, pose[at])
+        turned = np.cross(raw[at, None, ORIENTATION], arm)
+        off = -np.sum(unit * (raw[at, None, POSITION] + turned), axis=-1)
+        errors[at] = np.where(known[at, None], off, np.nan)
+        lever = np.linalg.norm(np.cross(arm, unit), axis=-1)
+        turn = (sigma.orientation_rad or 0.0) * ratio[at, 1:2] * lever
+        noise[at] = np.hypot((sigma.position_m or 0.0) * ratio[at, :1], turn)
+    return errors, noise
 
 
 def cable_lengths(problem: Problem, prediction: Prediction) -> Array:
@@ -106,17 +108,15 @@ def independent_part(problem: Problem, prediction: Prediction) -> float:
     The number of independent errors is m^2/tr(C^2) with the correlations C. That is m if they are
     independent, and the number of groups if they are identical within groups.
     """
-    sigma = problem.sigma
-
-    def at(some: slice) -> Array:
-        unit, arm = _cables(problem, prediction.pose[some])
+    sigma, independent = problem.sigma, 0.0
+    for at in blocks(len(prediction.pose)):
+        unit, arm = _cables(problem, prediction.pose[at])
         turn = (sigma.orientation_rad or 0.0) * np.cross(arm, unit)
         columns = np.concatenate([(sigma.position_m or 0.0) * unit, turn], axis=-1)
         columns /= np.maximum(np.linalg.norm(columns, axis=-1, keepdims=True), 1e-300)
         together = np.einsum("nik,njk->nij", columns, columns)
-        return np.asarray(columns.shape[1] / np.sum(together**2, axis=(1, 2)))
-
-    return float(np.mean(in_blocks(at, len(prediction.pose))))
+        independent += float(np.sum(columns.shape[1] / np.sum(together**2, axis=(1, 2))))
+    return independent / len(prediction.pose)
 
 
 def _cables(problem: Problem, pose: Array) -> tuple[Array, Array]:
@@ -285,29 +285,39 @@ def of_rows(problem: Problem, prediction: Prediction, way: Travel) -> Iterator[A
         yield Abscissa(QuantityKind.TEMPERATURE, "temperature", data.temperature_C, "C")
     slack = prediction.slack
     yield Abscissa(QuantityKind.TENSION, "number of slack cables", slack.sum(axis=1).astype(float))
-    taut = np.where(slack, np.nan, prediction.tensions)
-    some = np.isfinite(taut).any(axis=1)
-    for name, pick in (("smallest", np.nanmin), ("mean", np.nanmean)):
-        values = np.full(n, np.nan)
-        values[some] = pick(taut[some], axis=1)
-        yield Abscissa(QuantityKind.TENSION, f"{name} tension of the taut cables", values, "N")
+    pulls = prediction.tensions
+    taut = ~slack & np.isfinite(pulls)
+    count = taut.sum(axis=1)
+    least = np.min(np.where(taut, pulls, np.inf), axis=1, initial=np.inf)
+    mean = np.where(taut, pulls, 0.0).sum(axis=1) / np.maximum(count, 1)
+    for name, values in (("smallest", least), ("mean", mean)):
+        told = np.where(count > 0, values, np.nan)
+        yield Abscissa(QuantityKind.TENSION, f"{name} tension of the taut cables", told, "N")
 
 
 def of_cables(problem: Problem, prediction: Prediction, way: Travel) -> Iterator[Abscissa]:
     """Quantities that change from cable to cable, with (n m,) values, row by row."""
     robot, n = problem.robot, problem.data.n_rows
     names, which = np.unique(np.array(robot.cable_names), return_inverse=True)
-    each = np.tile(which.astype(np.int32), n)
-    yield Abscissa(QuantityKind.CABLE, "the cable", each, groups=tuple(names.tolist()))
-    lengths = cable_lengths(problem, prediction).ravel()
-    yield Abscissa(QuantityKind.CABLE, "the cable's length", lengths, "m")
+    each = which.astype(np.int32)
+    yield Abscissa(QuantityKind.CABLE, "the cable", np.tile(each, n), groups=tuple(names.tolist()))
+    # what was yielded is not kept here: of many rows it is large
+    yield Abscissa(
+        QuantityKind.CABLE, "the cable's length", cable_lengths(problem, prediction).ravel(), "m"
+    )
     yield Abscissa(QuantityKind.CABLE, "the cable's tension", prediction.tensions.ravel(), "N")
+    name = "whether the cable was paid out or reeled in"
+    groups = ("paid out", "reeled in", STILL)
+    yield Abscissa(QuantityKind.CABLE, name, _motions(problem, way).ravel(), groups=groups)
+
+
+def _motions(problem: Problem, way: Travel) -> NDArray[np.int32]:
+    """Whether each cable (n, m) was paid out (0), reeled in (1) or stood still (2)."""
+    robot = problem.robot
     nominal = robot.nominal_lengths(way.pose)
     home = robot.nominal_lengths(robot.reference_pose[None])[0]
     paid = nominal - problem.experiment.commands.before(nominal, home)
-    motion = np.select([paid > 0.0, paid < 0.0], [np.int32(0), np.int32(1)], np.int32(2)).ravel()
-    name = "whether the cable was paid out or reeled in"
-    yield Abscissa(QuantityKind.CABLE, name, motion, groups=("paid out", "reeled in", STILL))
+    return np.select([paid > 0.0, paid < 0.0], [np.int32(0), np.int32(1)], np.int32(2))
 
 
 def in_time(problem: Problem, table: Array) -> tuple[Abscissa | None, int]:

@@ -63,12 +63,12 @@ def compare(
     notes = [*said, *contradictions(terms), *ready.notes]
     terms = ready.terms
     factor = problem.noise_under(terms.effects)
-    state = evaluate(problem, terms, factor)
+    state = evaluate(problem, terms, factor, predicted=ready.plain)
     way = travel(problem, state.prediction)
     judged, left = problem, state
     if outliers.any():
         judged = problem.only(~outliers)
-        left = evaluate(judged, terms, factor, state)
+        left = state.among(judged)
         without = rms_words(rms_by_kind(judged, state.raw))
         notes.append(
             f"{data.lines_of(outliers)}: possible outliers, included in all errors (without them "
@@ -90,7 +90,7 @@ def compare(
         runs=tuple(_groups(problem, state, data.run, data.runs)),
         directions=tuple(_groups(problem, state, way.direction)),
         regions=tuple(_groups(problem, state, regions_of(problem, way.pose))),
-        associations=tuple(associations(judged, left.white, left.prediction) if some else ()),
+        associations=tuple(associations(judged, left, left.white, way) if some else ()),
         worst=tuple(_worst(problem, state, way)),
         whiteness=white,
         coloured=coloured,

@@ -10,6 +10,7 @@ import numpy as np
 from crosscheck.add.weigh import MATTERS, spread_by_others
 from crosscheck.calibration import JointErrors
 from crosscheck.comparison.associations import Association, associations
+from crosscheck.comparison.quantities import travel
 from crosscheck.diagnosis.advice import check_of, measure_next
 from crosscheck.diagnosis.path import ModelPath, path_to
 from crosscheck.diagnosis.result import (
@@ -66,7 +67,8 @@ def diagnosis_of(
     white = whiteness(problem, last.state.white, int(last.fit.seen.sum()))
     where: tuple[Association, ...] = ()
     if unknown:
-        where = tuple(associations(problem, last.fit.white, last.state.prediction)[:_MOST_WHERE])
+        way = travel(problem, last.state.prediction)
+        where = tuple(associations(problem, last.state, last.fit.white, way)[:_MOST_WHERE])
     left = _left(path, search.best, floor, tolerance, white.lag)
     verdict = said.verdict
     if unknown and not left.important and not left.undecided:

@@ -13,7 +13,7 @@ Residuals are whitened by its Cholesky factor, so that noise alone has unit vari
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import numpy as np
@@ -33,6 +33,8 @@ from seecr.units import in_unit
 POSITION, ORIENTATION, TENSION = slice(0, 3), slice(3, 6), slice(6, None)
 # Numbers that differ less [m, rad] are the same number; in so many rows no instrument reads it.
 _ROUNDING, _ROWS = 1e-12, 4
+# What is computed once, of the data alone.
+_OF_DATA = ("measured", "filled_in", "uses_angles")
 
 
 @dataclass(eq=False)
@@ -90,8 +92,11 @@ class Problem:
         return self._like(groups=groups)
 
     def _like(self, **changes: object) -> Problem:
-        other = replace(self, **changes)  # type: ignore[arg-type]
-        other.experiment = self.experiment
+        """The same problem with other fields than its robot and data."""
+        other = object.__new__(Problem)
+        kept = [*(item.name for item in fields(self)), *_OF_DATA]
+        mine = vars(self)
+        vars(other).update({name: mine[name] for name in kept if name in mine} | changes)
         return other
 
     @cached_property
@@ -182,10 +187,16 @@ class Problem:
 
     @cached_property
     def reading_sigma(self) -> Array:
-        """(n, 6 + m) standard deviation of each reading; 1 for kinds without a stated noise."""
+        """(n, 6 + m) standard deviation of each reading; 1 for kinds without a stated noise.
+
+        It cannot be written: rows that are all alike are one, shown so many times.
+        """
         stated = (self.sigma.position_m, self.sigma.orientation_rad, self.sigma.tension_N)
-        by_kind = np.array([value or 1.0 for value in stated]) * self.data.sigma_ratio[:, :3]
-        return np.repeat(by_kind, [3, 3, self.data.n_cables], axis=1)
+        ratio = self.data.sigma_ratio[:, :3]
+        alike = ratio[:1] if len(ratio) and not np.any(ratio != ratio[0]) else ratio
+        by_kind = np.array([value or 1.0 for value in stated]) * alike
+        table = np.repeat(by_kind, [3, 3, self.data.n_cables], axis=1)
+        return np.broadcast_to(table, self.measured.shape)
 
     @cached_property
     def length_sigma(self) -> Array:
@@ -200,7 +211,7 @@ class Problem:
         """Cholesky factors of each row's noise, (n, 6 + m, 6 + m); 1 where nothing was read.
 
         Of exact lengths, whose readings have noise of their own alone, only the diagonal (n, 6 + m)
-        exists.
+        exists, and it is :attr:`reading_sigma`.
         """
         return self.noise_about(self.by_length(at) if self.sigma.length_m else None)
 
@@ -212,9 +223,9 @@ class Problem:
 
     def noise_about(self, by_length: Array | None) -> Array:
         """The same, given the derivative by lengths (n, 6 + m, m); None if lengths are exact."""
-        own = np.where(self.measured, self.reading_sigma, 1.0)
         if by_length is None or not self.sigma.length_m:
-            return own
+            return np.where(self.measured, self.reading_sigma, 1.0)
+        own = np.where(self.measured, self.reading_sigma, 1.0)
         rate = np.where(self.measured[:, :, None], by_length * self.length_sigma[:, None], 0.0)
         return noise_factors(own, rate)
 

@@ -237,10 +237,11 @@ class Whiteness:
 
 def whiteness(problem: Problem, white: Array, parameters: int) -> Whiteness:
     """Test the whitened residuals (N,) of a fit with this many ``parameters``."""
-    table = as_table(problem, white)
     dof = max(len(white) - parameters, 1)
     chi2 = float(white @ white)
-    lag, near = (agreement(table, pairs(problem)) for pairs in (next_rows, nearest_rows))
+    beside = nearest_rows(problem)  # before the table, which takes as much memory
+    table = as_table(problem, white)
+    lag, near = (agreement(table, pairs) for pairs in (next_rows(problem), beside))
     p, scale = float(special.chdtrc(dof, chi2)), float(np.sqrt(chi2 / dof))
     return Whiteness(chi2, dof, p, scale, *lag, *near)
 
@@ -248,7 +249,7 @@ def whiteness(problem: Problem, white: Array, parameters: int) -> Whiteness:
 def as_table(problem: Problem, white: Array) -> Array:
     """Whitened residuals as a table (n, 6 + m), NaN where no reading counts."""
     table = np.full(problem.measured.shape, np.nan)
-    table[problem.row_of, problem.column_of] = white
+    table[problem.counted] = white
     return table
 
 
@@ -259,13 +260,16 @@ def agreement(table: Array, pairs: NDArray[np.integer]) -> tuple[float, float]:
     and each one by itself are tested, and the strongest result counts. The standard errors are
     corrected for the number of tests, see :func:`best_of`. Both are 0 if nothing is positive.
     """
-    product = table[pairs[:, 0]] * table[pairs[:, 1]]
-    channels = np.flatnonzero(np.isfinite(product).sum(axis=0))
-    groups = [channels, *(np.array([c]) for c in channels if len(channels) > 1)]
+    first, second = pairs.T
+    read = np.isfinite(table)
+    both = (read[first] & read[second]).sum(axis=0)
+    table, both = table[:, both > 0], both[both > 0]
+    product = table[first] * table[second]
+    groups = [slice(None), *(slice(c, c + 1) for c in range(len(both)) if len(both) > 1)]
     tried = [
         _correlation(table[:, group], product[:, group])
         for group in groups
-        if np.isfinite(product[:, group]).sum() >= _LEAST_PAIRS
+        if both[group].sum() >= _LEAST_PAIRS
     ]
     correlation, errors = max(tried, key=lambda found: found[1], default=(0.0, 0.0))
     errors = best_of(errors, len(tried)) if tried else 0.0
@@ -313,14 +317,16 @@ def nearest_rows(problem: Problem) -> NDArray[np.int64]:
         # commands under different loads are not neighbours
         apart = _APART * problem.robot.length * commands.loads.kinds[rows, None]
         place = np.concatenate([place, apart], axis=1)
-    tree = spatial.cKDTree(place)
-    _distance, index = tree.query(place, k=min(4, len(rows)))
-    here, others = np.arange(len(rows))[:, None], index.reshape(len(rows), -1)
-    apart = (others != here) & (np.abs(rows[others] - rows[here]) > 1)
+    count, near = len(rows), min(4, len(rows))
+    others = spatial.cKDTree(place).query(place, k=near)[1].reshape(count, near)
+    # others that are not next to a row are not the row itself, either
+    apart = np.stack([np.abs(rows[other] - rows) > 1 for other in others.T], axis=1)
     some = np.flatnonzero(apart.any(axis=1))
     beside = others[some, np.argmax(apart[some], axis=1)]
-    pairs = np.unique(np.sort(np.stack([some, beside], axis=1), axis=1), axis=0)
-    return np.asarray(rows[pairs], dtype=np.int64)
+    first, second = np.divmod(
+        np.unique(np.minimum(some, beside) * count + np.maximum(some, beside)), count
+    )
+    return np.stack([rows[first], rows[second]], axis=1)
 
 
 # A single row is an outlier if it is so many robust standard deviations above the median; if more
@@ -337,11 +343,9 @@ def outlying_rows(
     None if they are more than the part ``most`` of the rows; nor where more neighbours than
     ``together`` stick out, which is structure.
     """
-    power = np.zeros(problem.data.n_rows)
-    count = np.zeros(problem.data.n_rows)
-    np.add.at(power, problem.row_of, state.white**2)
-    np.add.at(count, problem.row_of, 1.0)
-    size = np.sqrt(power / np.maximum(count, 1.0))
+    power = np.nansum(as_table(problem, state.white) ** 2, axis=1)
+    count = problem.counted.sum(axis=1)
+    size = np.sqrt(power / np.maximum(count, 1))
     used = problem.use & (count > 0)
     middle = float(np.median(size[used]))
     spread = 1.4826 * float(np.median(np.abs(size[used] - middle)))

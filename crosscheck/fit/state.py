@@ -66,6 +66,15 @@ class State:
         """The same state, as that of other terms (usually some more, at their null values)."""
         return replace(self, terms=terms)
 
+    def among(self, problem: Problem) -> State:
+        """The same state, of a problem in which other rows of the same data count."""
+        valid = bool(np.all(self.prediction.solved[problem.use]))
+        white = self.table[problem.counted]
+        valid = valid and bool(np.all(np.isfinite(white)))
+        log_det = _log_det(problem, self.factor) if problem.sigma.length_m else 0.0
+        chi2 = float(white @ white) if valid else np.inf
+        return replace(self, white=white, chi2=chi2, log_det=log_det)
+
 
 def evaluate(
     problem: Problem,
@@ -73,6 +82,7 @@ def evaluate(
     factor: Array,
     near: State | None = None,
     trial: bool = False,
+    predicted: Prediction | None = None,
 ) -> State:
     """Predict with the terms, and compare with the readings.
 
@@ -84,12 +94,16 @@ def evaluate(
         factor: :meth:`Problem.noise`; only used if commanded lengths are exact.
         near: a state to start from.
         trial: the rest need not be solved once a counted row with history is lost.
+        predicted: what the terms predict where commanded lengths are exact, if it is known.
     """
     effects = terms.effects
     experiment = problem.experiment if near is None else near.experiment
     start = None if near is None else near.prediction
     if not problem.sigma.length_m:
-        prediction = experiment.predict(effects, start, problem.use if trial else None)
+        needed = problem.use if trial else None
+        prediction = predicted
+        if prediction is None:
+            prediction = experiment.predict(effects, start, needed)
         raw = problem.residuals(prediction.readings)
         state = _compared(problem, terms, prediction, raw, factor, experiment)
         return _on_measured_branch(problem, state)
@@ -146,14 +160,11 @@ def _compared(
 ) -> State:
     filled = np.where(problem.measured & np.isfinite(raw), raw, 0.0)
     table = in_units_of(factor, filled[..., None])[..., 0]
-    white = table[problem.counted]
-    valid = bool(np.all(prediction.solved[problem.use])) and bool(np.all(np.isfinite(white)))
-    chi2 = float(white @ white) if valid else np.inf
-    log_det = _log_det(problem, factor) if problem.sigma.length_m else 0.0
-    return State(
-        terms, prediction, raw, np.where(problem.measured, table, np.nan), white, factor,
-        chi2, log_det, experiment,
-    )  # fmt: skip
+    table[~problem.measured] = np.nan
+    none = np.zeros(0)
+    return State(terms, prediction, raw, table, none, factor, np.inf, 0.0, experiment).among(
+        problem
+    )
 
 
 def _log_det(problem: Problem, factor: Array) -> float:

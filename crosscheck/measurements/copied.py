@@ -6,7 +6,7 @@ Noise does not repeat all numbers of a row, unless they are so coarse that chanc
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,10 +57,12 @@ def repetitions(data: Measurements, across: bool = False) -> tuple[list[str], Ma
 
 def _pairs(data: Measurements, across: bool) -> tuple[list[Pair], list[Pair]]:
     """Rows that repeat another one whole, and those that do beside another command or load."""
-    read, rows = _readings(data), np.arange(data.n_rows)
-    number = np.isfinite(read).sum(axis=1)
-    whole = _first_like(_table(data, lambda name: name != "run"))
-    before = _first_like(read)
+    rows = np.arange(data.n_rows)
+    number = np.zeros(data.n_rows, dtype=np.int64)
+    for column in _readings(data):
+        number += np.isfinite(column)
+    whole = _first_like(data, lambda name: name != "run")
+    before = _first_like(data, _is_reading)
     commands = np.column_stack([_commands(data), data.file])
     twice = (number > 0) & (whole != rows)
     copies = (number >= _LEAST_COLUMNS) & (commands != commands[before]).any(axis=1)
@@ -74,32 +76,53 @@ def _listed(some: Mask, before: NDArray[np.intp]) -> list[Pair]:
     return [(row, int(before[row])) for row in np.flatnonzero(some).tolist()]
 
 
-def _first_like(table: Array) -> NDArray[np.intp]:
-    """For each row (n, k) the first one with the same numbers, bit for bit."""
-    if table.shape[1] == 0:
-        return np.zeros(len(table), dtype=np.intp)
-    whole = np.ascontiguousarray(table).view(np.dtype((np.void, 8 * table.shape[1])))
-    _rows, first, which = np.unique(whole.ravel(), return_index=True, return_inverse=True)
-    return np.asarray(first[which.ravel()])
+def _first_like(data: Measurements, wanted: Callable[[str], bool]) -> NDArray[np.intp]:
+    """For each row the first one with the same numbers in some columns, bit for bit.
+
+    Rows are sorted by a key of 64 bits, with which whole rows are compared afterwards: sorted
+    themselves they take five times the memory. With other keys should two rows have the same one.
+    """
+    for first_key in range(data.n_rows + 1):
+        key = np.full(data.n_rows, first_key, dtype=np.uint64)
+        for column in _stated(data, wanted):
+            key = _mixed(key ^ column.view(np.uint64))
+        _keys, first, which = np.unique(key, return_index=True, return_inverse=True)
+        before = first[which.ravel()]
+        bits = (column.view(np.uint64) for column in _stated(data, wanted))
+        if not any(np.any(each != each[before]) for each in bits):
+            break
+    return np.asarray(before)
+
+
+def _mixed(key: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Another key for each: the last steps of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014)."""
+    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+        key = (key ^ (key >> np.uint64(shift))) * np.uint64(factor)
+    return key ^ (key >> np.uint64(31))
 
 
 _READ = ("meas_", "tension_")
 
 
+def _is_reading(name: str) -> bool:
+    return name.startswith(_READ)
+
+
 def _commands(data: Measurements) -> NDArray[np.intp]:
     """(n,) the first row with the same command, load, and what else is stated but readings."""
-    return _first_like(_table(data, lambda name: not name.startswith((*_READ, "t_s", "run"))))
+    return _first_like(data, lambda name: not name.startswith((*_READ, "t_s", "run")))
 
 
-def _readings(data: Measurements) -> Array:
-    """The readings (n, k) as written."""
-    return _table(data, lambda name: name.startswith(_READ))
+def _readings(data: Measurements) -> Iterator[Array]:
+    """The columns (n,) of readings, as written."""
+    return _stated(data, _is_reading)
 
 
-def _table(data: Measurements, wanted: Callable[[str], bool]) -> Array:
-    """Columns (n, k) as written; 0 and -0 are the same, NaN is not stated."""
-    columns = [np.array(values, dtype=float) for name, values in data.columns() if wanted(name)]
-    return np.array(columns).reshape(len(columns), data.n_rows).T + 0.0
+def _stated(data: Measurements, wanted: Callable[[str], bool]) -> Iterator[Array]:
+    """Columns (n,) as written; 0 and -0 are the same, NaN is not stated."""
+    for name, values in data.columns():
+        if wanted(name):
+            yield np.array(values, dtype=float) + 0.0
 
 
 def _by_chance(data: Measurements, count: int) -> float:
@@ -112,7 +135,7 @@ def _by_chance(data: Measurements, count: int) -> float:
 
     place = data.command_pose if data.command_lengths is None else data.command_lengths
     assert place is not None
-    read = _readings(data)
+    read = np.stack(list(_readings(data)), axis=1)
     rows = np.isfinite(read).sum(axis=1) >= _LEAST_COLUMNS
     read = read[rows]
     _places, which = np.unique(place[rows].round(9), axis=0, return_inverse=True)

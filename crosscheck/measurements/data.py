@@ -285,15 +285,16 @@ class Measurements(Result):
             raise ValueError("expected exactly one of command_pose and command_lengths")
         self._set("run", np.array(self.run, dtype=np.str_))
         filled: dict[str, NDArray[Any]] = {
-            "position": np.full((n, 3), np.nan),
-            "angles_rad": np.full((n, 3), np.nan),
-            "tensions": np.full((n, m), np.nan),
+            # one number, shown so many times
+            "position": np.broadcast_to(np.nan, (n, 3)),
+            "angles_rad": np.broadcast_to(np.nan, (n, 3)),
+            "tensions": np.broadcast_to(np.nan, (n, m)),
             "line": np.arange(2, n + 2),
             "driven": np.ones(m, dtype=bool),
             "stands": np.zeros(n, dtype=bool),
             "copied": np.zeros(n, dtype=bool),
             "file": np.zeros(n, dtype=np.int64),
-            "sigma_ratio": np.ones((n, len(fields(Sigma)))),
+            "sigma_ratio": np.broadcast_to(1.0, (n, len(fields(Sigma)))),
         }
         for name, value in filled.items():
             if getattr(self, name) is None:
@@ -330,19 +331,27 @@ class Measurements(Result):
     @property
     def parts(self) -> dict[str, Names]:
         """Names (n,) of the "file" and the "run" of each row, as models know them."""
-        origin = np.array(self.origins or (origin_of(self.path),), dtype=np.str_)[self.file]
-        run = self.run
-        if self.files:  # runs of several files have the file's name in front
-            own = [len(self.files[k]) + 2 for k in self.file]
-            run = np.array([name[cut:] for name, cut in zip(run, own, strict=True)], dtype=np.str_)
-        return {"file": origin, "run": np.char.add(np.char.add(origin, ": "), run)}
+        return {kind: names[index] for kind, (names, index) in self._labels.items()}
+
+    @cached_property
+    def _labels(self) -> dict[str, tuple[Names, NDArray[np.integer]]]:
+        """The different names of parts, and the index (n,) of each row's."""
+        origin = np.array(self.origins or (origin_of(self.path),), dtype=np.str_)
+        runs, first, which = np.unique(self.run, return_index=True, return_inverse=True)
+        names = []
+        for name, file in zip(runs.tolist(), self.file[first], strict=True):
+            # runs of several files have the file's name in front
+            own = name[len(self.files[file]) + 2 :] if self.files else name
+            names.append(f"{origin[file]}: {own}")
+        run = np.array(names, dtype=np.str_), which.ravel().astype(np.int32)
+        return {"file": (origin, self.file), "run": run}
 
     @property
     def runs(self) -> tuple[str, ...]:
         """Names of the runs, in order of appearance."""
         return tuple(dict.fromkeys(self.run.tolist()))
 
-    @property
+    @cached_property
     def run_index(self) -> NDArray[np.int64]:
         """(n,) index of each row's run in :attr:`runs`."""
         _names, first, which = np.unique(self.run, return_index=True, return_inverse=True)
@@ -409,7 +418,8 @@ class Measurements(Result):
             loads=self.loads,
             stands=self.stands,
             clock=self.file if self.files else None,
-            parts=self.parts,
+            # names that rows have in common are kept once
+            parts={k: names.astype(object)[index] for k, (names, index) in self._labels.items()},
             line=None if self.files else self.line,
         )
 

@@ -12,6 +12,7 @@ cables that pull alike, as a mirror's do, show none.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,6 +25,7 @@ from crosscheck.fit.problem import TENSION, Problem
 from crosscheck.preparation.unread import rows_of_files
 from seecr.pose import Array, quat_from_rxyz
 from seecr.prediction.experiment import Prediction
+from seecr.statics.tables import portions
 from seecr.units import short
 from seecr.workspace.margins import balance_equations
 
@@ -45,10 +47,10 @@ Left = Callable[[NDArray[np.intp]], Array]
 """What is left unexplained (k,) in orders of cables (k, m); never less than the noise."""
 
 
-def exchange_doubts(problem: Problem, pulls: Pulls) -> list[str]:
+def exchange_doubts(problem: Problem, pulls: Pulls | None) -> list[str]:
     """Sentences that name columns of lengths or tensions that seem exchanged."""
     # where lengths are exchanged the platform is not where it is predicted
-    return list(_lengths(problem)) or list(_tensions(problem, pulls))
+    return list(_lengths(problem)) or ([] if pulls is None else list(_tensions(problem, pulls)))
 
 
 def _lengths(problem: Problem) -> Iterator[str]:
@@ -185,27 +187,30 @@ class Pulls:
     """Tensions as measured and as predicted, and what they hold along the platform's coordinates.
 
     Attributes:
-        matrix: (n, d, m) forces per tension at the predicted poses, torques over the robot's
-            length. measured, expected: (n, m) [N], 0 where one of them is not known.
+        matrix: gives (k, d, m) forces per tension of some rows at their predicted poses, torques
+            over the robot's length: that of all rows takes as much memory as all else together.
+        measured, expected: (n, m) [N], 0 where one of them is not known.
         whole: (n,) rows in which all cables were read: what an unread one holds is not known.
         free: whether balance alone fixes every tension, since there is no pretension.
     """
 
-    matrix: Array
+    matrix: Callable[[NDArray[np.intp]], Array]
     measured: Array
     expected: Array
     whole: NDArray[np.bool_]
     free: bool
 
     @classmethod
-    def of(cls, problem: Problem, at: Prediction) -> Pulls:
-        """Of some data, beside what the model as it stands predicts."""
+    def of(cls, problem: Problem, at: Prediction) -> Pulls | None:
+        """Of some data, beside what the model as it stands predicts; None if no tension counts."""
+        if not problem.counted[:, TENSION].any():
+            return None
         robot = problem.robot
         pose = np.where(at.solved[:, None], at.pose, robot.reference_pose)
         known: NDArray[np.bool_] = problem.counted[:, TENSION] & at.solved[:, None]
         known &= np.isfinite(at.readings.tensions)
         return cls(
-            matrix=balance_equations(robot, pose)[0],
+            matrix=lambda rows: balance_equations(robot, pose[rows])[0],
             measured=np.where(known, problem.data.tensions, 0.0),
             expected=np.where(known, at.readings.tensions, 0.0),
             whole=np.asarray(known.all(axis=1)),
@@ -219,7 +224,8 @@ class Pulls:
 
     def held(self, tensions: Array) -> Array:
         """The resultant (n, d) [N] of tensions (n, m)."""
-        return np.asarray((self.matrix @ tensions[..., None])[..., 0])
+        every = portions(np.arange(len(tensions)))
+        return np.concatenate([(self.matrix(k) @ tensions[k][..., None])[..., 0] for k in every])
 
     def carried(self) -> Array:
         """Part (n,) of the load that the measured tensions hold; NaN where it is not known."""
@@ -238,13 +244,19 @@ def unbalanced(pulls: Pulls, rows: NDArray[np.bool_], noise: float) -> Left:
 
     Each order may have a scale: load cells and masses that are off by one factor do not count.
     """
-    matrix, read, load = pulls.matrix[rows], pulls.measured[rows], pulls.load[rows]
-    count, m = read.shape
-    # each column i of tensions at each cable j, and their products with others and with the load
-    at = np.einsum("ndj,ni->ijnd", matrix, read).reshape(m * m, -1)
-    gram, along = (at @ at.T).reshape(m, m, m, m), (at @ load.ravel()).reshape(m, m)
-    scale = np.linalg.norm(pulls.expected[rows]) / max(float(np.linalg.norm(read)), _TINY)
-    least = max(float(scale) * noise * float(np.sqrt((matrix**2).sum() / count)), _TINY)
+    count, m = int(rows.sum()), pulls.measured.shape[1]
+    gram, along, squares = np.zeros((m * m, m * m)), np.zeros((m, m)), np.zeros(4)
+    for some in portions(np.flatnonzero(rows)):
+        matrix, read, load = pulls.matrix(some), pulls.measured[some], pulls.load[some]
+        # each column i of tensions at each cable j, and their products with others and the load
+        at = np.einsum("ndj,ni->ijnd", matrix, read).reshape(m * m, -1)
+        gram += at @ at.T
+        along += (at @ load.ravel()).reshape(m, m)
+        squares += [float((x**2).sum()) for x in (pulls.expected[some], read, matrix, load)]
+    gram = gram.reshape(m, m, m, m)
+    of_expected, of_read, of_matrix, whole = squares.tolist()
+    scale = math.sqrt(of_expected) / max(math.sqrt(of_read), _TINY)
+    least = max(scale * noise * math.sqrt(of_matrix / count), _TINY)
     columns = np.arange(m)
 
     def left(orders: NDArray[np.intp]) -> Array:
@@ -252,7 +264,7 @@ def unbalanced(pulls: Pulls, rows: NDArray[np.bool_], noise: float) -> Left:
         square = gram[
             columns[None, :, None], orders[:, :, None], columns[None, None, :], orders[:, None, :]
         ].sum(axis=(1, 2))
-        rest = float((load**2).sum()) - held**2 / np.maximum(square, 1e-300)
+        rest = whole - held**2 / np.maximum(square, 1e-300)
         return np.asarray(np.maximum(np.sqrt(np.maximum(rest, 0.0) / count), least))
 
     return left

@@ -28,8 +28,8 @@ from seecr.prediction.experiment import Prediction
 Progress = Callable[[str, float], None]
 """Called with what is being done and the fraction that is done, 0 to 1."""
 
-Finder = Callable[[Problem, Terms], NDArray[np.bool_]]
-"""Called with the data and the model as it stands; returns which rows (n,) are outliers."""
+Finder = Callable[[Problem, Terms, Prediction], NDArray[np.bool_]]
+"""Called with the data, the model as it stands and what that predicts; returns outliers (n,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +43,7 @@ class Prepared:
         refusal: why nothing can be said about these data; None if something can.
         fitted: how many values were fitted in advance because the data leave them free.
         far_off: (n,) outliers, which count in none of the estimates; None if nobody looked for any.
+        plain: what the terms predict where commanded lengths are exact; None without readings.
     """
 
     problem: Problem
@@ -51,6 +52,7 @@ class Prepared:
     refusal: Refusal | None
     fitted: int = 0
     far_off: NDArray[np.bool_] | None = None
+    plain: Prediction | None = None
 
 
 def prepare(
@@ -83,7 +85,7 @@ def prepare(
         plain = problem.experiment.predict(terms.effects)
         if estimates:  # the first residuals also contained the error of the frame
             problem, estimates = estimate_sigma(problem.with_sigma(data.sigma), plain)
-    far_off = None if outliers is None else outliers(problem, terms)
+    far_off = None if outliers is None else outliers(problem, terms, plain)
     if far_off is not None and far_off.any() and estimates:
         others, estimates = estimate_sigma(problem.only(~far_off).with_sigma(data.sigma), plain)
         problem = problem.with_sigma(others.sigma)
@@ -94,7 +96,7 @@ def prepare(
     )  # fmt: skip
     problem = problem.with_groups(groups_of(data, terms))
     refusal = refusal_of(problem, plain.pose[:, :3], data.sigma) or odd
-    return Prepared(problem, terms, notes, refusal, int(free.sum()), far_off)
+    return Prepared(problem, terms, notes, refusal, int(free.sum()), far_off, plain)
 
 
 def _solved_rows(problem: Problem, plain: Prediction) -> Problem:

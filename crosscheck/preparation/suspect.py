@@ -69,7 +69,10 @@ def suspicions(problem: Problem, at: Prediction) -> tuple[list[str], Refusal | N
         *_worse_than_commands(problem, readings),
         *_other_turns(problem, readings),
         *stuck_doubts(problem, at.pose[:, :3]),
-        *(list(_other_units(problem, pulls)) or _other_tensions(problem, readings)),
+        *(
+            ([] if pulls is None else _other_units(problem, pulls))
+            or _other_tensions(problem, readings)
+        ),
         *exchange_doubts(problem, pulls),
     ]
     return notes, refusal
@@ -348,19 +351,20 @@ def _stuck_words(
 # tensions
 
 
-def _other_units(problem: Problem, pulls: Pulls) -> Iterator[str]:
+def _other_units(problem: Problem, pulls: Pulls) -> list[str]:
     """A sentence for each file whose tensions carry the load in another unit."""
-    part = pulls.carried()
+    part, said = pulls.carried(), []
     for name, rows in rows_of_files(problem):
         mine = part[rows & np.isfinite(part)]
         unit = unit_of(mine)
         if unit is not None:
-            yield (
+            said.append(
                 f"{name}The measured tensions carry {short(float(np.median(mine)))} times the load "
                 f"that the model puts on the cables, as if they were in {unit}, of "
                 f"{_UNITS[unit]:.6g} N each. They are taken as they stand: are they in {unit}, or "
                 "is the platform's mass in the MJCF so far off?"
             )
+    return said
 
 
 def unit_of(part: Array) -> str | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from crosscheck.comparison.quantities import cable_errors, cable_lengths, channels, travel
+from crosscheck.comparison.quantities import cable_errors, channels, travel
 from crosscheck.fit.problem import KINDS, TENSION, Kind, Problem
 from crosscheck.show.blocks import Figure, Line, Panel, Words, pieces, section
 from crosscheck.show.figures import MANY, blank, dots, grid, image, styled
@@ -208,32 +208,28 @@ class Wall:
         """(n, k) what remains with these effects."""
         return self.measured - self.predicted
 
-    def at(self, rows: NDArray[np.int64]) -> Wall:
-        """Some of its rows of measurements."""
-        against = [(name, values[rows]) for name, values in self.abscissae]
-        shown, part = self.measured[rows], self.predicted[rows]
-        return replace(self, measured=shown, predicted=part, abscissae=against)
-
 
 def walls_of(problem: Problem, before: Drawn, after: Drawn) -> list[Wall]:
     """Cable lengths where the whole pose was read, else its readings; tensions where read.
 
     Of the rows that are drawn.
     """
-    raw, prediction = before.state.raw, after.state.prediction
-    change, names, out = raw - after.state.raw, list(problem.robot.cable_names), []
-    against = _of_cables(problem, prediction)
-    errors, noise = cable_errors(problem, raw, before.state.prediction)
-    predicted, _ = cable_errors(problem, change, before.state.prediction)
+    rows = Misfit(problem, before.state).drawn
+    raw = before.state.raw[rows]
+    change = raw - after.state.raw[rows]
+    names, out = list(problem.robot.cable_names), []
+    against = _of_cables(problem, after.state.prediction, rows)
+    errors, noise = cable_errors(problem, raw, before.state.prediction, rows)
+    predicted, _ = cable_errors(problem, change, before.state.prediction, rows)
     if np.isfinite(errors).any():
         out.append(
             Wall("Errors of cable length", names, 1e3 * errors, 1e3 * predicted,
                  1e3 * np.mean(noise, axis=0), "mm", against)
         )  # fmt: skip
     elif problem.counted[:, :6].any():
-        out.append(_of_readings(problem, raw, change, prediction))
+        out.append(_of_readings(problem, raw, change, after.state.prediction, rows))
     if problem.counted[:, TENSION].any():
-        shown = np.where(problem.counted[:, TENSION], raw[:, TENSION], np.nan)
+        shown = np.where(problem.counted[rows, TENSION], raw[:, TENSION], np.nan)
         part = np.where(np.isfinite(shown), change[:, TENSION], np.nan)
         seen = np.flatnonzero(np.isfinite(shown).any(axis=0))
         level = np.full(len(seen), problem.sigma.tension_N or 0.0)
@@ -242,55 +238,60 @@ def walls_of(problem: Problem, before: Drawn, after: Drawn) -> list[Wall]:
             Wall("Errors of tension", [names[k] for k in seen], shown[:, seen], part[:, seen],
                  level, "N", of_seen)
         )  # fmt: skip
-    rows = Misfit(problem, before.state).drawn
-    return [wall.at(rows) for wall in out]
+    return out
 
 
-def _of_cables(problem: Problem, prediction: Prediction) -> list[tuple[str, Array]]:
+def _of_cables(
+    problem: Problem, prediction: Prediction, rows: NDArray[np.int64]
+) -> list[tuple[str, Array]]:
     return [
-        ("length of the cable [m]", cable_lengths(problem, prediction)),
-        ("its tension [N]", prediction.tensions),
-        ("reeled in ← last move [mm] → paid out", 1e3 * length_changes(problem, prediction)),
-        *_time(problem),
+        ("length of the cable [m]", problem.robot.nominal_lengths(prediction.pose[rows])),
+        ("its tension [N]", prediction.found.tension[rows] / problem.robot.falls),
+        ("reeled in ← last move [mm] → paid out", 1e3 * length_changes(problem, rows)),
+        *_time(problem, rows),
     ]
 
 
-def _of_readings(problem: Problem, raw: Array, change: Array, prediction: Prediction) -> Wall:
+def _of_readings(
+    problem: Problem, raw: Array, change: Array, prediction: Prediction, rows: NDArray[np.int64]
+) -> Wall:
     """Where the pose was read in part: its readings against place and time."""
     kept = np.flatnonzero(problem.counted[:, :6].any(axis=0)).tolist()
     factor = np.repeat([KINDS[0].factor, KINDS[1].factor], 3)[kept]
     sigma = [problem.sigma.position_m or 0.0, problem.sigma.orientation_rad or 0.0]
-    shown = np.where(problem.counted[:, kept], raw[:, kept], np.nan) * factor
+    shown = np.where(problem.counted[rows][:, kept], raw[:, kept], np.nan) * factor
     part = np.where(np.isfinite(shown), change[:, kept] * factor, np.nan)
     place = travel(problem, prediction).pose[:, :3]
     wide = np.ptp(place[problem.use], axis=0) > 1e-6 * problem.robot.length
-    abscissae = [(f"{'xyz'[k]} [m]", place[:, k]) for k in range(3) if wide[k]]
-    rows, units = [channels(problem)[0][c] for c in kept], [KINDS[c // 3].unit for c in kept]
+    abscissae = [(f"{'xyz'[k]} [m]", place[rows, k]) for k in range(3) if wide[k]]
+    names, units = [channels(problem)[0][c] for c in kept], [KINDS[c // 3].unit for c in kept]
     unit = units[0] if len(set(units)) == 1 else ""
     if not unit:
-        rows = [f"{name} [{unit}]" for name, unit in zip(rows, units, strict=True)]
-    return Wall("Errors of the readings", rows, shown, part, np.repeat(sigma, 3)[kept] * factor,
-                unit, (abscissae + _time(problem))[:4])  # fmt: skip
+        names = [f"{name} [{unit}]" for name, unit in zip(names, units, strict=True)]
+    return Wall("Errors of the readings", names, shown, part, np.repeat(sigma, 3)[kept] * factor,
+                unit, (abscissae + _time(problem, rows))[:4])  # fmt: skip
 
 
-def _time(problem: Problem) -> list[tuple[str, Array]]:
+def _time(problem: Problem, rows: NDArray[np.int64]) -> list[tuple[str, Array]]:
     t_s = problem.data.t_s
     if t_s is None or np.ptp(t_s) == 0.0:
-        return [("row", np.arange(problem.data.n_rows, dtype=float) + 1.0)]
-    return [("time [s]", t_s - t_s.min())]
+        return [("row", np.arange(problem.data.n_rows, dtype=float)[rows] + 1.0)]
+    return [("time [s]", t_s[rows] - t_s.min())]
 
 
-def length_changes(problem: Problem, prediction: Prediction) -> Array:
-    """Commanded change of each cable's length (n, m) [m] since the row before in its run.
+def length_changes(problem: Problem, rows: NDArray[np.int64]) -> Array:
+    """Commanded change of each cable's length (k, m) [m] since the row before in its run.
 
     NaN for the first row of a run: its long way from the reference pose would hide the others.
     """
-    first = problem.experiment.commands.starts
-    lengths = problem.experiment.commands.lengths
-    if lengths is None:
-        lengths = problem.robot.nominal_lengths(travel(problem, prediction).pose)
-    before = np.concatenate([lengths[:1], lengths[:-1]])
-    return np.asarray(np.where(first[:, None], np.nan, lengths - before))
+    commands, robot = problem.experiment.commands, problem.robot
+    first = commands.starts[rows]
+
+    def at(some: NDArray[np.int64]) -> Array:
+        given = commands.lengths
+        return robot.nominal_lengths(commands.pose[some]) if given is None else given[some]
+
+    return np.asarray(np.where(first[:, None], np.nan, at(rows) - at(np.maximum(rows - 1, 0))))
 
 
 def wall_section(

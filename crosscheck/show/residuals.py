@@ -94,8 +94,10 @@ class Misfit:
     @cached_property
     def _power(self) -> Array:
         """(n,) sum of squares of each row's errors that count, in units of the noise."""
-        power = np.bincount(self.problem.row_of, self.first.white**2, self.problem.data.n_rows)
-        return np.asarray(power, float)
+        power = np.zeros(self.problem.data.n_rows)
+        for errors, some in zip(self.first.table.T, self.problem.counted.T, strict=True):
+            power += np.where(some, errors, 0.0) ** 2
+        return power
 
     @property
     def place(self) -> Array:

@@ -6,8 +6,9 @@ And the texts and workbooks that such cells are in.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import date, datetime, time
+from itertools import chain
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -60,29 +61,49 @@ def decimals(cell: str) -> int:
     return len(mantissa.partition(".")[2]) - int(power or 0)
 
 
+def _marked(columns: Sequence[Iterable[str]]) -> Iterator[str]:
+    """The cells with a point or a comma."""
+    for cell in chain.from_iterable(columns):
+        if "," in cell or "." in cell:
+            yield plain_sign(cell)
+
+
+def _has_point(cell: str) -> bool:
+    """Whether a cell is a number with a decimal point, whatever others are."""
+    if _POINT.fullmatch(cell):
+        return not _EITHER.fullmatch(cell)
+    grouped = "," in cell and ("." in cell or cell.count(",") > 1)
+    return grouped and _GROUPED[","].fullmatch(cell) is not None
+
+
+def _has_comma(cell: str) -> bool:
+    """Whether a cell is a number with a decimal comma, whatever others are."""
+    if _COMMA.fullmatch(cell):
+        return not _EITHER.fullmatch(cell)
+    grouped = "." in cell and ("," in cell or cell.count(".") > 1)
+    return grouped and _GROUPED[r"\."].fullmatch(cell) is not None
+
+
 class Style:
     """How a file writes numbers: with decimal points or commas, with marks between thousands.
 
     Args:
-        cells: of all columns of numbers. comma: whether a comma can be in a cell without quotation
-            marks, because it is not what separates cells: then it may be decimal.
+        columns: of numbers. comma: whether a comma can be in a cell without quotation marks,
+            because it is not what separates cells: then it may be decimal.
     """
 
-    def __init__(self, cells: Iterable[str], comma: bool) -> None:
-        marked = {cell for cell in map(plain_sign, cells) if "," in cell or "." in cell}
-        points = {cell for cell in marked if _POINT.fullmatch(cell) and not _EITHER.fullmatch(cell)}
-        commas = {cell for cell in marked if _COMMA.fullmatch(cell) and not _EITHER.fullmatch(cell)}
-        points |= {cell for cell in marked if "," in cell and _GROUPED[","].fullmatch(cell)
-                   and ("." in cell or cell.count(",") > 1)}  # fmt: skip
-        commas |= {cell for cell in marked if "." in cell and _GROUPED[r"\."].fullmatch(cell)
-                   and ("," in cell or cell.count(".") > 1)}  # fmt: skip
-        either = sorted(cell for cell in marked if _EITHER.fullmatch(cell))
-        with_comma = [cell for cell in either if "," in cell]
+    def __init__(self, columns: Sequence[Iterable[str]], comma: bool) -> None:
+        self.grouped = self.unsure = ""
         # A file has one kind of decimal mark. Without commas a point is decimal, as ever.
-        self.comma = comma and not points and (bool(commas) or bool(with_comma))
-        # only groups of three behind one comma: nothing tells thousands from decimals
-        self.unsure = with_comma[0] if self.comma and not commas else ""
-        self.grouped = ""
+        self.comma = comma and not any(map(_has_point, _marked(columns)))
+        if self.comma:
+            commas = any(map(_has_comma, _marked(columns)))
+            either = min(
+                (c for c in _marked(columns) if "," in c and _EITHER.fullmatch(c)), default=""
+            )
+            self.comma = commas or bool(either)
+            # only groups of three behind one comma: nothing tells thousands from decimals
+            self.unsure = either if not commas else ""
 
     def plain(self, cell: str) -> str:
         """The cell as a number with a decimal point and nothing else; as it is if it is none."""

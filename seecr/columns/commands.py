@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.columns.csv import Table, read_table, show
+from seecr.columns.csv import Table, Texts, read_table, show
 from seecr.columns.headers import columns_said, renamed
 from seecr.columns.known import ANGLES, POSITION, QUATERNION, Columns, know_columns
 from seecr.columns.plausible import check_commands
@@ -200,7 +200,7 @@ def runs(columns: Columns) -> NDArray[np.str_]:
         if last_row.get(name, row - 1) != row - 1:
             raise _run_came_back(columns, name, last_row[name], row)
         last_row[name] = row
-    return np.array(names, dtype=np.str_)
+    return np.array(list(names), dtype=np.str_)
 
 
 def _run_came_back(columns: Columns, name: str, last: int, row: int) -> InputFileError:
@@ -301,7 +301,7 @@ def _moment(table: Table, index: int, row: int) -> datetime:
         raise table.error(text, row=row, column=table.names[index]) from None
 
 
-def _shown(cells: Sequence[str], t_s: Array, row: int, of_day: bool) -> str:
+def _shown(cells: Texts, t_s: Array, row: int, of_day: bool) -> str:
     return cells[row] if of_day else f"{t_s[row]:.9g} s"
 
 

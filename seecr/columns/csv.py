@@ -6,13 +6,13 @@ This module does not know what a column means. Errors name the line and column o
 from __future__ import annotations
 
 import csv
-import io
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain, islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,8 @@ _MOST_CELLS = 3
 # Most characters of a title that are shown.
 _MOST_TITLE = 40
 _NUMBER = re.compile(r"[-+]?[\d.,]+([eE][-+]?\d+)?")
+# A line with its end, whichever of the three that is.
+_LINE = re.compile(r"[^\r\n]*(?:\r\n?|\n)|[^\r\n]+")
 _MEANS = re.compile("mean|average|avg|mittel|durchschnitt|moyenne", re.IGNORECASE)
 
 _PARQUET_MAGIC = b"PAR1"
@@ -49,6 +51,14 @@ _TEXT_BEGINNINGS = {"{": "JSON", "[": "JSON or TOML", "<": "XML, such as a robot
 VICON = ("segments", "trajectories", "devices", "joints", "model outputs")
 _QUALISYS = "no_of_frames"
 _SEPARATORS = (",", ";", "\t")
+
+
+TEXT = np.dtypes.StringDType()
+"""The type of columns of texts."""
+
+Texts: TypeAlias = Sequence[str] | NDArray[Any]
+# Rows at a time that are lists of texts.
+_PIECE = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +70,9 @@ class Table:
         names: of the columns, stripped, as in the header.
         line: (n,) line at which each row begins, counted from 1.
         header_line: line of the header; None if the file has no lines.
-        cells: for each column the stripped texts, (n,) each; numbers with decimal points.
+        cells: for each column the stripped texts, (n,) each; numbers with decimal points. Read from
+            a file they are arrays of NumPy's strings, of 16 bytes a cell where a list of Python's
+            has 70.
         word: how people count in it: "line", or "row" of a workbook.
         notes: sentences for the reader: what was left out or understood.
     """
@@ -69,7 +81,7 @@ class Table:
     names: tuple[str, ...]
     line: NDArray[np.int64]
     header_line: int | None
-    cells: Sequence[Sequence[str]]
+    cells: Sequence[Texts]
     word: str = "line"
     notes: tuple[str, ...] = ()
     _seen: dict[tuple[int, bool], Array] = field(default_factory=dict)
@@ -95,7 +107,7 @@ class Table:
     def _numbers(self, index: int, blank_is_nan: bool) -> Array:
         cells = self.cells[index]
         try:  # most columns hold nothing else
-            values = np.array(list(map(float, cells)))
+            values = np.fromiter(map(float, cells), float, len(cells))
             if np.all(np.abs(values) <= LARGEST) and "_" not in "".join(cells):
                 return values
         except ValueError:
@@ -112,7 +124,7 @@ class Table:
             raise self._faults(index, cells, blank_is_nan)
         return values
 
-    def _faults(self, index: int, cells: Sequence[str], blank_is_nan: bool) -> InputFileError:
+    def _faults(self, index: int, cells: Texts, blank_is_nan: bool) -> InputFileError:
         name = self.names[index]
         faults = [(row, text) for row, cell in enumerate(cells)
                   if (text := fault_of(cell, blank_is_nan))]  # fmt: skip
@@ -167,27 +179,35 @@ def read_table(path: Path) -> Table:
         titles, said = _titles(((number, cells) for number, cells in rows), "row")
         return _of_rows(path, rows[titles:], ";", "row", said)
     text, notes = decoded(path, data, EXPECTED_FILE)
+    del data  # of a million rows more than 100 MB
     return _read_csv(path, text, notes)
 
 
 def _read_csv(path: Path, text: str, notes: list[str]) -> Table:
-    numbered = [
-        (number, line)
-        for number, line in enumerate(io.StringIO(text, newline=""), start=1)
-        if line.strip() and not (line.lstrip()[0] == "#" and is_comment(line))
-    ]
+    first = next(_content(text), None)
     # so Excel says what separates the cells below
-    said = re.fullmatch(r'"?sep=(.)"?', numbered[0][1].strip()) if numbered else None
-    numbered = numbered[1:] if said else numbered
-    if not numbered:
+    said = re.fullmatch(r'"?sep=(.)"?', first[1].strip()) if first else None
+    begin = 1 if said else 0
+    first = next(islice(_content(text), begin, None), None)
+    if first is None:
         raise InputFileError.at(path, f"is empty; {EXPECTED_FILE}")
-    _check_first_line(path, *numbered[0])
+    _check_first_line(path, *first)
     split = said[1] if said else "[,;\t]"
-    titles, above = _titles(((number, re.split(split, line)) for number, line in numbered), "line")
-    numbered = numbered[titles:]
-    separator = said[1] if said else _separator(path, *numbered[0])
-    rows = _csv_rows(path, numbered, separator)
+    lines = islice(_content(text), begin, None)
+    titles, above = _titles(((number, re.split(split, line)) for number, line in lines), "line")
+    begin += titles
+    header = next(islice(_content(text), begin, None))
+    separator = said[1] if said else _separator(path, *header)
+    rows = _csv_rows(path, islice(_content(text), begin, None), separator)
     return _of_rows(path, rows, separator, "line", [*notes, *above])
+
+
+def _content(text: str) -> Iterator[tuple[int, str]]:
+    """The lines with something in them that is no comment, with their numbers and their ends."""
+    for number, match in enumerate(_LINE.finditer(text), start=1):
+        line = match[0]
+        if line.strip() and not (line.lstrip()[0] == "#" and is_comment(line)):
+            yield number, line
 
 
 def _titles(rows: Iterable[tuple[int, Sequence[str]]], word: str) -> tuple[int, list[str]]:
@@ -208,40 +228,104 @@ def _titles(rows: Iterable[tuple[int, Sequence[str]]], word: str) -> tuple[int, 
 
 
 def _of_rows(
-    path: Path, rows: list[tuple[int, list[str]]], separator: str, word: str, notes: Sequence[str]
+    path: Path,
+    rows: Iterable[tuple[int, list[str]]],
+    separator: str,
+    word: str,
+    notes: Sequence[str],
 ) -> Table:
     """The table of rows with their lines, the header first; those without any text are none."""
-    stripped = [(line, [cell.strip() for cell in row]) for line, row in rows]
-    stripped = [(line, row) for line, row in stripped if any(row)]
-    if not stripped:
+    stripped = ((line, [cell.strip() for cell in row]) for line, row in rows)
+    filled: Iterator[tuple[int, list[str]]] = (pair for pair in stripped if any(pair[1]))
+    first = next(filled, None)
+    if first is None:
         raise InputFileError.at(path, f"is empty; {EXPECTED_FILE}")
-    if names := numbered_headers(stripped[0][1]):
-        stripped = [(stripped[0][0], names), *stripped]
-    (header_line, header), *body = stripped
-    while not header[-1] and not any(any(row[len(header) - 1 :]) for _, row in body):
-        header = header[:-1]  # spreadsheets write separators for columns that are empty
-    body = [(line, _trimmed(row, len(header))) for line, row in body]
-    _check_cell_counts(path, header_line, header, body, word)
-    body, left_out = _without_statistics(header, body, word)
-    if not body:
+    header_line, header = first
+    if names := numbered_headers(header):
+        header, filled = names, chain([first], filled)
+    grid = _Grid.of(filled, header)
+    header = header[: grid.width(header)]
+    _check_cell_counts(path, header_line, header, grid, word)
+    cells, lines = grid.cells[: len(header)], grid.lines
+    end, left_out = _without_statistics(header, cells, lines, word)
+    if end == 0:
         text = "has a header but no rows; expected one row per resting pose"
         raise InputFileError.at(path, text, line=header_line, line_word=word)
-    cells = [list(column) for column in zip(*(row for _, row in body), strict=True)]
-    cells, said = _plain_numbers(header, cells, separator)
-    lines = np.array([line for line, _ in body])
+    cells = [column[:end] for column in cells]
+    said = _plain_numbers(header, cells, separator)
     notes = (*notes, *left_out, *said)
-    return Table(path, tuple(header), lines, header_line, cells, word, notes)
+    return Table(path, tuple(header), lines[:end], header_line, cells, word, notes)
 
 
-def _trimmed(row: list[str], width: int) -> list[str]:
-    """A row without empty cells beyond the header's."""
-    return row[:width] if len(row) > width and not any(row[width:]) else row
+@dataclass(frozen=True)
+class _Odd:
+    """A row with another number of cells than the header, or with the header's.
+
+    Attributes:
+        line: where it is. count: of its cells. filled: the same without empty ones at its end.
+        again: whether it is the header.
+    """
+
+    line: int
+    count: int
+    filled: int
+    again: bool
 
 
-def _plain_numbers(
-    names: list[str], cells: list[list[str]], separator: str
-) -> tuple[list[list[str]], list[str]]:
-    """Cells whose numbers have decimal points and nothing else, and notes about them.
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """Cells by column, as many as the header has, and what is odd about rows.
+
+    A million rows as lists of texts would take gigabytes.
+    """
+
+    lines: NDArray[np.int64]
+    cells: list[NDArray[Any]]
+    odd: list[_Odd]
+
+    @classmethod
+    def of(cls, rows: Iterable[tuple[int, list[str]]], header: Sequence[str]) -> _Grid:
+        """The grid of rows with their lines; what is beyond the header is not kept."""
+        width, title = len(header), _bare(header)
+        lines, odd = list[NDArray[np.int64]](), list[_Odd]()
+        pieces: list[list[NDArray[Any]]] = [[] for _ in header]
+        rows = iter(rows)
+        while some := list(islice(rows, _PIECE)):
+            for line, row in some:
+                again = row[0] == header[0] and _bare(row) == title
+                if again or len(row) != width:
+                    odd.append(_Odd(line, len(row), len(_bare(row)), again))
+                    row[width:] = [""] * max(width - len(row), 0)
+            lines.append(np.array([line for line, _row in some]))
+            columns = zip(*(row for _line, row in some), strict=True)
+            for piece, column in zip(pieces, columns, strict=True):
+                piece.append(np.array(column, dtype=TEXT))
+        cells = []
+        while pieces:
+            cells.append(np.concatenate(pieces.pop(0) or [np.array([], dtype=TEXT)]))
+        return cls(np.concatenate(lines) if lines else np.zeros(0, dtype=np.int64), cells, odd)
+
+    def width(self, header: Sequence[str]) -> int:
+        """Columns without those at the end that have neither a name nor a cell.
+
+        Spreadsheets write separators for columns that are empty.
+        """
+        out, most = len(header), max((row.filled for row in self.odd), default=0)
+        while not header[out - 1] and most < out and not np.any(self.cells[out - 1] != ""):
+            out -= 1
+        return out
+
+
+def _bare(row: Sequence[str]) -> Sequence[str]:
+    """A row without empty cells at its end."""
+    end = len(row)
+    while end and not row[end - 1]:
+        end -= 1
+    return row[:end]
+
+
+def _plain_numbers(names: list[str], cells: list[NDArray[Any]], separator: str) -> list[str]:
+    """Give numbers decimal points and nothing else, in place; notes about them.
 
     Columns without numbers are left as they are: a run's name may be 1.5.
     """
@@ -249,34 +333,36 @@ def _plain_numbers(
     # a file has one style, so columns that are ours show it, if there are any
     ours = [k for k in which if QUANTITY.fullmatch(spelled(names[k]))] or which
     odd = {k for k in which if not OF_NUMBERS.fullmatch("".join(cells[k]))}
-    style = Style((cell for k in ours for cell in cells[k] if odd), comma=separator != ",")
+    style = Style([cells[k] for k in ours] if odd else [], comma=separator != ",")
     for k in which if style.comma else odd:
-        cells[k] = [style.plain(cell) for cell in cells[k]]
-    return cells, style.notes()
+        cells[k] = np.array([style.plain(cell) for cell in cells[k]], dtype=TEXT)
+    return style.notes()
 
 
 def _without_statistics(
-    names: list[str], body: list[tuple[int, list[str]]], word: str
-) -> tuple[list[tuple[int, list[str]]], list[str]]:
-    """The rows without those below them that are computed from them, and a note.
+    names: list[str], cells: list[NDArray[Any]], lines: NDArray[np.int64], word: str
+) -> tuple[int, list[str]]:
+    """How many rows there are without those below that are computed from them, and a note.
 
     Such a row begins with a word for it. As the name of a run that word counts only where the row
     has no whole command, or where it is a mean.
     """
+
+    def row_at(k: int) -> list[str]:
+        return [column[k] for column in cells]
+
     commands = [k for k, name in enumerate(names) if spelled(name).startswith(("cmd_", "length_"))]
-    end = len(body)
-    while end and (said := is_statistic(body[end - 1][1])):
-        row = body[end - 1][1]
+    end = len(lines)
+    while end and (said := is_statistic(row := row_at(end - 1))):
         named = spelled(names[row.index(said)]) == "run"
         if named and all(row[k] for k in commands) and not _MEANS.match(said):
             break
         end -= 1
-    if end == len(body):
-        return body, []
-    named_rows = [f"{line} ({is_statistic(row)})" for line, row in body[end:]]
-    noun = plural(len(named_rows), word)
-    text = f"Left out: {noun} {some(named_rows, 8)}, computed from the other rows."
-    return body[:end], [text]
+    if end == len(lines):
+        return end, []
+    left = [f"{lines[k]} ({is_statistic(row_at(k))})" for k in range(end, len(lines))]
+    noun = plural(len(left), word)
+    return end, [f"Left out: {noun} {some(left, 8)}, computed from the other rows."]
 
 
 def _check_first_line(path: Path, number: int, line: str) -> None:
@@ -304,43 +390,48 @@ def _separator(path: Path, number: int, line: str) -> str:
 
 
 def _csv_rows(
-    path: Path, numbered: list[tuple[int, str]], separator: str
-) -> list[tuple[int, list[str]]]:
-    lines = (line for _, line in numbered)
-    reader = csv.reader(lines, delimiter=separator, strict=True, skipinitialspace=separator != "\t")
-    rows, first = [], 0
+    path: Path, numbered: Iterable[tuple[int, str]], separator: str
+) -> Iterator[tuple[int, list[str]]]:
+    """Rows of cells, each with its first line."""
+    begun: list[int] = []  # lines of the row that is being read
+
+    def lines() -> Iterator[str]:
+        for number, line in numbered:
+            begun.append(number)
+            yield line
+
+    blanks = separator != "\t"
     try:
-        for row in reader:
-            rows.append((numbered[first][0], row))
-            first = reader.line_num
+        for row in csv.reader(lines(), delimiter=separator, strict=True, skipinitialspace=blanks):
+            yield begun[0], row
+            begun.clear()
     except csv.Error as error:
         text = f"cannot be split into cells: {error}; look for a quotation mark without its partner"
-        raise InputFileError.at(path, text, line=numbered[first][0]) from None
-    return rows
+        raise InputFileError.at(path, text, line=begun[0]) from None
 
 
 def _check_cell_counts(
-    path: Path, header_line: int, header: list[str], body: list[tuple[int, list[str]]], word: str
+    path: Path, header_line: int, header: list[str], grid: _Grid, word: str
 ) -> None:
     n_columns, faults = len(header), list[tuple[int, str]]()
-    for line, row in body:
-        if row == header:
+    for row in grid.odd:
+        if row.again:
             text = f"expected a row of cells, got the header ({word} {header_line}) again; are two "
             text += "files in one? Give them one at a time"
-            faults.append((line, text))
-        elif len(row) != n_columns:
+            faults.append((row.line, text))
+        elif row.count < n_columns or row.filled > n_columns:
             text = (
                 f"expected {counted(n_columns, 'cell')} as in the header ({word} {header_line}), "
-                f"got {counted(len(row), 'cell')}"
+                f"got {counted(row.count, 'cell')}"
             )
-            if line == body[-1][0] and len(row) < n_columns:
+            if row.line == grid.lines[-1] and row.count < n_columns:
                 text += "; it is the last line: is the file cut off?"
-            if len(row) > n_columns:
+            if row.count > n_columns:
                 text += (
                     "; a decimal comma splits a number in two: write 1.5, not 1,5, or put "
                     "semicolons between cells"
                 )
-            faults.append((line, text))
+            faults.append((row.line, text))
     if faults:
         raise _first_few(path, faults, None, word)
 
@@ -359,7 +450,7 @@ def _read_parquet(path: Path) -> Table:
         content = parquet.read_table(path)
         names = tuple(name.strip() for name in content.column_names)
         cells = [
-            ["" if value is None else str(value).strip() for value in column.to_pylist()]
+            np.array(["" if v is None else str(v).strip() for v in column.to_pylist()], dtype=TEXT)
             for column in content.columns
         ]
     except UnicodeDecodeError as error:

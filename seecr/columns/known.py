@@ -213,8 +213,10 @@ class Columns:
 
     def readings(self, prefix: str, parts: Sequence[str]) -> Array:
         """Columns ``prefix_part`` (n, k) in SI units; NaN for a missing column or an empty cell."""
-        values = np.full((self.n_rows, len(parts)), np.nan)
         there = [k for k, part in enumerate(parts) if f"{prefix}_{part}" in self.known]
+        if not there:  # one number, shown so many times
+            return np.broadcast_to(np.nan, (self.n_rows, len(parts)))
+        values = np.full((self.n_rows, len(parts)), np.nan)
         quantities = [f"{prefix}_{parts[k]}" for k in there]
         values[:, there] = self.all_numbers(quantities, blank_is_nan=True)
         for k, part in enumerate(parts):

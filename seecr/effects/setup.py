@@ -58,9 +58,14 @@ class Quantity:
         return tuple(sizes[size] if isinstance(size, str) else size for size in self.shape)
 
     def plain_of(self, robot: Robot, rows: int) -> Any:
-        """The plain value: an array, or a number where there is one for all."""
+        """The plain value: an array, or a number where there is one for all.
+
+        Arrays of all rows are the value of one of them, shown so many times, and cannot be written.
+        """
         value = getattr(robot, self.plain) if isinstance(self.plain, str) else self.plain
         shape = self.shape_of(robot, rows)
+        if "rows" in self.shape:
+            return np.broadcast_to(np.asarray(value, float), shape)
         return np.array(np.broadcast_to(value, shape), float, order="C") if shape else float(value)
 
 
@@ -324,7 +329,8 @@ def plain_setup(robot: Robot, commands: Commands, wrench: Array | None = None) -
     """
     n = len(commands)
     plain = _plain_values(robot, n)
-    setup = Setup(robot, commands, **{name: copy(value) for name, value in plain.items()})
+    own = {k: v if "rows" in QUANTITIES[k].shape else copy(v) for k, v in plain.items()}
+    setup = Setup(robot, commands, **own)
     if commands.loads is not None:
         setup.wrench = commands.loads.wrench.copy()
     if wrench is not None:

@@ -336,8 +336,9 @@ def test_without_pretension_any_cable_tells() -> None:
 
 def test_where_cables_pull_against_each_other_their_resultant_says_nothing() -> None:
     """Two rows: a load of a tenth of the tensions, and one of a hundredth."""
+    matrix = np.array([[1.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
     pulls = Pulls(
-        matrix=np.tile([[1.0, -1.0, 0.0], [0.0, 0.0, 1.0]], (2, 1, 1)),
+        matrix=lambda rows: np.tile(matrix, (len(rows), 1, 1)),
         measured=np.array([[5.0, 5.0, 2.2], [5.0, 5.0, 0.2]]),
         expected=np.array([[5.0, 5.0, 1.1], [5.0, 5.0, 0.1]]),
         whole=np.ones(2, bool),
