@@ -68,7 +68,9 @@ class LazyGroup(click.Group):
         name, command, words = super().resolve_command(ctx, args)
         _refuse_empty(words, ctx)
         if command is not None:
-            _refuse_repeated(words, command, click.Context(command, ctx, name))
+            own = click.Context(command, ctx, name)
+            _refuse_taken(words, command, own)
+            _refuse_repeated(words, command, own)
         return name, command, words
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -110,6 +112,8 @@ class LazyGroup(click.Group):
         except SeecrError as error:
             sys.exit(self._refuse(str(error), error.exit_status))
         except SystemExit as done:
+            if done.code == _ENDED:
+                self._refuse("ended by SIGTERM")
             # click ends 1 when whoever read our output has left; here 1 means something else
             sys.exit(_CUT_OFF if done.code == 1 else done.code)
         except OSError as error:
@@ -162,6 +166,16 @@ def _refuse_empty(words: list[str], ctx: click.Context) -> None:
         if not word.strip():
             where = f"{before}: " if before.startswith("-") else ""
             raise click.UsageError(f"{where}expected a value, got an empty one; leave it out", ctx)
+
+
+def _refuse_taken(words: list[str], command: click.Command, ctx: click.Context) -> None:
+    """Refuse an option too few values, before click takes the options after it for values."""
+    options = {o: one for one in command.params if isinstance(one, click.Option) for o in one.opts}
+    for k, word in enumerate(words):
+        one = options.get(word)
+        for value in [] if one is None or one.is_flag else words[k + 1 : k + 1 + one.nargs]:
+            if one is not None and value in options:
+                raise click.UsageError(f"{word}: expected {one.metavar}, got {value}", ctx)
 
 
 def _refuse_repeated(words: list[str], command: click.Command, ctx: click.Context) -> None:

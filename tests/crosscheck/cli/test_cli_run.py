@@ -309,5 +309,5 @@ def test_a_run_that_is_ended_leaves_nothing_unfinished(tmp_path):
             time.sleep(0.01)
         process.terminate()
         _out, said = process.communicate()
-    assert process.returncode == 143, said
+    assert process.returncode == 143 and said == "crosscheck: ended by SIGTERM\n", said
     assert not list(tmp_path.rglob("*.unfinished*")) and not list(tmp_path.rglob(".*"))

@@ -44,6 +44,10 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("sweep demobot_cogiro --grid 0:1 0 0", "--grid: expected FIRST:LAST:"),
         ("sweep demobot_cogiro --grid 0:1:0 0 0", "a count above zero"),
         ("map cogiro_large -x:1:2", "No such option"),
+        # click took the options after it for its values, and then complained of "out"
+        ("map demobot_cogiro --grid 21 --parts --out out",
+         "--grid: expected X Y Z, got --parts (see seecr map --help)"),
+        ("map demobot_cogiro --model --out out", "--model: expected M.toml, got --out"),
         ("pose demobot_parallel 0.4 0.25 nan", "Z: expected metres, in the range of"),
         ("pose demobot_parallel 1e300 0 1", "got 1e+300"),
         ("pose demobot_parallel 0.4 0.25 0.1 --cable 1e300",
