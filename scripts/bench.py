@@ -97,8 +97,28 @@ compiled yet. The data are those of `crosscheck twin demobot_cogiro --hide 7`, 1
 
 Two thirds of `pose` are the loading of NumPy, Numba, MuJoCo and of what is compiled. More than half
 of `compare` is the loading of these with SciPy, Matplotlib and Rerun, and a third is the drawing of
-its figures. Most of a first diagnosis is compilation: LLVM takes six tenths of that, and what Numba
-does before, in Python, the rest.
+its figures. Most of a first diagnosis is compilation, 28 s when it was last taken apart: LLVM takes
+12 s, and what Numba does before, in Python, the rest. 10 s are the descent with its equilibria in
+order, 6 s the law of a cable, 4 s the margins of the 46 poses of the advice, 3 s the change of a
+path, and the rest some forty small functions.
+
+A function is compiled by itself and again in all that call it, down to each function that Python
+calls. So the descent is part of one function only, the law of a cable is called by its address, and
+NumPy makes the scratch arrays. What was tried and left:
+
+* **Shipping what is compiled.** The cache of a diagnosis is 6 MB, and works from another place. But
+  an entry counts for one minor version of Python, one release of Numba, one name of processor with
+  its features, and one state of the source: its time and size, in Numba 0.68 its contents. A wheel
+  would need one for each, and with the next release of Numba none would count. For a common
+  processor it could only be compiled by a setting of the whole process, which holds for users' own
+  functions too: with `NUMBA_CPU_NAME=x86-64-v3` a descent takes 1.2 times as long, and lanes 1.2;
+  with `generic` up to 1.3, and 1.9. `numba.pycc` is to be removed, and Python alone can call what
+  it compiles. In an image of a container, one diagnosis while it is built does the same.
+* **Less effort of LLVM for what is seldom called.** Numba has it for all functions (`NUMBA_OPT`);
+  for one function there are only private options.
+* **SciPy's linear programs for few margins.** They compile nothing, but HiGHS allows 1e-7 of
+  infeasibility, where ours are right to 1e-12; so the answer at a limit would depend on how many
+  poses are asked for.
 """
 # Commands whose start is measured, by what the page calls them; DIR has what `twin` wrote.
 STARTS = {

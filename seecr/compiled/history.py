@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from seecr.compiled.algebra import copy_rows, copy_vector
@@ -140,7 +142,7 @@ def solve_rows(
     cables, load, poses, screws, starts, start_values, length, scale, radius, reach, limit, staged,
     in_order, fresh, onward, enough, elapsed, outcome, count, residual, gradient, hessian, states,
     slopes, deviation, values, guess,
-):  # fmt: skip
+) -> None:  # fmt: skip
     """Solve poses, each from its own start, or waypoints in order; all outputs are filled.
 
     Independent poses are all ``fresh``. A waypoint that is not starts from the one before; its
@@ -286,7 +288,7 @@ def _stands_still(poses, load, k):
     return k > 0 and not (differ(poses[k], poses[k - 1]) or differ(load[k], load[k - 1]))
 
 
-def space_of_way(screws, m, d):
+def space_of_way(screws: Any, m: int, d: int) -> tuple[Any, ...]:
     """Scratch arrays of change_on_the_way: of the sides ahead and behind, their displacements and
     what is added to these, and for the wrench.
     """

@@ -8,6 +8,7 @@ Nothing is solved; columns OF_THE_PAST are fixed.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -66,7 +67,7 @@ from seecr.compiled.joint_kinematics import (
 # of seecr.compiled.cable.cable_pull. Nothing is solved, so no stiffness is assembled.
 
 
-def change_space(screws):
+def change_space(screws: Any) -> tuple[Any, ...]:
     """Scratch arrays of a batch. NumPy makes them: what creates arrays takes longer to compile."""
     joints = screws.shape[1]
     return (

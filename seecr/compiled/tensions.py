@@ -9,6 +9,7 @@ artificial functions and ends after a few pivots.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -179,7 +180,7 @@ def _largest_least(a, b, scale, basis, answer, system, right, weights, change):
 _BLOCK = 64
 
 
-def _space(d, m, n_loads):
+def _space(n_loads: int, d: int, m: int) -> tuple[Any, ...]:
     """Scratch arrays for any number of poses, made by NumPy: so nothing compiled creates any.
 
     Those of _margin, of _again, the limits (k, m) that a neighbour reached, and those of poses.
@@ -285,12 +286,12 @@ def _least_margin(matrix, loads, low, high, scale, space):
     return least
 
 
-def margins_of(matrices, loads, low, high, scale, out):
+def margins_of(matrices, loads, low, high, scale, out) -> None:
     """Margins (n,) of matrices (n, d, m) and loads (n, k, d): the smallest over k loads.
 
     Limits (n, m) and scales (n,) are of each, or have one row for all.
     """
-    space = _space(*matrices.shape[1:], loads.shape[1])
+    space = _space(loads.shape[1], *matrices.shape[1:])
     _margins_of(matrices, loads, low, high, scale, out, space)
 
 
@@ -303,12 +304,12 @@ def _margins_of(matrices, loads, low, high, scale, out, space):
         out[r] = _least_margin(matrices[r], loads[r], low[row], high[row], scale[of], space)
 
 
-def innermost_of(matrices, loads, low, high, scale, out, tensions):
+def innermost_of(matrices, loads, low, high, scale, out, tensions) -> None:
     """Margins of one load (n, d) and limits (n, m) each, and tensions (n, m) farthest inside.
 
     Tensions are nan if the margin is not finite.
     """
-    space = _space(*matrices.shape[1:], 1)
+    space = _space(1, *matrices.shape[1:])
     _innermost_of(matrices, loads, low, high, scale, out, tensions, space)
 
 
@@ -323,9 +324,11 @@ def _innermost_of(matrices, loads, low, high, scale, out, tensions, space):
                 tensions[r, i] += null[i, k] * answer[k]
 
 
-def margins_at(poses, exits, anchors, centre, weight, wrenches, low, high, length, scale, out):
+def margins_at(
+    poses, exits, anchors, centre, weight, wrenches, low, high, length, scale, out
+) -> None:
     """Margins (n,) of a free platform at poses (n, 7); wrenches (k, 6) add to its weight."""
-    space = _space(6, len(exits), len(wrenches))
+    space = _space(len(wrenches), 6, len(exits))
     _margins_at(
         poses, exits, anchors, centre, weight, wrenches, low, high, length, scale, out, space
     )
