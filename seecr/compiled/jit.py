@@ -12,7 +12,7 @@ from llvmlite.binding import add_symbol
 from numba import carray as carray  # type: ignore[attr-defined]
 from numba import config, njit, types
 from numba.core import event
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.ccallback import CFunc
 from numba.core.runtime.nrt import rtsys
 
@@ -37,11 +37,18 @@ class _Cache(FunctionCache):
     """What was compiled, on disk. On a full disk, or from a damaged file, it is compiled anew.
 
     A function is compiled with all that it calls, but Numba compares its own file only: of a new
-    release it would run old parts where that file is the same. So all files count here.
+    release it would run old parts where that file is the same. So all files count here, in the
+    names of what is kept: Numba writes its index before what that tells of, and a process that
+    starts meanwhile would load what an older release left under the same name.
     """
 
-    def _index_key(self, sig: Any, codegen: Any) -> Any:
-        return *super()._index_key(sig, codegen), _SOURCES  # type: ignore[no-untyped-call]
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)  # type: ignore[no-untyped-call]
+        self._cache_file = IndexDataCacheFile(  # type: ignore[no-untyped-call]
+            cache_path=self._cache_path,
+            filename_base=f"{self._impl.filename_base}-{_SOURCES[:16]}",
+            source_stamp=self._impl.locator.get_source_stamp(),
+        )
 
     @contextmanager
     def _guard_against_spurious_io_errors(self) -> Iterator[None]:
@@ -67,7 +74,7 @@ class _Cache(FunctionCache):
 def _cached(compiled: Any) -> Any:
     """A function of Numba's with a cache, if there is a folder that can be written."""
     with suppress(RuntimeError):  # no folder
-        compiled._cache = _Cache(compiled.__wrapped__)  # type: ignore[no-untyped-call]
+        compiled._cache = _Cache(compiled.__wrapped__)
     return compiled
 
 
