@@ -199,14 +199,21 @@ class Commands:
 
         Zero for passive lines.
         """
-        if not self._kept or self._kept[0][0] is not robot:
-            change = robot.nominal_lengths(self.pose) - robot.reference_lengths
-            change[:, ~robot.driven] = 0.0  # nothing is paid out for passive lines
+        if self._kept and self._kept[0][0] is robot:
+            return self._kept[0][1]
+        change = robot.nominal_lengths(self.pose)
+        change -= robot.reference_lengths
+        change[:, ~robot.driven] = 0.0  # nothing is paid out for passive lines
+        if len(self) <= _MOST_KEPT:
             self._kept[:] = [(robot, change)]
-        return self._kept[0][1]
+        return change
 
     # for the last robot asked for, since every trial of a fit asks again
     _kept: list[tuple[Robot, Array]] = field(default_factory=list, repr=False, init=False)
+
+
+# Fits have no more rows than this, and of more the changes of length take much memory.
+_MOST_KEPT = 10_000
 
 
 def play(

@@ -269,7 +269,9 @@ def _binned(quantity: Abscissa, some: NDArray[np.bool_]) -> tuple[NDArray[np.int
         edges = rising[1:][steps]
     else:
         count = int(min(_BINS, max(2, len(rising) // _IN_A_BIN)))
-        edges = np.unique(np.quantile(rising, np.linspace(0, 1, count + 1)[1:-1]))
+        below, part = np.divmod(np.linspace(0, len(rising) - 1, count + 1)[1:-1], 1.0)
+        low, high = (rising[below.astype(int) + k] for k in (0, 1))
+        edges = np.unique(low + part * (high - low))
     cuts = [0, *np.searchsorted(rising, edges).tolist(), len(rising)]
     filled = np.diff(cuts) > 0
     number = np.cumsum(filled) - 1

@@ -224,7 +224,7 @@ class Problem:
     def noise_about(self, by_length: Array | None) -> Array:
         """The same, given the derivative by lengths (n, 6 + m, m); None if lengths are exact."""
         if by_length is None or not self.sigma.length_m:
-            return np.where(self.measured, self.reading_sigma, 1.0)
+            return self.reading_sigma
         own = np.where(self.measured, self.reading_sigma, 1.0)
         rate = np.where(self.measured[:, :, None], by_length * self.length_sigma[:, None], 0.0)
         return noise_factors(own, rate)

@@ -19,7 +19,7 @@ from seecr.statics.tables import PORTION
 pytestmark = pytest.mark.slow
 
 # Bytes of a row at most: 10^6 rows are to fit into 2 GB, of which 0.3 are the programs. A
-# comparison takes 1.30 kB: commands and readings, the problem that is solved and its solution,
+# comparison takes 1.06 kB: commands and readings, the problem that is solved and its solution,
 # residuals and their noise. It was 3.0 kB. A file of 14 columns takes 0.80 kB while it is read,
 # and took 2.5 kB.
 COMPARED, READ = 1500, 1000
