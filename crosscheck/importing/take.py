@@ -83,6 +83,9 @@ def _told_to_move(log: Measurements, moved: float) -> bool:
 _LEAST = 4
 # Number of offsets tried: those at which most commands begin as the platform leaves a rest.
 _MOST = 40
+# Of more commands so many are asked, evenly spaced: pairs of a thousand are a million, and tell as
+# much. Those of 15,000 took 15 GB.
+_MOST_ASKED = 1000
 # Distances that are off by this part of their usual size still match. An offset is accepted if all
 # others are worse by this factor, and no offset is preferred unless it is worse by as much.
 _ALIKE, _CLEAR = 0.2, 1.5
@@ -151,7 +154,7 @@ def find_clock(held: HeldCommands, told: Array, rests: Dwells, least: float = 0.
 
 def _likely(begin: Array, end: Array) -> Array:
     """Offsets [s], zero first, at which many commands begin as a rest ends."""
-    every = np.sort((end[None, :] - begin[1:, None]).ravel())
+    every = np.sort((end[None, :] - begin[1 + _asked(len(begin) - 1), None]).ravel())
     gap = 0.25 * float(np.min(np.diff(begin)))
     votes = np.searchsorted(every, every + gap) - np.searchsorted(every, every - gap)
     found: list[float] = [0.0]
@@ -168,15 +171,22 @@ def _off(told: Array, place: Array, number: NDArray[np.int64]) -> float:
 
     Missing rests count as if their distances were zero.
     """
-    there = number >= 0
-    every = min(len(told), len(place))
-    if there.sum() < _LEAST:
+    if np.sum(number >= 0) < _LEAST:
         return np.inf
+    some = _asked(len(told))
+    every = round(min(len(told), len(place)) * len(some) / len(told))
+    told, number = told[some], number[some]
+    there = number >= 0
     wanted, got = _distances(told[there]), _distances(place[number[there]])
     usual = float(np.mean(_distances(told) ** 2))
     n = int(there.sum())
     lacking = max(every**2 - n**2, 0) * usual
     return float(np.sqrt((np.sum((wanted - got) ** 2) + lacking) / (max(every, n) ** 2 * usual)))
+
+
+def _asked(count: int) -> NDArray[np.intp]:
+    """Which of so many commands are asked: all, or of many some, evenly spaced."""
+    return np.linspace(0, count - 1, min(count, _MOST_ASKED)).astype(np.intp)
 
 
 def _distances(points: Array) -> Array:

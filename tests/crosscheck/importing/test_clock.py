@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from made_data import soft_cogiro
 
-from crosscheck.importing import ImportChoices, import_case
+from crosscheck.importing import ImportChoices, import_case, take
 from crosscheck.importing.dwells import HeldCommands, find_dwells
 from crosscheck.importing.logs import Stream
 from crosscheck.importing.take import find_clock
@@ -42,6 +42,14 @@ def test_the_shift_is_found_and_said(made, tmp_path, clock):
     alone = taken(made, tmp_path, clock, ImportChoices(clock=clock))
     assert measured.position == pytest.approx(alone.measured.position, abs=3e-5)
     assert f"{abs(found.takes[0].held.clock):.3f} s {'more' if clock > 0 else 'less'}" in str(found)
+
+
+def test_of_many_commands_some_tell_the_shift(made, tmp_path, monkeypatch):
+    monkeypatch.setattr(take, "_MOST_ASKED", 10)
+    for clock in (37.3, -5.2):
+        found = taken(made, tmp_path, clock)
+        assert found.takes[0].held.clock == pytest.approx(clock, abs=0.3)
+    assert taken(made, tmp_path, 0.0).takes[0].held.clock == 0.0
 
 
 def test_one_clock_stays_one(made, tmp_path):
