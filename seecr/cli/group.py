@@ -173,8 +173,11 @@ def _refuse_taken(words: list[str], command: click.Command, ctx: click.Context) 
     options = {o: one for one in command.params if isinstance(one, click.Option) for o in one.opts}
     for k, word in enumerate(words):
         one = options.get(word)
-        for value in [] if one is None or one.is_flag else words[k + 1 : k + 1 + one.nargs]:
-            if one is not None and value in options:
+        # flags have no value, and where there is one for want of any it may be left out
+        if one is None or one.is_flag or isinstance(one.flag_value, str):
+            continue
+        for value in words[k + 1 : k + 1 + one.nargs]:
+            if value in options:
                 raise click.UsageError(f"{word}: expected {one.metavar}, got {value}", ctx)
 
 
