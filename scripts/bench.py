@@ -23,16 +23,18 @@ from pathlib import Path
 from typing import Any
 
 import bench_peers
+import bench_rows
 import numpy as np
 from paper_search import search
 
 import seecr
 from crosscheck.settle.settler import Settler
 from seecr.description.joints import pose_of_values, values_of_pose
+from seecr.effects.setup import plain_setup
 from seecr.files import write_text
 from seecr.parallel import processors, undivided
-from seecr.statics.batch import Brief
-from seecr.statics.tables import one_by_one
+from seecr.statics.batch import Brief, descend
+from seecr.statics.tables import PORTION, assemble, one_by_one
 from seecr.workspace.maps import default_axes
 
 # Poses of each robot, values along the axes of a map, and poses for the slow ways.
@@ -49,7 +51,8 @@ PAGE = """# Performance
 descent of a single pose, which small batches still take; "abreast" is the same descent for sixteen
 poses at once, which batches from 256 poses on take. Both are the whole of `seecr.solve`, in
 microseconds a pose on one processor. "Left" are poses that lanes leave to the descent of one:
-falls, saddles, and rests within rounding of a cable's rest length.
+falls, saddles, and rests within rounding of a cable's rest length. The "floor" of one by one is the
+number of evaluations times what one costs.
 
 {table}
 
@@ -75,6 +78,19 @@ catenaries, and `seecr` takes poses one by one. MoorPy says that it is done wher
 than its tolerance: if cables are stiff, forces are far from balanced there.
 
 {peers}
+
+## One pose and a million
+
+`seecr.solve` by the clock, in microseconds a pose; a batch is divided from 256 poses on. The best
+of some runs.
+
+{counts}
+
+Commands as a whole, in seconds of processor, against the rows of their data:
+sweeps to and fro of a robot with one hidden effect. `import` reads twelve samples of each. What is
+compiled is there. Of more than 1500 rows `diagnose` searches so many.
+
+{rows}
 
 ## Maps of any size
 
@@ -197,11 +213,23 @@ def row(name: str, robot: seecr.Robot) -> list[str]:
                 single = min(single, best_of(run, runs=1))
             abreast = min(abreast, best_of(run, runs=1))
     left = found.evaluation.alone.mean() if isinstance(found.evaluation, Brief) else 1.0
+    floor = 1e6 * evaluation(robot, poses[:PORTION]) * found.iterations.mean()
     return [
         name, f"{robot.n_cables}", f"{robot.ea.mean():.3g}", f"{found.slack.sum(1).mean():.1f}",
-        f"{found.iterations.mean():.1f}", f"{100 * left:.1f} %", f"{1e6 * single / POSES:.2f}",
-        f"{1e6 * abreast / POSES:.2f}", f"{single / abreast:.1f}",
+        f"{found.iterations.mean():.1f}", f"{100 * left:.1f} %", f"{floor:.2f}",
+        f"{1e6 * single / POSES:.2f}", f"{1e6 * abreast / POSES:.2f}", f"{single / abreast:.1f}",
     ]  # fmt: skip
+
+
+def evaluation(robot: seecr.Robot, poses: np.ndarray) -> float:
+    """Seconds of an evaluation in the descent of one pose: what two more of them add."""
+    with one_by_one(), undivided():
+        tables = assemble(plain_setup(robot, seecr.Commands(poses)))
+        one, three = (
+            best_of(lambda most=most: descend(tables, limit=most, staged=False))  # type: ignore[misc]
+            for most in (1, 3)
+        )
+    return 0.5 * (three - one) / len(poses)
 
 
 def maps(name: str) -> list[str]:
@@ -339,13 +367,17 @@ def figures(before: str | None, short: bool) -> dict[str, Any]:
         "processors": processors(), "peers": peers, "poses": POSES, "before": before,
         **compared, "maps": [maps(name) for name in DEMOBOTS],
         "stored": {"poses": poses, "microseconds": each, "gigabytes": memory},
-        "starting": starting(),
+        "starting": starting(), "counts": bench_rows.of_poses(DEMOBOTS, poses_of),
+        "rows": bench_rows.of_rows(spent_by),
     }  # fmt: skip
 
 
 def page_of(found: dict[str, Any]) -> str:
     """docs/performance.md."""
-    head = "robot, cables, E S (N), slack, evaluations, left, one by one (µs), abreast (µs), ratio"
+    head = (
+        "robot, cables, E S (N), slack, evaluations, left, floor (µs), one by one (µs), "
+        "abreast (µs), ratio"
+    )
     ways = {"paper": "the paper's search", "fsolve": "compiled", "mujoco": "in MuJoCo",
             "before": "before"}  # fmt: skip
     known = [way for way in ways if way in next(iter(found["ratios"].values()))]
@@ -364,6 +396,8 @@ def page_of(found: dict[str, Any]) -> str:
         ratios=table(", ".join(["robot, seecr (µs)", *(f"{ways[w]} (µs)" for w in known)]), lines),
         large=found["stored"]["poses"], store=found["stored"]["microseconds"],
         memory=found["stored"]["gigabytes"],
+        counts=table(bench_rows.POSES_HEAD, found["counts"]),
+        rows=table(bench_rows.ROWS_HEAD, found["rows"]),
         starting=table("command, processor (s)", [
             [f"`{command}`", f"{seconds:.2f}"] for command, seconds in found["starting"].items()
         ]),

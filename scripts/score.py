@@ -647,7 +647,7 @@ def page_of(found: dict[str, Any]) -> str:
     """The figures as docs/diagnosis.md has them."""
     parts = [
         f"{found['cases']} cases by `make score` (seed {found['seed']}, commit {found['commit']}); "
-        f"{found['left_out']} more took MuJoCo over a minute to settle and are left out.",
+        f"left out: {found['left_out']}, which MuJoCo took over a minute to settle.",
         _sizes_table(found["named_by_size"]),
         _sentences(found),
         _words_table("nothing is missing; the noise is", found["nulls"]),

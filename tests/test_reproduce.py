@@ -43,7 +43,7 @@ def test_what_is_kept_is_inside_its_own_intervals() -> None:
             100.0,
             "demobot_cogiro, mujoco: ",
         ),
-        ("speed robots 0 8", "3.0", "demobot_cogiro, E S 300 N, alone: 3 times, expected "),
+        ("speed robots 0 9", "3.0", "demobot_cogiro, E S 300 N, alone: 3 times, expected "),
     ],
 )
 def test_a_number_outside_is_told_with_what_was_expected(path: str, value: Any, said: str) -> None:
@@ -102,3 +102,19 @@ def test_a_changed_tree_is_of_no_commit(run: Any, monkeypatch: pytest.MonkeyPatc
 def test_a_script_that_fails_is_no_answer() -> None:
     with pytest.raises(SystemExit, match=r"scripts/none\.py ended with status 2"):
         reproduce.run("scripts/none.py")
+
+
+def test_a_page_may_move_by_how_its_numbers_are_rounded() -> None:
+    page = "# Seven\n\n| 7 | `wrench` | 0.21 mm | ± 0.0046 mm | 1.2e-05 |\n"
+    for new, same in (
+        (page.replace("0.0046", "0.0047"), True),
+        (page.replace("0.0046", "0.0048"), False),
+        (page.replace("1.2e-05", "1.1e-05"), True),
+        (page.replace("1.2e-05", "1.2e-04"), False),
+        (page.replace("| 7 |", "| 8 |"), False),  # counts are not rounded
+        (page.replace("wrench", "spring"), False),
+        (page + "\n", False),
+    ):
+        assert (reproduce.moved(page, new) == []) is same, new
+    assert reproduce.moved("a 0.0099 b", "a 0.010 b") == []
+    assert len(reproduce.moved("a 0.0096 b", "a 0.010 b")) > 0
