@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from made_data import SIGMA, measured, soft_cogiro, term
 from scipy import stats
 
+import seecr
 from crosscheck.comparison.associations import SIGNIFICANT, Association, f_test, labelled
 from crosscheck.comparison.noise import Coloured, underestimation
 from crosscheck.comparison.quantities import (
@@ -22,7 +24,7 @@ from crosscheck.comparison.quantities import (
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import error_size_words, misfit_sentence, noise_sentence
 from crosscheck.fit.residual_noise import Whiteness
-from crosscheck.measurements.data import Sigma
+from crosscheck.measurements.data import Measurements, Sigma
 from seecr.description.mjcf import load_robot, model_path
 from seecr.files import json_text
 from seecr.pose import pose_add, pose_difference, quat_from_rotvec, quat_multiply, rotvec_from_quat
@@ -134,6 +136,30 @@ def test_errors_are_traced_to_what_they_follow(robot, against):
         ends = [float(end) for b in first.bins for end in re.findall(r"[\d.]+", b.label)]
         assert len(ends) == 12 and ends == sorted(ends) and ends[0] == 0.0
         assert ends[-1] == pytest.approx(np.ptp(plain.t_s), rel=1e-3)
+
+
+def test_bins_hold_as_many_rows_each_in_whatever_order_they_are(robot):
+    """Against the quantiles of NumPy, for poses in no order."""
+    rng, n = np.random.default_rng(5), 120
+    pose = np.tile(robot.reference_pose, (n, 1))
+    pose[:, :3] += rng.uniform(-0.05, 0.05, (n, 3))
+    rest = seecr.solve(robot, pose).pose
+    off = np.zeros((n, 3))
+    off[:, 2] = 0.02 * (pose[:, 0] - pose[:, 0].mean())
+    data = Measurements(
+        Path("random.csv"), robot.n_cables, np.full(n, "all"), command_pose=pose,
+        position=rest[:, :3] + off + rng.normal(0.0, 1e-5, (n, 3)), sigma=Sigma(position_m=1e-5),
+    )  # fmt: skip
+    found = compare(robot, data)
+    bins = next(a for a in found.associations if a.against == "commanded x").bins
+    x, edges = pose[:, 0], np.quantile(pose[:, 0], np.arange(1, 6) / 6)
+    place = np.searchsorted(edges, x, side="right")
+    error = found.state.raw[:, 2]
+    assert [b.rows for b in bins] == [20] * 6
+    assert [b.mean for b in bins] == pytest.approx([error[place == k].mean() for k in range(6)])
+    for k, one in enumerate(bins):
+        ends = [float(end) for end in re.findall(r"[\d.]+", one.label)]
+        assert ends == pytest.approx([x[place == k].min(), x[place == k].max()], rel=2e-3)
 
 
 @pytest.mark.slow
