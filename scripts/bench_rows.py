@@ -34,7 +34,7 @@ _READINGS, _MOVING = 12, 2
 def of_poses(
     names: tuple[str, ...], poses_of: Callable[[seecr.Robot], np.ndarray]
 ) -> list[list[str]]:
-    """Microseconds a pose, from one to a million poses, by the clock: the best of three."""
+    """Microseconds a pose, from one to a million poses, by the clock: the best of some runs."""
     columns = []
     for name in names:
         robot = seecr.load_robot(seecr.model_path(name))

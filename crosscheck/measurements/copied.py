@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +83,7 @@ def _first_like(data: Measurements, wanted: Callable[[str], bool]) -> NDArray[np
     Rows are sorted by a key of 64 bits, with which whole rows are compared afterwards: sorted
     themselves they take five times the memory. With other keys should two rows have the same one.
     """
-    for first_key in range(data.n_rows + 1):
+    for first_key in count():
         key = np.full(data.n_rows, first_key, dtype=np.uint64)
         for column in _stated(data, wanted):
             key = _mixed(key ^ column.view(np.uint64))
@@ -90,8 +91,8 @@ def _first_like(data: Measurements, wanted: Callable[[str], bool]) -> NDArray[np
         before = first[which.ravel()]
         bits = (column.view(np.uint64) for column in _stated(data, wanted))
         if not any(np.any(each != each[before]) for each in bits):
-            break
-    return np.asarray(before)
+            return np.asarray(before)
+    raise AssertionError("there is always another key")
 
 
 def _mixed(key: NDArray[np.uint64]) -> NDArray[np.uint64]:
